@@ -1,0 +1,1 @@
+"""virtualrig: an independent time-domain stand-in for a hydraulic test bench."""
