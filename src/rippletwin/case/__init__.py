@@ -1,0 +1,27 @@
+"""A case: the rig and the recordings a user gives, read and checked."""
+
+from rippletwin.case.model import (
+    STATE_CODES,
+    Case,
+    FlowRipple,
+    Fluid,
+    Load,
+    Recording,
+    Rig,
+    Segment,
+    Sensor,
+    Uncertainty,
+)
+
+__all__ = [
+    "STATE_CODES",
+    "Case",
+    "FlowRipple",
+    "Fluid",
+    "Load",
+    "Recording",
+    "Rig",
+    "Segment",
+    "Sensor",
+    "Uncertainty",
+]

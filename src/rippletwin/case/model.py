@@ -1,0 +1,159 @@
+"""What a user gives: the rig and its recordings, as frozen dataclasses named as in rig.yaml."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+STATE_CODES = {
+    "healthy": "H",
+    "slipper": "S",
+    "cylinder": "C",
+    "cylinder_slight": "C1",
+    "cylinder_severe": "C2",
+    "unknown": None,
+}
+"""State labels of rig.yaml and the class they stand for; None is a state nobody knows."""
+
+
+@dataclass(frozen=True)
+class Fluid:
+    """Density (kg/m3), kinematic viscosity (m2/s); a gas also has gamma = cp/cv and Prandtl."""
+
+    density: float
+    kinematic_viscosity: float
+    heat_capacity_ratio: float | None = None
+    prandtl: float | None = None
+
+    @property
+    def is_gas(self) -> bool:
+        return self.heat_capacity_ratio is not None
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A uniform pipe: length (m), inner diameter (m), wave speed (m/s), temperature (K)."""
+
+    length: float
+    diameter: float
+    wave_speed: float
+    temperature: float | None = None
+
+    @property
+    def area(self) -> float:
+        return np.pi * self.diameter**2 / 4
+
+    @property
+    def delay(self) -> float:
+        """Travel time of a wave through the segment, s."""
+        return self.length / self.wave_speed
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A pressure sensor and its distance from the pump outlet (m)."""
+
+    name: str
+    position: float
+
+
+@dataclass(frozen=True)
+class Load:
+    """What closes the line: orifice, open, closed, anechoic or impedance (measured, from a file).
+
+    `coefficient` is K_v of the orifice law q = K_v sqrt(p - back_pressure), m3/s/sqrt(Pa); None
+    leaves it to the twin, which takes it from mean flow and load pressure. A measured impedance is
+    `impedance` (F,) complex, Pa s/m3, at `frequency_hz` (F,).
+    """
+
+    kind: str
+    coefficient: float | None = None
+    back_pressure: float = 0.0
+    frequency_hz: np.ndarray | None = None
+    impedance: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Standard deviations of the data sheet: relative, except `sensor_position` in metres."""
+
+    length: float = 0.01
+    diameter: float = 0.03
+    wave_speed: float = 0.05
+    viscosity: float = 0.1
+    load: float = 0.05
+    sensor_position: float = 0.02
+
+
+@dataclass(frozen=True)
+class FlowRipple:
+    """Flow into the line over one revolution: flow (M,), m3/s, at angle_deg (M,), ascending.
+
+    `pressure_mean` is the mean outlet pressure (Pa) at which it was computed, where that is known.
+    """
+
+    angle_deg: np.ndarray
+    flow: np.ndarray
+    pressure_mean: float | None = None
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One entry of rig.yaml's `recordings`, read and checked.
+
+    Periodic and random recordings carry `pressure` (S, N), Pa; spectrum and input_impedance carry
+    `frequency_hz` (F,) and `spectra` (repeats, S, F) complex: Pa, or Pa s/m3 (`normalised`: in
+    units of the first segment's characteristic impedance). What does not apply is None.
+    """
+
+    file: Path
+    kind: str
+    state: str
+    label: str
+    speed_rpm: float | None = None
+    load_pressure: float | None = None
+    sampling_rate_hz: float | None = None
+    pressure: np.ndarray | None = None
+    flow_ripple: FlowRipple | None = None
+    frequency_hz: np.ndarray | None = None
+    spectra: np.ndarray | None = None
+    relative_error: float | None = None
+    normalised: bool = False
+
+    @property
+    def state_code(self) -> str | None:
+        """H, S, C, C1 or C2; None where the state is unknown."""
+        return STATE_CODES[self.state]
+
+
+@dataclass(frozen=True)
+class Rig:
+    """The test bench; `pump` holds the keys of rig.yaml's pump (pistons, and geometry if given)."""
+
+    fluid: Fluid
+    pump: dict
+    line: tuple[Segment, ...]
+    sensors: tuple[Sensor, ...]
+    load: Load
+    uncertainty: Uncertainty = Uncertainty()
+
+    @property
+    def length(self) -> float:
+        """Length of the whole line, m."""
+        return sum(segment.length for segment in self.line)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A folder with a rig and its recordings."""
+
+    folder: Path
+    rig: Rig
+    recordings: tuple[Recording, ...]
+
+    @property
+    def healthy(self) -> list[Recording]:
+        """The recordings that calibration and explanation use."""
+        return [recording for recording in self.recordings if recording.state == "healthy"]
