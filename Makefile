@@ -1,0 +1,35 @@
+PYTHON ?= python3
+BIN := .venv/bin
+CORES ?= 2
+# One thread a process: two processes share two cores well, two processes of two threads do not.
+export OMP_NUM_THREADS = 1
+export MKL_NUM_THREADS = 1
+export NUMBA_NUM_THREADS = 1
+
+.PHONY: run smoke test test-long lint clean
+
+run: .venv/ready
+	$(BIN)/snakemake --cores $(CORES)
+
+smoke: .venv/ready
+	$(BIN)/snakemake --cores $(CORES) --configfile config/smoke.yaml
+
+test: .venv/ready lint
+	$(BIN)/python -m pytest -n $(CORES) -m "not long"
+
+test-long: .venv/ready
+	$(BIN)/python -m pytest -n $(CORES)
+
+lint: .venv/ready
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/snakefmt --check Snakefile workflow/rules
+	$(BIN)/snakemake --lint
+
+.venv/ready: environment.txt pyproject.toml
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --requirement environment.txt
+	touch $@
+
+clean:
+	rm -rf .venv .snakemake results
