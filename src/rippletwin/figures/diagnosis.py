@@ -1,0 +1,98 @@
+"""Pictures of the diagnosis: confusion matrices, accuracy beside the paper, SST images."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from rippletwin.figures import style
+
+
+def confusion(
+    matrices: Mapping[str, np.ndarray], truth: Sequence[str], predicted: Sequence[str]
+) -> Figure:
+    """Confusion matrices, one panel a name: (len(truth), len(predicted)) shares of a row."""
+    columns = min(5, len(matrices))
+    rows = -(-len(matrices) // columns)
+    fig, axes = style.figure(rows, columns, height=1.7, sharex=True, sharey=True)
+    for ax in axes.flat[len(matrices) :]:
+        ax.set_visible(False)
+    for ax, (name, matrix) in zip(axes.flat, matrices.items()):
+        ax.imshow(matrix, vmin=0, vmax=1, cmap="Blues", aspect="auto")
+        for (i, j), share in np.ndenumerate(matrix):
+            ax.text(
+                j, i, f"{100 * share:.0f}", ha="center", va="center", fontsize=7,
+                color="white" if share > 0.6 else "black",
+            )  # fmt: skip
+        ax.set_title(name, fontsize=7)
+        ax.set_xticks(range(len(predicted)), predicted)
+        ax.set_yticks(range(len(truth)), truth)
+        ax.spines[:].set_visible(False)
+        ax.tick_params(length=0)
+    fig.supxlabel("predicted (% of the recording's windows)", fontsize=9)
+    fig.supylabel("recorded", fontsize=9)
+    return fig
+
+
+def accuracy(
+    architectures: Sequence[str],
+    ours: Mapping[str, np.ndarray],
+    paper: Mapping[str, np.ndarray],
+) -> Figure:
+    """Accuracy per architecture, one panel a dataset, beside the paper's.
+
+    ours, paper: dataset -> (A, 2) mean and standard deviation in per cent, NaN where absent.
+    """
+    fig, axes = style.figure(1, len(ours), height=3.4, sharey=True)
+    rows = np.arange(len(architectures))
+    for ax, dataset in zip(axes[0], ours):
+        mean, spread = np.asarray(ours[dataset]).T
+        ax.barh(rows, mean, xerr=spread, color=style.CALIBRATED, height=0.6, label="rippletwin")
+        if dataset in paper:
+            mean, spread = np.asarray(paper[dataset]).T
+            ax.errorbar(
+                mean, rows, xerr=spread, fmt="D", ms=4, color=style.ALARM, label="paper", zorder=3
+            )
+        ax.set_title(dataset)
+        ax.set_xlim(0, 105)
+    axes[0, 0].set_yticks(rows, architectures)
+    axes[0, 0].invert_yaxis()
+    fig.supxlabel("accuracy on recordings / %", fontsize=9)
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    fig.legend(handles, labels, loc="outside upper right", ncols=2)
+    return fig
+
+
+def sst(
+    images: Mapping[str, np.ndarray], frequency_hz: np.ndarray, shaft_hz: float, pistons: int
+) -> Figure:
+    """SST images side by side: name -> (size, size), lowest frequency in the first row.
+
+    frequency_hz (size,) is the (logarithmic) axis of the rows; ticks are multiples of the shaft
+    and the pumping frequency. Time runs over two revolutions.
+    """
+    columns = min(4, len(images))
+    rows = -(-len(images) // columns)
+    fig, axes = style.figure(rows, columns, height=2.1, sharex=True, sharey=True)
+    for ax in axes.flat[len(images) :]:
+        ax.set_visible(False)
+    top = max(float(np.max(image)) for image in images.values())
+    low = min(float(np.min(image)) for image in images.values())
+    pumping = shaft_hz * pistons
+    ticks = [(shaft_hz, "1 shaft"), (2 * shaft_hz, "2"), (4 * shaft_hz, "4")]
+    ticks += [(k * pumping, "1 pumping" if k == 1 else str(k)) for k in (1, 2, 3, 5, 10)]
+    log_axis = np.log(frequency_hz)
+    shown = [(f, text) for f, text in ticks if frequency_hz[0] <= f <= frequency_hz[-1] * 1.001]
+    for ax, (name, image) in zip(axes.flat, images.items()):
+        mesh = ax.imshow(
+            image, origin="lower", aspect="auto", cmap=style.SEQUENTIAL, vmin=low, vmax=top,
+            extent=(0, 2, log_axis[0], log_axis[-1]),
+        )  # fmt: skip
+        ax.set_title(name)
+        ax.set_yticks([np.log(f) for f, _ in shown], [text for _, text in shown])
+    fig.supxlabel("revolutions", fontsize=9)
+    fig.supylabel("frequency / multiples of shaft and pumping frequency", fontsize=9)
+    fig.colorbar(mesh, ax=axes, label="image value", shrink=0.8)
+    return fig

@@ -1,0 +1,66 @@
+"""Ripples over one revolution, and what calibration made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from rippletwin.figures import style
+
+_LOOK = {
+    "measured": dict(color=style.MEASURED, lw=1.6),
+    "nominal": dict(color=style.NOMINAL, ls="--"),
+    "calibrated": dict(color=style.CALIBRATED),
+    "corrected": dict(color=style.CORRECTED, ls="-."),
+}
+
+
+def overlay(
+    angle_deg: np.ndarray, curves: Mapping[str, np.ndarray], sensors: Sequence[str], title: str = ""
+) -> Figure:
+    """Pressure ripple at each sensor: measured, nominal, calibrated (and corrected).
+
+    angle_deg (M,); curves: name -> (S, M) Pa; one panel a sensor.
+    """
+    fig, axes = style.figure(len(sensors), 1, height=1.9, sharex=True)
+    for k, (ax, sensor) in enumerate(zip(axes[:, 0], sensors)):
+        for name, values in curves.items():
+            ax.plot(angle_deg, values[k] / 1e6, label=name, **_LOOK.get(name, {}))
+        ax.set_ylabel(f"{sensor}: ripple / MPa")
+    axes[0, 0].legend(ncols=len(curves), loc="upper right")
+    axes[0, 0].set_title(title)
+    axes[-1, 0].set_xlabel("crank angle / degrees")
+    axes[-1, 0].set_xlim(angle_deg[0], angle_deg[-1])
+    axes[-1, 0].set_xticks(np.arange(0, 361, 40))
+    return fig
+
+
+def states(
+    angle_deg: np.ndarray, curves: Mapping[str, np.ndarray], ylabel: str, scale: float = 1.0
+) -> Figure:
+    """One ripple a state, one panel each: curves name -> (M,), divided by `scale`."""
+    fig, axes = style.figure(len(curves), 1, height=1.3, sharex=True, sharey=True)
+    for ax, (name, values) in zip(axes[:, 0], curves.items()):
+        ax.plot(angle_deg, values / scale, color=style.CALIBRATED)
+        ax.set_title(name, loc="left")
+    fig.supylabel(ylabel, fontsize=9)
+    axes[-1, 0].set_xlabel("crank angle / degrees")
+    axes[-1, 0].set_xticks(np.arange(0, 361, 40))
+    return fig
+
+
+def harmonics(
+    frequency_hz: np.ndarray, curves: Mapping[str, np.ndarray], sensors: Sequence[str]
+) -> Figure:
+    """Magnitude of the piston harmonics at each sensor: name -> (S, F) complex Pa."""
+    fig, axes = style.figure(len(sensors), 1, height=1.9, sharex=True)
+    for k, (ax, sensor) in enumerate(zip(axes[:, 0], sensors)):
+        for marker, (name, values) in zip("os^dv", curves.items()):
+            look = {key: v for key, v in _LOOK.get(name, {}).items() if key != "ls"}
+            ax.semilogy(frequency_hz, np.abs(values[k]) / 1e3, marker, ms=4, label=name, **look)
+        ax.set_ylabel(f"{sensor}: amplitude / kPa")
+    axes[0, 0].legend(ncols=len(curves), loc="upper right")
+    axes[-1, 0].set_xlabel("frequency / Hz")
+    return fig
