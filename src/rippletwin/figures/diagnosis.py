@@ -75,7 +75,7 @@ def sst(
     """
     columns = min(4, len(images))
     rows = -(-len(images) // columns)
-    fig, axes = style.figure(rows, columns, height=2.1, sharex=True, sharey=True)
+    fig, axes = style.figure(rows, columns, height=2.4, sharex=True, sharey=True)
     for ax in axes.flat[len(images) :]:
         ax.set_visible(False)
     top = max(float(np.max(image)) for image in images.values())
@@ -93,6 +93,6 @@ def sst(
         ax.set_title(name)
         ax.set_yticks([np.log(f) for f, _ in shown], [text for _, text in shown])
     fig.supxlabel("revolutions", fontsize=9)
-    fig.supylabel("frequency / multiples of shaft and pumping frequency", fontsize=9)
+    fig.supylabel("frequency in multiples of shaft\nand pumping frequency", fontsize=9)
     fig.colorbar(mesh, ax=axes, label="image value", shrink=0.8)
     return fig

@@ -29,8 +29,8 @@ def overlay(
         for name, values in curves.items():
             ax.plot(angle_deg, values[k] / 1e6, label=name, **_LOOK.get(name, {}))
         ax.set_ylabel(f"{sensor}: ripple / MPa")
-    axes[0, 0].legend(ncols=len(curves), loc="upper right")
-    axes[0, 0].set_title(title)
+    _legend(fig, axes)
+    axes[0, 0].set_title(title, loc="left")
     axes[-1, 0].set_xlabel("crank angle / degrees")
     axes[-1, 0].set_xlim(angle_deg[0], angle_deg[-1])
     axes[-1, 0].set_xticks(np.arange(0, 361, 40))
@@ -61,6 +61,11 @@ def harmonics(
             look = {key: v for key, v in _LOOK.get(name, {}).items() if key != "ls"}
             ax.semilogy(frequency_hz, np.abs(values[k]) / 1e3, marker, ms=4, label=name, **look)
         ax.set_ylabel(f"{sensor}: amplitude / kPa")
-    axes[0, 0].legend(ncols=len(curves), loc="upper right")
+    _legend(fig, axes)
     axes[-1, 0].set_xlabel("frequency / Hz")
     return fig
+
+
+def _legend(fig: Figure, axes: np.ndarray) -> None:
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    fig.legend(handles, labels, loc="outside upper right", ncols=len(labels))

@@ -18,37 +18,36 @@ CYCLE = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000
 SEQUENTIAL, DIVERGING = "viridis", "RdBu_r"
 COLUMN = 7.0  # inches, width of a text column
 
-_RC = {
-    "figure.constrained_layout.use": True,
-    "figure.dpi": 110,
-    "savefig.dpi": 160,
-    "font.size": 9,
-    "axes.titlesize": 9,
-    "axes.labelsize": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.prop_cycle": mpl.cycler(color=CYCLE),
-    "axes.grid": False,
-    "legend.frameon": False,
-    "legend.fontsize": 8,
-    "lines.linewidth": 1.2,
-    "svg.hashsalt": "rippletwin",  # the same picture gives the same bytes
-}
+# Set once for the process: text and legends drawn after a figure is made follow it too.
+mpl.rcParams.update(
+    {
+        "figure.constrained_layout.use": True,
+        "figure.dpi": 110,
+        "savefig.dpi": 160,
+        "font.size": 9,
+        "axes.titlesize": 9,
+        "axes.labelsize": 9,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "axes.prop_cycle": mpl.cycler(color=CYCLE),
+        "axes.grid": False,
+        "legend.frameon": False,
+        "legend.fontsize": 8,
+        "lines.linewidth": 1.2,
+        "svg.hashsalt": "rippletwin",  # the same picture gives the same bytes
+    }
+)
 
 
 def figure(rows: int = 1, columns: int = 1, height: float = 2.2, **kwargs):
     """A figure one text column wide and its axes (rows, columns), `height` inches a row."""
-    with mpl.rc_context(_RC):
-        fig = Figure(figsize=(COLUMN, height * rows), layout="constrained")
-        axes = fig.subplots(rows, columns, squeeze=False, **kwargs)
-    return fig, axes
+    fig = Figure(figsize=(COLUMN, height * rows), layout="constrained")
+    return fig, fig.subplots(rows, columns, squeeze=False, **kwargs)
 
 
 def save(fig: Figure, *paths) -> None:
     """Write a figure to each of `paths`; the suffix (.png, .svg) is the format."""
-    with mpl.rc_context(_RC):
-        for path in paths:
-            path = Path(path)
-            path.parent.mkdir(parents=True, exist_ok=True)
-            metadata = {"Date": None} if path.suffix == ".svg" else None
-            fig.savefig(path, metadata=metadata)
+    for path in map(Path, paths):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        metadata = {"Date": None} if path.suffix == ".svg" else None
+        fig.savefig(path, metadata=metadata)
