@@ -1,0 +1,74 @@
+"""Training samples from simulated seeds, and the split of recordings by time.
+
+The paper's augmentation: one simulated revolution for each class becomes many samples by a random
+cyclic shift (there is no tachometer: the crank angle of a window's first point is unknown) and
+Gaussian noise. Only the mean is removed: amplitude is the diagnosis, so nothing is normalised.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+NOISE_FRACTION = 0.15  # of the estimated sensor noise (the paper's augmentation)
+
+
+def augment(
+    seed: np.ndarray,
+    samples_per_class: int,
+    noise_std: np.ndarray,
+    rng: np.random.Generator,
+    revolutions: int = 1,
+    noise_fraction: float = NOISE_FRACTION,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Shifted, noisy, mean-free samples of one seed revolution for each class.
+
+    seed : (classes, channels, M), one whole revolution, Pa or m3/s.
+    noise_std : (channels,) estimated standard deviation of the sensor noise, the seed's unit;
+        ``noise_fraction`` of it is added.
+    revolutions : length of a sample; the signal repeats, its noise does not.
+
+    Returns x (classes * samples_per_class, channels, M * revolutions) float32 and
+    y (classes * samples_per_class,), in class order. Raises ValueError for shapes that disagree or
+    for a seed that is not finite.
+    """
+    seed = np.asarray(seed, dtype=float)
+    if seed.ndim != 3:
+        raise ValueError(f"seed must be (classes, channels, M), got shape {seed.shape}")
+    classes, channels, points = seed.shape
+    noise_std = np.broadcast_to(np.asarray(noise_std, dtype=float), (channels,))
+    if not (np.isfinite(seed).all() and np.isfinite(noise_std).all()):
+        raise ValueError("seed and noise_std must be finite")
+
+    y = np.repeat(np.arange(classes), samples_per_class)
+    shift = rng.integers(points, size=y.size)
+    at = (np.arange(points * revolutions) + shift[:, None]) % points
+    x = np.empty((y.size, channels, points * revolutions), dtype=np.float32)
+    for label in range(classes):
+        of_class = y == label
+        x[of_class] = seed[label][:, at[of_class]].swapaxes(0, 1)
+    std = (noise_fraction * noise_std).astype(np.float32)
+    x += std[:, None] * rng.standard_normal(x.shape, dtype=np.float32)
+    return remove_mean(x), y
+
+
+def remove_mean(x: np.ndarray) -> np.ndarray:
+    """x (..., M) less its mean along the last axis: what recordings and samples both get."""
+    return x - x.mean(axis=-1, keepdims=True)
+
+
+def split_by_time(
+    n_per_recording: list[int] | np.ndarray, fraction: float = 0.8, gap: int = 0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Early windows of each recording for training, late ones for testing: indices (a,), (b,).
+
+    n_per_recording : windows of each recording, in the order in which they are stacked.
+    gap : windows dropped between the two parts. Neighbouring windows are never on both sides, as
+        shuffling would have them.
+    """
+    train, test, start = [], [], 0
+    for n in n_per_recording:
+        cut = round(fraction * n)
+        train.append(np.arange(start, start + cut))
+        test.append(np.arange(start + cut + gap, start + n))
+        start += n
+    return np.concatenate(train), np.concatenate(test)

@@ -1,0 +1,146 @@
+"""The ten classifiers of the paper: plain and residual networks on time windows and on images.
+
+Source: Dong, Tao, Liu, "Digital Twin-Driven Zero-Shot Fault Diagnosis of Axial Piston Pumps Using
+Fluid-Borne Noise Signals", tables of CNN1D (341@100) and CNN2D (3x3@1) with their notes. ``k@s``
+names the kernel and stride of the first convolution; the architectures of one domain differ in
+nothing else, or in what follows it (residual blocks). docs/learning.md tells how the tables are
+read where they leave a choice.
+
+A time window is convolved as an image of one row: the same arithmetic as a 1D convolution, for
+which the CPU kernels of torch are up to twice as fast in channels-last order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import nn
+
+CLASSES = ("H", "S", "C1", "C2")
+WIDTH = 64  # feature maps of every plain layer and of the first residual stage
+
+
+@dataclass(frozen=True)
+class Architecture:
+    """One row of the paper's accuracy table."""
+
+    title: str  # as the paper prints it
+    domain: str  # "time": (n, channels, M) windows; "image": (n, channels, size, size)
+    kernel: int  # of the first convolution
+    stride: int
+    padding: int  # on either side; circular on time windows (one revolution is a period)
+    blocks: tuple[int, ...] = ()  # residual blocks in each stage; none: the plain network
+
+
+# 1D: 1536 is half a revolution on either side, the one padding that gives the table's (64, 59) for
+# kernel 341, stride 100 and 3072 points; 150@50 gives (64, 59) without any.
+ARCHITECTURES: dict[str, Architecture] = {
+    "cnn1d_341_100": Architecture("CNN1D (341@100)", "time", 341, 100, 1536),
+    "cnn1d_150_50": Architecture("CNN1D (150@50)", "time", 150, 50, 0),
+    "cnn1d_3_1": Architecture("CNN1D (3@1)", "time", 3, 1, 1),
+    "resnet18_1d": Architecture("ResNet18 (341@100)", "time", 341, 100, 1536, (2, 2, 2, 2)),
+    "resnet34_1d": Architecture("ResNet34 (341@100)", "time", 341, 100, 1536, (3, 4, 6, 3)),
+    "cnn2d_3_1": Architecture("CNN2D (3×3@1)", "image", 3, 1, 1),
+    "cnn2d_7_2": Architecture("CNN2D (7×7@2)", "image", 7, 2, 3),
+    "cnn2d_30_3": Architecture("CNN2D (30×30@3)", "image", 30, 3, 14),
+    "resnet18_2d": Architecture("ResNet18 (3×3@1)", "image", 3, 1, 1, (2, 2, 2, 2)),
+    "resnet34_2d": Architecture("ResNet34 (3×3@1)", "image", 3, 1, 1, (3, 4, 6, 3)),
+}
+
+
+def build(name: str, channels: int, classes: int = len(CLASSES)) -> Classifier:
+    """A fresh network, initialised from torch's global generator.
+
+    name : a key of ``ARCHITECTURES``; channels : 2 for two pressure sensors, 1 for the outlet flow.
+    Raises KeyError for an unknown name.
+    """
+    architecture = ARCHITECTURES[name]
+    return Classifier(architecture, channels, classes).to(memory_format=torch.channels_last)
+
+
+class Classifier(nn.Module):
+    """Feature maps, global average pooling, one linear layer: logits (n, classes).
+
+    ``scale`` is the only standardisation there is: one number for all samples, channels and times
+    (amplitude is the diagnosis). Training sets it to the root mean square of its inputs.
+    """
+
+    def __init__(self, architecture: Architecture, channels: int, classes: int):
+        super().__init__()
+        self.architecture = architecture
+        self.register_buffer("scale", torch.ones(()))
+        layers = _residual if architecture.blocks else _plain
+        self.features, width = layers(architecture, channels)
+        self.pool = nn.AdaptiveAvgPool2d(1)
+        self.head = nn.Linear(width, classes)
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        """x (n, channels, M) or (n, channels, size, size) in the data's own unit -> (n, classes)"""
+        if self.architecture.domain == "time":
+            x = x.unsqueeze(-2)
+        x = (x / self.scale).contiguous(memory_format=torch.channels_last)
+        return self.head(self.pool(self.features(x)).flatten(1))
+
+
+def _plain(a: Architecture, channels: int) -> tuple[nn.Sequential, int]:
+    pools = (
+        (nn.MaxPool2d((1, 3), (1, 2), (0, 1)), nn.MaxPool2d((1, 3), 1, (0, 1)))
+        if a.domain == "time"
+        else (nn.MaxPool2d(2), nn.MaxPool2d(2))
+    )
+    layers = []
+    for convolution, pool in zip((_first(a, channels), _same(a.domain, WIDTH, WIDTH)), pools):
+        layers += [convolution, nn.ReLU(inplace=True), pool]
+    return nn.Sequential(*layers), WIDTH
+
+
+def _residual(a: Architecture, channels: int) -> tuple[nn.Sequential, int]:
+    """He et al. 2016, table 1, basic blocks; the first convolution is the architecture's."""
+    pool = nn.MaxPool2d((1, 3), (1, 2), (0, 1)) if a.domain == "time" else nn.MaxPool2d(3, 2, 1)
+    layers = [_first(a, channels, bias=False), nn.BatchNorm2d(WIDTH), nn.ReLU(inplace=True), pool]
+    width = WIDTH
+    for stage, blocks in enumerate(a.blocks):
+        stage_width = WIDTH * 2**stage
+        for block in range(blocks):
+            stride = 2 if stage and not block else 1
+            layers.append(BasicBlock(a.domain, width, stage_width, stride))
+            width = stage_width
+    return nn.Sequential(*layers), width
+
+
+class BasicBlock(nn.Module):
+    """relu(x + F(x)), F two convolutions of three taps; x is projected where the shape changes."""
+
+    def __init__(self, domain: str, width_in: int, width: int, stride: int):
+        super().__init__()
+        self.residual = nn.Sequential(
+            _same(domain, width_in, width, stride, bias=False),
+            nn.BatchNorm2d(width),
+            nn.ReLU(inplace=True),
+            _same(domain, width, width, bias=False),
+            nn.BatchNorm2d(width),
+        )
+        self.shortcut = nn.Identity()
+        if stride != 1 or width_in != width:
+            strides = (1, stride) if domain == "time" else stride
+            self.shortcut = nn.Sequential(
+                nn.Conv2d(width_in, width, 1, strides, bias=False), nn.BatchNorm2d(width)
+            )
+        self.activation = nn.ReLU(inplace=True)
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        return self.activation(self.residual(x) + self.shortcut(x))
+
+
+def _first(a: Architecture, channels: int, bias: bool = True) -> nn.Conv2d:
+    if a.domain == "time":
+        shape = ((1, a.kernel), (1, a.stride), (0, a.padding))
+        return nn.Conv2d(channels, WIDTH, *shape, bias=bias, padding_mode="circular")
+    return nn.Conv2d(channels, WIDTH, a.kernel, a.stride, a.padding, bias=bias)
+
+
+def _same(domain: str, width_in: int, width: int, stride: int = 1, bias: bool = True) -> nn.Conv2d:
+    """Three taps (3 x 3 in an image), padded so that stride 1 keeps the shape."""
+    shape = ((1, 3), (1, stride), (0, 1)) if domain == "time" else (3, stride, 1)
+    return nn.Conv2d(width_in, width, *shape, bias=bias)

@@ -1,0 +1,163 @@
+"""Training to a stated convergence rule, and prediction.
+
+A training has **converged** when the loss on its validation split (samples of the same simulation,
+never a recording) has either stayed below ``target_loss`` for ``patience`` epochs in a row, or
+not fallen by ``min_improvement`` (relative) for ``plateau`` epochs. The weights of the epoch with
+the lowest validation loss are kept. A training that reaches ``max_epochs`` first is reported as not
+converged.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import torch
+from torch import nn
+
+# glibc returns every large tensor to the kernel and faults its pages in again at the next step: up
+# to half of a step's time. To be in the environment before Python starts.
+MALLOC_ENVIRONMENT = {
+    "MALLOC_MMAP_MAX_": "0",
+    "MALLOC_TRIM_THRESHOLD_": "17179869184",
+    "MALLOC_TOP_PAD_": "268435456",
+}
+
+
+@dataclass(frozen=True)
+class TrainingSettings:
+    batch_size: int = 32
+    learning_rate: float = 1e-3
+    validation_fraction: float = 0.2
+    target_loss: float = 0.02  # nats a sample
+    patience: int = 2  # epochs in a row below target_loss
+    plateau: int = 10  # epochs without improvement
+    min_improvement: float = 0.01  # relative
+    max_epochs: int = 100
+    threads: int = 1
+
+
+@dataclass
+class History:
+    """Per epoch: mean losses and validation accuracy; and how it ended."""
+
+    training_loss: list[float] = field(default_factory=list)
+    validation_loss: list[float] = field(default_factory=list)
+    validation_accuracy: list[float] = field(default_factory=list)
+    best_epoch: int = 0
+    converged: bool = False
+    reason: str = "max_epochs"  # or "target" or "plateau"
+
+    @property
+    def epochs(self) -> int:
+        return len(self.validation_loss)
+
+
+def train(
+    network: nn.Module,
+    x: np.ndarray,
+    y: np.ndarray,
+    settings: TrainingSettings,
+    seed: int,
+    progress: Callable[[int, History], None] | None = None,
+) -> tuple[nn.Module, History]:
+    """Adam on the cross entropy of (x, y) until the rule above stops it; deterministic in ``seed``.
+
+    x : (n, channels, M) or (n, channels, size, size); y : (n,) class indices.
+    The network's weights are drawn anew from ``seed``; ``network.scale`` becomes the root mean
+    square of the training part of x. progress(epoch, history) is called after every epoch.
+    Sets torch's thread count to ``settings.threads``. Raises ValueError where a class has no
+    sample in one of the two parts.
+    """
+    torch.set_num_threads(settings.threads)
+    rng = np.random.default_rng(seed)
+    fit, held = stratified_split(y, settings.validation_fraction, rng)
+    images, labels = torch.as_tensor(x, dtype=torch.float32), torch.as_tensor(y)
+    initialise(network, seed)
+    network.scale.fill_(float(images[fit].double().square().mean().sqrt()) or 1.0)
+    optimiser = torch.optim.Adam(network.parameters(), lr=settings.learning_rate, fused=True)
+    history, best = History(), None
+
+    for epoch in range(settings.max_epochs):
+        network.train()
+        order, total = torch.as_tensor(rng.permutation(fit)), 0.0
+        for batch in order.split(settings.batch_size):
+            if len(batch) < 2:  # batch normalisation needs two
+                continue
+            loss = nn.functional.cross_entropy(network(images[batch]), labels[batch])
+            optimiser.zero_grad()
+            loss.backward()
+            optimiser.step()
+            total += float(loss.detach()) * len(batch)
+        logits = _logits(network, images[held])
+        history.training_loss.append(total / len(fit))
+        history.validation_loss.append(float(nn.functional.cross_entropy(logits, labels[held])))
+        history.validation_accuracy.append(
+            float((logits.argmax(1) == labels[held]).double().mean())
+        )
+        if (
+            best is None
+            or history.validation_loss[-1] < history.validation_loss[history.best_epoch]
+        ):
+            history.best_epoch, best = epoch, copy.deepcopy(network.state_dict())
+        if progress:
+            progress(epoch, history)
+        reason = stopping_reason(history.validation_loss, settings)
+        if reason:
+            history.converged, history.reason = True, reason
+            break
+
+    network.load_state_dict(best)
+    return network.eval(), history
+
+
+def stopping_reason(validation_loss: list[float], settings: TrainingSettings) -> str | None:
+    """ "target", "plateau", or None while the rule at the top of this module says go on."""
+    recent = validation_loss[-settings.patience :]
+    if len(recent) == settings.patience and max(recent) < settings.target_loss:
+        return "target"
+    if len(validation_loss) > settings.plateau:
+        before, after = validation_loss[: -settings.plateau], validation_loss[-settings.plateau :]
+        if min(after) > (1 - settings.min_improvement) * min(before):
+            return "plateau"
+    return None
+
+
+def stratified_split(
+    y: np.ndarray, fraction: float, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Indices to fit (most) and to hold out (``fraction`` of every class)."""
+    fit, held = [], []
+    for label in np.unique(y):
+        index = rng.permutation(np.flatnonzero(y == label))
+        cut = round(fraction * len(index))
+        if not 0 < cut < len(index):
+            raise ValueError(f"class {label} has {len(index)} samples: too few to split")
+        held.append(index[:cut])
+        fit.append(index[cut:])
+    return np.concatenate(fit), np.concatenate(held)
+
+
+def initialise(network: nn.Module, seed: int) -> None:
+    """Draw every parameter anew by its layer's own rule, leaving torch's global generator alone."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        for layer in network.modules():
+            if hasattr(layer, "reset_parameters"):
+                layer.reset_parameters()
+
+
+def predict(
+    network: nn.Module, x: np.ndarray, batch_size: int = 64
+) -> tuple[np.ndarray, np.ndarray]:
+    """Class indices (n,) and probabilities (n, classes) of x, in its own unit."""
+    logits = _logits(network, torch.as_tensor(x, dtype=torch.float32), batch_size)
+    return logits.argmax(1).numpy(), logits.softmax(1).numpy()
+
+
+@torch.no_grad()
+def _logits(network: nn.Module, x: torch.Tensor, batch_size: int = 64) -> torch.Tensor:
+    network.eval()
+    return torch.cat([network(batch) for batch in x.split(batch_size)])
