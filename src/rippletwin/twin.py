@@ -1,27 +1,386 @@
-"""The twin: a rig with uncertain numbers that predicts what its sensors read.
+"""The twin: a rig whose numbers are uncertain, that predicts what its sensors read.
 
-Interfaces (implementation follows):
+The parameter vector theta is in the coordinates of `rippletwin.parameters`: 0 is the data sheet
+and every prior is N(0, 1). Its entries, in this order (segments and recordings count from 1):
 
-Twin(rig, observations, friction="steady", effects=(), source_sd=0.02, theta=None)
-    .parameters : tuple[Parameter]      names: wave_speed[i], diameter[i], length[i] (i from 1),
-                                        position[NAME], viscosity, load, angle[r] (r from 1),
-                                        then each effect's own, named EFFECT.PARAMETER
-    .values(theta) -> dict              physical values by name
-    .predict(observations, theta) -> list of (S, F) complex   (an input_impedance gives R, see below)
-    .network(observation, theta) -> Network    ready to be asked for pressures, effects applied
-    .to_dict(), Twin.from_dict(d, observations)
+    wave_speed[i], diameter[i], length[i]   of each segment, with the priors of `uncertainty`
+    position[NAME]                          of each sensor
+    viscosity                               kinematic
+    load                                    factor on the orifice's coefficient or on the measured
+                                            load impedance; not there for other loads
+    angle[LABEL]                            shaft angle at a recording's first sample, rad: no prior
+    LABEL.NAME                              parameters of the effects, with priors of their own
 
-theta is in the coordinates of rippletwin.parameters: 0 is nominal, priors are N(0, 1).
-
-An effect, as the twin calls it (any object with these):
-    effect.name : str
-    effect.parameters : tuple[Parameter, ...]      names without the effect's own name
-    effect.apply(network, values, setting) -> None
-        network : line.chain.Network to change: (F,) columns at the frequencies of ALL recordings
-        values  : dict of this effect's physical values by name
-        setting : Setting(fluid, diameter (n,), wave_speed (n,), length (n,), friction, sensors,
-                  recording (F,) int, order (F,), speed_hz (F,)): the twin's values at this theta
-
-calibrate.calibrate(twin, observations, settings=Settings()) -> Calibration
-Calibration: twin, theta, covariance (P, P), pull (P,), warnings, misfit, theil, floor, ...
+An effect at its place is a pair (effect, place) of `rippletwin.effects`; its LABEL is
+"name@place", as in "viscoelastic_wall@segment 2".
 """
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from rippletwin import parameters as coordinates
+from rippletwin.case import FlowRipple, Fluid, Load, Rig, Segment, Sensor, Uncertainty
+from rippletwin.effects import EFFECTS, Place
+from rippletwin.effects.base import lognormal, normal
+from rippletwin.errors import InputError
+from rippletwin.forward import Forward, flow_harmonics
+from rippletwin.line.segment import FRICTIONS
+from rippletwin.parameters import Parameter
+
+SOURCE_SD = 0.05
+"""Largest relative error of a nominal flow ripple's harmonic that is put down to the ripple."""
+
+ANGLE_SCALE = 0.01  # rad, of the fit's coordinate: a few degrees of phase at the 9th harmonic
+
+
+class OperatingPoint(NamedTuple):
+    """Pressures in Pa, flow in m3/s, orifice coefficient in m3/s/sqrt(Pa); NaN where unknown.
+
+    `ripple` is None where the source is free or known by definition (input impedance).
+    """
+
+    load_pressure: float
+    mean_flow: float
+    coefficient: float
+    ripple: FlowRipple | None
+
+
+class Arrays(NamedTuple):
+    """The line at one theta: segments (n,), sensors (S,), viscosity and load factor scalars."""
+
+    wave_speeds: np.ndarray
+    diameters: np.ndarray
+    lengths: np.ndarray
+    positions: np.ndarray
+    viscosity: float
+    load: float
+
+
+class Twin:
+    """Nominal rig, friction law, effects and the recordings' shaft angles.
+
+    Parameters
+    ----------
+    rig : the data sheet.
+    observations : those whose shaft angle is unknown get an angle parameter; None for none.
+    friction : "none", "steady" (the paper) or "unsteady".
+    effects : physics beyond that, applied in order.
+    source_sd : largest relative standard deviation of a nominal ripple's harmonics.
+    theta : where the twin stands, (P,); nominal by default.
+
+    Raises ValueError for an unknown friction or a theta of the wrong length.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        observations: Sequence = (),
+        friction: str = "steady",
+        effects: Sequence = (),
+        source_sd: float = SOURCE_SD,
+        theta: np.ndarray | None = None,
+    ):
+        if friction not in FRICTIONS:
+            raise ValueError(f"friction must be one of {FRICTIONS}, not {friction!r}")
+        self.rig, self.friction, self.effects = rig, friction, tuple(effects)
+        self.source_sd = source_sd
+        self.labels = tuple(
+            o.label for o in observations if o.kind == "periodic" and o.source != "free"
+        )
+        if len(set(self.labels)) < len(self.labels):
+            raise ValueError(f"recordings need labels of their own, not {self.labels}")
+        self._effect_parameters = [effect.parameters(rig, place) for effect, place in self.effects]
+        self.parameters = (
+            *_line_parameters(rig),
+            *(_angle(label) for label in self.labels),
+            *_named_apart(self.effects, self._effect_parameters),
+        )
+        self.index = {p.name: k for k, p in enumerate(self.parameters)}
+        self.theta = np.zeros(len(self.parameters)) if theta is None else np.asarray(theta, float)
+        if self.theta.shape != (len(self.parameters),):
+            raise ValueError(f"theta must have {len(self.parameters)} entries")
+        self._ripples = {}
+
+    # what the parameters mean
+
+    def values(self, theta: np.ndarray | None = None) -> dict[str, float]:
+        """Physical values by name, at `theta` (default: where the twin stands)."""
+        return coordinates.values(self.parameters, self.theta if theta is None else theta)
+
+    def arrays(self, theta: np.ndarray) -> Arrays:
+        """The line's numbers at `theta` as arrays."""
+        n = len(self.rig.line)
+        k = 3 * n + len(self.rig.sensors)
+        u = np.array([p.value(x) for p, x in zip(self.parameters[: k + 1], theta)])
+        a, d, lengths = u[: 3 * n].reshape(3, n)
+        # A sensor stays on the line however the fit stretches it.
+        x = np.clip(u[3 * n : k], 0.0, np.sum(lengths))
+        load = self.index.get("load")
+        factor = 1.0 if load is None else self.parameters[load].value(theta[load])
+        return Arrays(a, d, lengths, x, u[k], factor)
+
+    def effect_values(self, theta: np.ndarray) -> list[tuple]:
+        """(effect, place, values by name) of each effect at `theta`."""
+        out, k = [], len(self.parameters) - sum(len(e) for e in self._effect_parameters)
+        for (effect, place), own in zip(self.effects, self._effect_parameters):
+            values = {p.name: p.prior.value(u) for p, u in zip(own, theta[k:])}
+            out.append((effect, place, values))
+            k += len(own)
+        return out
+
+    # predictions
+
+    def predict(self, observations: Sequence, theta: np.ndarray | None = None) -> list[np.ndarray]:
+        """What the sensors read in each observation: list of (S, F) complex, see `Forward`.
+
+        For many calls with the same observations make one `Forward` and keep it.
+        """
+        return Forward(self, observations)(self.theta if theta is None else np.asarray(theta))
+
+    def operating_point(self, observation) -> OperatingPoint:
+        """Mean pressure and flow, orifice coefficient and source of an observation.
+
+        The coefficient is that of the data sheet, or what mean flow and load pressure give.
+        Raises InputError where an orifice load cannot be had from what is known.
+        """
+        load, kind = self.rig.load, observation.kind
+        ripple = None
+        if kind == "periodic" and observation.source != "free":
+            ripple = observation.flow_ripple or self._pump_ripple(observation)
+        mean = observation.load_pressure
+        if mean is None and observation.mean is not None and np.size(observation.mean):
+            mean = float(observation.mean[-1])
+        if load.kind != "orifice":
+            return OperatingPoint(_or_nan(mean), _mean_flow(ripple), np.nan, ripple)
+        if mean is None or not mean > load.back_pressure:
+            raise InputError(
+                observation.label,
+                "load_pressure",
+                f"an orifice load needs a mean pressure above the back pressure, not {mean}",
+                "give load_pressure in Pa for this recording, or another kind of load",
+            )
+        root = np.sqrt(mean - load.back_pressure)
+        if load.coefficient is not None:
+            coefficient = load.coefficient
+        elif ripple is not None or observation.flow_ripple is not None:
+            coefficient = _mean_flow(ripple or observation.flow_ripple) / root
+        else:
+            raise InputError(
+                observation.label,
+                "load.coefficient",
+                "an orifice load with an unknown source has no mean flow to go by",
+                "give load.coefficient (m3/s/sqrt(Pa)) in rig.yaml or a flow_ripple",
+            )
+        return OperatingPoint(mean, coefficient * root, coefficient, ripple)
+
+    def respond(
+        self,
+        ripple: FlowRipple,
+        speed_hz: float,
+        load_pressure: float,
+        orders: np.ndarray,
+        friction: str | None = None,
+    ) -> np.ndarray:
+        """Sensors' pressure harmonics (S, F) at shaft `orders` (F,) for any flow ripple, angle 0.
+
+        This is how faults are propagated: the ripple of a faulty pump through the twin as it
+        stands. The orifice keeps the coefficient that the healthy mean flow of `ripple` gives
+        where the data sheet has none.
+        """
+        twin = self if friction is None else self.with_(friction=friction)
+        point = _Point(
+            label="",
+            frequency_hz=np.asarray(orders) * speed_hz,
+            orders=np.asarray(orders),
+            speed_hz=speed_hz,
+            load_pressure=load_pressure,
+            flow_ripple=ripple,
+        )
+        return twin.predict([point])[0]
+
+    def reference_impedance(self, theta: np.ndarray, observation) -> float:
+        """What an input impedance is divided by, Pa s/m3: rho a/A of the first segment.
+
+        A measurement given as a ratio is a ratio whatever the bore really is, so the model's own
+        is taken for it; one given in Pa s/m3 is divided by the data sheet's, as the data are.
+        """
+        first = self.rig.line[0]
+        if getattr(observation, "normalised", False):
+            v = self.arrays(theta)
+            first = Segment(first.length, v.diameters[0], v.wave_speeds[0])
+        return self.rig.fluid.density * first.wave_speed / first.area
+
+    # copies
+
+    def with_(self, **changes) -> Twin:
+        """A copy with other friction, effects, source_sd or theta (nominal if effects change)."""
+        state = {
+            "friction": self.friction,
+            "effects": self.effects,
+            "source_sd": self.source_sd,
+            "theta": None if "effects" in changes else self.theta,
+        }
+        labels = [_Point(label=label) for label in self.labels]
+        twin = Twin(self.rig, labels, **{**state, **changes})
+        twin._ripples = self._ripples
+        return twin
+
+    def calibrated_rig(self) -> Rig:
+        """The rig with the values of where the twin stands: for the method of characteristics.
+
+        The load factor goes into the orifice's coefficient where the data sheet gives one.
+        """
+        v = self.arrays(self.theta)
+        line = tuple(
+            replace(s, length=float(length), diameter=float(d), wave_speed=float(a))
+            for s, length, d, a in zip(self.rig.line, v.lengths, v.diameters, v.wave_speeds)
+        )
+        sensors = tuple(Sensor(s.name, float(x)) for s, x in zip(self.rig.sensors, v.positions))
+        load = self.rig.load
+        if load.coefficient is not None:
+            load = replace(load, coefficient=load.coefficient * v.load)
+        fluid = replace(self.rig.fluid, kinematic_viscosity=v.viscosity)
+        return replace(self.rig, line=line, sensors=sensors, load=load, fluid=fluid)
+
+    # to and from plain data
+
+    def to_dict(self) -> dict:
+        """Plain lists, numbers and text, for a JSON file."""
+        rig = asdict(self.rig)
+        for key in ("frequency_hz", "impedance"):
+            rig["load"][key] = _plain(rig["load"][key])
+        return {
+            "rig": rig,
+            "recordings": list(self.labels),
+            "friction": self.friction,
+            "source_sd": self.source_sd,
+            "effects": [{"name": e.name, "place": asdict(place)} for e, place in self.effects],
+            "theta": self.theta.tolist(),
+            "values": self.values(),
+        }
+
+    @classmethod
+    def from_dict(cls, data: dict) -> Twin:
+        """The twin that `to_dict` wrote."""
+        effects = [(EFFECTS[e["name"]], Place(**e["place"])) for e in data["effects"]]
+        points = [_Point(label=label) for label in data["recordings"]]
+        return cls(
+            _rig(data["rig"]),
+            points,
+            friction=data["friction"],
+            effects=effects,
+            source_sd=data["source_sd"],
+            theta=np.array(data["theta"]),
+        )
+
+    def _pump_ripple(self, observation) -> FlowRipple:
+        """The lumped pump model's ripple where the user gave none."""
+        key = observation.speed_hz, observation.load_pressure
+        if key not in self._ripples:
+            from rippletwin.pump import ConstantPressure, simulate
+
+            self._ripples[key] = simulate(
+                self.rig.pump,
+                self.rig.fluid,
+                60.0 * observation.speed_hz,
+                ConstantPressure(observation.load_pressure),
+            )
+        return self._ripples[key]
+
+
+@dataclass(frozen=True)
+class _Point:
+    """An operating point to predict, with the fields of an observation but no data."""
+
+    label: str
+    frequency_hz: np.ndarray = ()
+    orders: np.ndarray = ()
+    speed_hz: float | None = None
+    load_pressure: float | None = None
+    flow_ripple: FlowRipple | None = None
+    kind: str = "periodic"
+    source: str = "nominal"
+    mean: np.ndarray | None = None
+    sensors: tuple | None = None
+
+
+def _line_parameters(rig: Rig) -> list[Parameter]:
+    sheet = rig.uncertainty
+    relative = (
+        ("wave_speed", sheet.wave_speed, "m/s"),
+        ("diameter", sheet.diameter, "m"),
+        ("length", sheet.length, "m"),
+    )
+    out = [
+        Parameter(f"{name}[{k}]", unit, lognormal(getattr(segment, name), sd), f"segment {k}")
+        for name, sd, unit in relative
+        for k, segment in enumerate(rig.line, 1)
+    ]
+    out += [
+        Parameter(
+            f"position[{s.name}]",
+            "m",
+            normal(s.position, sheet.sensor_position),
+            f"sensor {s.name}",
+        )
+        for s in rig.sensors
+    ]
+    viscosity = lognormal(rig.fluid.kinematic_viscosity, sheet.viscosity)
+    out.append(Parameter("viscosity", "m2/s", viscosity, "fluid"))
+    if rig.load.kind in ("orifice", "impedance"):
+        out.append(Parameter("load", "", lognormal(1.0, sheet.load), "load"))
+    return out
+
+
+def _angle(label: str) -> Parameter:
+    return Parameter(f"angle[{label}]", "rad", normal(0.0, ANGLE_SCALE), f"recording {label}", True)
+
+
+def _named_apart(effects, parameters) -> list[Parameter]:
+    labels = [f"{effect.name}@{place}" for effect, place in effects]
+    if len(set(labels)) < len(labels):
+        raise ValueError(f"an effect can be at a place once, not {labels}")
+    return [
+        Parameter(f"{label}.{p.name}", p.unit, p.prior, label)
+        for label, own in zip(labels, parameters)
+        for p in own
+    ]
+
+
+def _rig(data: dict) -> Rig:
+    load = dict(data["load"])
+    for key in ("frequency_hz", "impedance"):
+        load[key] = _array(load[key])
+    return Rig(
+        fluid=Fluid(**data["fluid"]),
+        pump=data["pump"],
+        line=tuple(Segment(**s) for s in data["line"]),
+        sensors=tuple(Sensor(**s) for s in data["sensors"]),
+        load=Load(**load),
+        uncertainty=Uncertainty(**data["uncertainty"]),
+    )
+
+
+def _plain(values: np.ndarray | None):
+    if values is None or not np.iscomplexobj(values):
+        return None if values is None else values.tolist()
+    return {"re": values.real.tolist(), "im": values.imag.tolist()}
+
+
+def _array(values):
+    if isinstance(values, dict):
+        return np.array(values["re"]) + 1j * np.array(values["im"])
+    return None if values is None else np.array(values)
+
+
+def _mean_flow(ripple: FlowRipple | None) -> float:
+    return np.nan if ripple is None else float(flow_harmonics(ripple, np.zeros(1))[0].real)
+
+
+def _or_nan(value: float | None) -> float:
+    return np.nan if value is None else value
