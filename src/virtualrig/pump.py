@@ -1,0 +1,191 @@
+"""The test bench's axial piston pump: chambers of a compressible liquid between two port plates.
+
+Crank angle is zero where a piston is furthest out; a chamber then shrinks, and delivers, for half a
+turn. Around both dead centres a chamber is shut off for `port_overlap_deg`; from there the port in
+question opens to its whole area over `port_opening_deg`, and closes the same way.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numba import njit
+
+# columns of the chamber table
+BORE, STROKE_RADIUS, DEAD_VOLUME, ANGLE, CASE_LEAK, SLIPPER, NEIGHBOUR, CHAMBER_COLUMNS = range(8)
+# entries of the port table
+AREA, OPENING, OVERLAP, TIMING, ORIFICE, MODULUS, SUCTION, LAMINAR, PORT_ENTRIES = range(9)
+
+
+@dataclass(frozen=True)
+class Pump:
+    """Geometry of an axial piston pump (SI units; angles in degrees of crank angle).
+
+    `case_leakage` is laminar, m3/s/Pa a chamber; `port_timing_deg` turns the port plate.
+    `spread` (pistons, 3) are each piston's relative deviations of bore area and case leakage, and
+    its deviation of angular position in degrees.
+    """
+
+    pistons: int = 9
+    piston_diameter: float = 0.017
+    pitch_radius: float = 0.0335
+    swash_angle_deg: float = 17.0
+    dead_volume: float = 1.5e-6
+    bulk_modulus: float = 1.3e9
+    port_area: float = 1.1e-4
+    port_opening_deg: float = 30.0
+    port_overlap_deg: float = 2.0
+    discharge_coefficient: float = 0.65
+    case_leakage: float = 3e-13
+    suction_pressure: float = 2e5
+    port_timing_deg: float = 0.0
+    spread: np.ndarray | None = field(default=None, repr=False)
+
+    @property
+    def displacement(self) -> float:
+        """Volume displaced a revolution, m3."""
+        stroke = 2 * self.pitch_radius * np.tan(np.radians(self.swash_angle_deg))
+        return self.pistons * np.pi / 4 * self.piston_diameter**2 * stroke
+
+    def changed(self, relative: dict[str, float], timing_deg: float = 0.0) -> "Pump":
+        """This pump with some values changed by a relative amount and the port plate turned."""
+        values = {name: getattr(self, name) * (1 + by) for name, by in relative.items()}
+        return replace(self, port_timing_deg=self.port_timing_deg + timing_deg, **values)
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A leakage path: `slipper` from chamber 0 to the case, `cylinder` from chamber 0 to 1.
+
+    `leak_area` is that of a sharp-edged orifice, m2.
+    """
+
+    kind: str
+    leak_area: float
+
+
+def tables(pump: Pump, density: float, faults: tuple[Fault, ...] = ()):
+    """The numbers the time stepper reads: (pistons, CHAMBER_COLUMNS) and (PORT_ENTRIES,)."""
+    spread = np.zeros((pump.pistons, 3)) if pump.spread is None else np.asarray(pump.spread)
+    orifice = pump.discharge_coefficient * np.sqrt(2 / density)
+    chambers = np.zeros((pump.pistons, CHAMBER_COLUMNS))
+    chambers[:, BORE] = np.pi / 4 * pump.piston_diameter**2 * (1 + spread[:, 0])
+    chambers[:, STROKE_RADIUS] = pump.pitch_radius * np.tan(np.radians(pump.swash_angle_deg))
+    chambers[:, DEAD_VOLUME] = pump.dead_volume
+    step = 2 * np.pi / pump.pistons
+    chambers[:, ANGLE] = step * np.arange(pump.pistons) + np.radians(spread[:, 2])
+    chambers[:, CASE_LEAK] = pump.case_leakage * (1 + spread[:, 1])
+    for fault in faults:
+        column = {"slipper": SLIPPER, "cylinder": NEIGHBOUR}[fault.kind]
+        chambers[0, column] += orifice * fault.leak_area
+    ports = np.zeros(PORT_ENTRIES)
+    ports[AREA] = pump.port_area
+    ports[OPENING] = np.radians(pump.port_opening_deg)
+    ports[OVERLAP] = np.radians(pump.port_overlap_deg)
+    ports[TIMING] = np.radians(pump.port_timing_deg)
+    ports[ORIFICE] = orifice
+    ports[MODULUS] = pump.bulk_modulus
+    ports[SUCTION] = pump.suction_pressure
+    ports[LAMINAR] = 2e3
+    return chambers, ports
+
+
+@njit(cache=True, fastmath=True)
+def orifice_flow(drop, laminar):
+    """Square-root orifice, linear below about `laminar` Pa: drop/(drop^2 + laminar^2)^(1/4), slope."""
+    square = drop * drop
+    shifted = square + laminar * laminar
+    root = np.sqrt(np.sqrt(shifted))
+    return drop / root, (0.5 * square + laminar * laminar) / (shifted * root)
+
+
+@njit(cache=True)
+def port_opening(angle, ports):
+    """Share (0 to 1) of the area of the delivery port open at crank angle `angle`, rad.
+
+    The suction port is the same half a turn later.
+    """
+    from_start = (angle - ports[TIMING]) % (2 * np.pi) - 0.5 * ports[OVERLAP]
+    to_end = np.pi - ports[OVERLAP] - from_start
+    x = min(from_start, to_end) / ports[OPENING]
+    if x <= 0:
+        return 0.0
+    if x >= 1:
+        return 1.0
+    return x * x * (3 - 2 * x)
+
+
+@njit(cache=True, fastmath=True)
+def step_chambers(angle, speed, history, lead, chambers, ports, outlet_lead, outlet_rest, x, matrix):
+    """One implicit step of all chambers and of the outlet that they share; returns Newton steps.
+
+    Solves lead p_i - history_i = dp_i/dt for the chambers and
+    outlet_lead p - outlet_rest = sum of delivered flows for the outlet pressure, by Newton's method.
+    `x` (pistons + 1,) holds the chamber pressures and the outlet pressure: start values in, solution
+    out. `speed` is the crank's, rad/s. `matrix` (pistons + 1, pistons + 2) is workspace.
+    """
+    n = chambers.shape[0]
+    orifice, laminar = ports[ORIFICE] * ports[AREA], ports[LAMINAR]
+    for iteration in range(30):
+        matrix[:] = 0.0
+        matrix[n, n] = outlet_lead
+        matrix[n, n + 1] = outlet_rest - outlet_lead * x[n]
+        for i in range(n):
+            phi = angle + chambers[i, ANGLE]
+            swept = chambers[i, BORE] * chambers[i, STROKE_RADIUS]
+            stiffness = ports[MODULUS] / (chambers[i, DEAD_VOLUME] + swept * (1 + np.cos(phi)))
+            delivery, d_slope = orifice_flow(x[i] - x[n], laminar)
+            suction, s_slope = orifice_flow(ports[SUCTION] - x[i], laminar)
+            opening = orifice * port_opening(phi, ports)
+            inlet = orifice * port_opening(phi + np.pi, ports)
+            slipper, l_slope = orifice_flow(x[i], laminar)
+            leak = chambers[i, CASE_LEAK] * x[i] + chambers[i, SLIPPER] * slipper
+            leak_slope = chambers[i, CASE_LEAK] + chambers[i, SLIPPER] * l_slope
+            gain = swept * np.sin(phi) * speed - opening * delivery + inlet * suction - leak
+            matrix[i, n + 1] += history[i] + stiffness * gain - lead * x[i]
+            matrix[i, i] += lead + stiffness * (opening * d_slope + inlet * s_slope + leak_slope)
+            matrix[i, n] -= stiffness * opening * d_slope
+            matrix[n, i] -= opening * d_slope
+            matrix[n, n] += opening * d_slope
+            matrix[n, n + 1] += opening * delivery
+            if chambers[i, NEIGHBOUR] > 0:
+                k = (i + 1) % n
+                swept_k = chambers[k, BORE] * chambers[k, STROKE_RADIUS]
+                volume_k = chambers[k, DEAD_VOLUME] + swept_k * (
+                    1 + np.cos(angle + chambers[k, ANGLE])
+                )
+                across, slope = orifice_flow(x[i] - x[k], laminar)
+                across *= chambers[i, NEIGHBOUR]
+                slope *= chambers[i, NEIGHBOUR]
+                stiffness_k = ports[MODULUS] / volume_k
+                matrix[i, n + 1] -= stiffness * across
+                matrix[k, n + 1] += stiffness_k * across
+                matrix[i, i] += stiffness * slope
+                matrix[i, k] -= stiffness * slope
+                matrix[k, k] += stiffness_k * slope
+                matrix[k, i] -= stiffness_k * slope
+        _eliminate(matrix)
+        largest = 0.0
+        for i in range(n + 1):
+            x[i] += matrix[i, n + 1]
+            largest = max(largest, abs(matrix[i, n + 1]))
+        if largest < 1e-2:
+            return iteration + 1
+    return 31
+
+
+@njit(cache=True, fastmath=True)
+def _eliminate(matrix):
+    """Solve in place, right-hand side in the last column; diagonally dominant, so without pivots."""
+    n = matrix.shape[0]
+    for k in range(n):
+        pivot = 1.0 / matrix[k, k]
+        for i in range(k + 1, n):
+            factor = matrix[i, k] * pivot
+            if factor != 0.0:
+                for j in range(k + 1, n + 1):
+                    matrix[i, j] -= factor * matrix[k, j]
+    for k in range(n - 1, -1, -1):
+        total = matrix[k, n]
+        for j in range(k + 1, n):
+            total -= matrix[k, j] * matrix[j, n]
+        matrix[k, n] = total / matrix[k, k]

@@ -1,0 +1,297 @@
+"""Time stepping of pump, pipes and nodes: a semi-implicit multistep method over spectral elements.
+
+Pipes: p_t = -(rho a^2/A) q_x, q = sum of velocity modes q_k with q_k' = -(A/rho) w_k p_x - lambda_k q_k
+(virtualrig.profile), discretised in space by the discontinuous Galerkin method on Lobatto nodes with
+upwind (characteristic) fluxes between elements (Hesthaven, Warburton, Nodal Discontinuous Galerkin
+Methods, 2008). Time: SBDF3 (Ascher, Ruuth, Wetton, SIAM J. Numer. Anal. 32, 1995): waves explicit;
+friction, chambers and everything at the nodes implicit. Where pipes meet, the outgoing characteristics of
+the new step and the node's elements settle the node's pressure together, so that no volume is lost.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from virtualrig.pump import orifice_flow, step_chambers
+
+# columns of the node table; flows leave the node, pressures in Pa
+(
+    VOLUME,  # compliance of a volume, m3/Pa
+    GAS_VOLUME,  # accumulator: gas volume at GAS_PRESSURE, polytropic exponent GAS_EXPONENT
+    GAS_PRESSURE,
+    GAS_EXPONENT,
+    LEAK,  # conductance to the tank, m3/s/Pa
+    ORIFICE,  # square-law orifice to the tank, m3/s/Pa^0.5
+    TANK,  # pressure behind LEAK, Pa
+    ARM_INERTANCE,  # series inertance, resistance, stiffness (1/compliance) of a resonant side arm
+    ARM_RESISTANCE,
+    ARM_STIFFNESS,
+    VALVE_GAIN,  # orifice opening 1 + y with y''/w^2 + y' VALVE_LAG + y = gain (p/VALVE_SET - 1)
+    VALVE_INERTIA,  # 1/w^2, s2
+    VALVE_LAG,  # s
+    VALVE_SET,
+    NODE_COLUMNS,
+) = range(15)
+# rows of a node's state: stored volume, arm flow, arm volume, valve opening, valve speed
+STORED, ARM_FLOW, ARM_VOLUME, VALVE, VALVE_SPEED, NODE_STATES = range(6)
+
+
+class Line(NamedTuple):
+    """Pipes cut into E elements of n nodes; K velocity modes. All constants of the time step."""
+
+    derivative: np.ndarray  # (n, n)
+    lift: float  # 1/first quadrature weight
+    slope: np.ndarray  # (E,) 2/element length
+    stiffness: np.ndarray  # (E,) rho a^2/A
+    mobility: np.ndarray  # (E,) A/rho
+    impedance: np.ndarray  # (E,) rho a/A
+    rates: np.ndarray  # (K, E) decay rates of the velocity modes, 1/s
+    weights: np.ndarray  # (K, E)
+    wall: np.ndarray  # (2, E) relative compliance and retardation time of the wall
+    air: np.ndarray  # (2, E) air fraction at one atmosphere and polytropic exponent
+    modulus: np.ndarray  # (3, E) rho a^2, its relative growth per Pa, reference pressure
+    drag: np.ndarray  # (E,) q' = ... - drag q |q|
+    first: np.ndarray  # (pipes,) first element
+    last: np.ndarray
+    start: np.ndarray  # (pipes,) node at the start
+    end: np.ndarray
+
+
+class State(NamedTuple):
+    """Everything that evolves, three steps deep: leading axis is the step, rotated in place."""
+
+    pressure: np.ndarray  # (3, n, E)
+    modes: np.ndarray  # (3, K, n, E) flow of each velocity mode
+    flow: np.ndarray  # (n, E) their sum
+    strain: np.ndarray  # (3, n, E) retarded wall strain, as a pressure
+    pressure_rate: np.ndarray  # (3, n, E)
+    flow_drive: np.ndarray  # (3, n, E)
+    node_pressure: np.ndarray  # (nodes,)
+    node: np.ndarray  # (3, NODE_STATES, nodes)
+    chamber: np.ndarray  # (3, pistons)
+
+
+@njit(cache=True, fastmath=True)
+def _rates(line, state, now, flux_p, flux_q):
+    """Right-hand sides of the waves at step `now`; flux_* (2, E) are the settled end values."""
+    n, elements = state.flow.shape
+    p, q = state.pressure[now], state.flow
+    dp, dq = state.pressure_rate[now], state.flow_drive[now]
+    for i in range(n):
+        for e in range(elements):
+            dp[i, e] = 0.0
+            dq[i, e] = 0.0
+        for j in range(n):
+            d = line.derivative[i, j]
+            for e in range(elements):
+                dp[i, e] += d * q[j, e]
+                dq[i, e] += d * p[j, e]
+    for e in range(elements):
+        dp[0, e] -= line.lift * (flux_q[0, e] - q[0, e])
+        dq[0, e] -= line.lift * (flux_p[0, e] - p[0, e])
+        dp[n - 1, e] += line.lift * (flux_q[1, e] - q[n - 1, e])
+        dq[n - 1, e] += line.lift * (flux_p[1, e] - p[n - 1, e])
+    for i in range(n):
+        for e in range(elements):
+            softness = 1.0
+            if line.air[0, e] > 0:
+                absolute = max(p[i, e], 0.0) + 1.01325e5
+                exponent = 1 / line.air[1, e]
+                gas = line.air[0, e] * exponent * (1.01325e5 / absolute) ** exponent / absolute
+                softness += line.modulus[0, e] * gas
+            if line.modulus[1, e] != 0:
+                softness -= 1 - 1 / (1 + line.modulus[1, e] * (p[i, e] - line.modulus[2, e]))
+            rate = -line.slope[e] * line.stiffness[e] * dp[i, e]
+            if line.wall[0, e] > 0:
+                rate -= line.wall[0, e] / line.wall[1, e] * (p[i, e] - state.strain[now, i, e])
+            dp[i, e] = rate / softness
+            dq[i, e] = -line.slope[e] * line.mobility[e] * dq[i, e]
+            if line.drag[e] > 0:
+                dq[i, e] -= line.drag[e] * q[i, e] * abs(q[i, e])
+
+
+@njit(cache=True, fastmath=True)
+def _advance(line, state, now, back, old, dt):
+    """Fields of the next step, written over the oldest one (index `old`)."""
+    n, elements = state.flow.shape
+    modes = line.rates.shape[0]
+    lead = 11 / (6 * dt)
+    p, r, q = state.pressure, state.strain, state.flow
+    np_, nq = state.pressure_rate, state.flow_drive
+    for i in range(n):
+        for e in range(elements):
+            rate = 3 * np_[now, i, e] - 3 * np_[back, i, e] + np_[old, i, e]
+            history = (3 * p[now, i, e] - 1.5 * p[back, i, e] + p[old, i, e] / 3) / dt
+            p[old, i, e] = (history + rate) / lead
+            # from here on flow_drive[old] holds the extrapolated drive of this step
+            nq[old, i, e] = 3 * nq[now, i, e] - 3 * nq[back, i, e] + nq[old, i, e]
+            q[i, e] = 0.0
+            if line.wall[0, e] > 0:
+                bent = (3 * r[now, i, e] - 1.5 * r[back, i, e] + r[old, i, e] / 3) / dt
+                pull = 1 / line.wall[1, e]
+                r[old, i, e] = (bent + pull * p[old, i, e]) / (lead + pull)
+    for k in range(modes):
+        m0, m1, m2 = state.modes[now, k], state.modes[back, k], state.modes[old, k]
+        for i in range(n):
+            for e in range(elements):
+                history = (3 * m0[i, e] - 1.5 * m1[i, e] + m2[i, e] / 3) / dt
+                value = (history + line.weights[k, e] * nq[old, i, e]) / (lead + line.rates[k, e])
+                m2[i, e] = value
+                q[i, e] += value
+
+
+@njit(cache=True)
+def _settle_node(table, history, state, lead, wave_in, wave_lead, guess):
+    """Pressure of one node: waves (and source) in, elements out. Updates the node's states."""
+    arm = table[ARM_INERTANCE] > 0
+    valve = table[VALVE_GAIN] != 0
+    # implicit side arm: flow = arm_0 + arm_1 p;  implicit valve: opening = open_0 + open_1 p
+    arm_0 = arm_1 = open_1 = 0.0
+    open_0 = 1.0
+    if arm:
+        inertia = table[ARM_INERTANCE] * lead + table[ARM_RESISTANCE] + table[ARM_STIFFNESS] / lead
+        arm_0 = table[ARM_INERTANCE] * history[ARM_FLOW]
+        arm_0 = (arm_0 - table[ARM_STIFFNESS] / lead * history[ARM_VOLUME]) / inertia
+        arm_1 = 1 / inertia
+    if valve:
+        stiff = table[VALVE_INERTIA] * lead * lead + table[VALVE_LAG] * lead + 1
+        open_0 = table[VALVE_INERTIA] * (lead * history[VALVE] + history[VALVE_SPEED])
+        open_0 = (open_0 + table[VALVE_LAG] * history[VALVE] - table[VALVE_GAIN]) / stiff
+        open_1 = table[VALVE_GAIN] / table[VALVE_SET] / stiff
+        open_0 += 1
+    p = guess
+    for _ in range(50):
+        stored, compliance = table[VOLUME] * p, table[VOLUME]
+        if table[GAS_VOLUME] > 0:
+            gas = table[GAS_VOLUME] * (table[GAS_PRESSURE] / p) ** (1 / table[GAS_EXPONENT])
+            stored -= gas
+            compliance += gas / (p * table[GAS_EXPONENT])
+        root, slope = orifice_flow(p, 1e3)
+        opening = open_0 + open_1 * p
+        out = table[LEAK] * (p - table[TANK]) + table[ORIFICE] * opening * root
+        out += arm_0 + arm_1 * p + lead * stored - history[STORED]
+        tangent = table[LEAK] + table[ORIFICE] * (opening * slope + open_1 * root)
+        tangent += arm_1 + lead * compliance + wave_lead
+        change = (wave_in - wave_lead * p - out) / tangent
+        p += change
+        if abs(change) < 1e-3:
+            break
+    state[STORED] = table[VOLUME] * p
+    if table[GAS_VOLUME] > 0:
+        state[STORED] -= table[GAS_VOLUME] * (table[GAS_PRESSURE] / p) ** (1 / table[GAS_EXPONENT])
+    state[ARM_FLOW] = arm_0 + arm_1 * p
+    state[ARM_VOLUME] = (history[ARM_VOLUME] + state[ARM_FLOW]) / lead
+    state[VALVE] = open_0 + open_1 * p - 1
+    state[VALVE_SPEED] = lead * state[VALVE] - history[VALVE]
+    return p
+
+
+@njit(cache=True, fastmath=True)
+def _meet(line, state, now, flux_p, flux_q, wave_in, wave_lead):
+    """Settle the faces inside pipes; gather for each node its waves, sum c/Z, and their sum 1/Z."""
+    n = state.flow.shape[0]
+    p, q = state.pressure[now], state.flow
+    wave_in[:] = 0.0
+    wave_lead[:] = 0.0
+    for k in range(len(line.first)):
+        for e in range(line.first[k], line.last[k]):
+            z = line.impedance[e]
+            mid_p = 0.5 * (p[n - 1, e] + p[0, e + 1] + z * (q[n - 1, e] - q[0, e + 1]))
+            mid_q = 0.5 * (q[n - 1, e] + q[0, e + 1] + (p[n - 1, e] - p[0, e + 1]) / z)
+            flux_p[1, e] = flux_p[0, e + 1] = mid_p
+            flux_q[1, e] = flux_q[0, e + 1] = mid_q
+        a, b = line.first[k], line.last[k]
+        wave_in[line.start[k]] += p[0, a] / line.impedance[a] - q[0, a]
+        wave_lead[line.start[k]] += 1 / line.impedance[a]
+        wave_in[line.end[k]] += p[n - 1, b] / line.impedance[b] + q[n - 1, b]
+        wave_lead[line.end[k]] += 1 / line.impedance[b]
+
+
+@njit(cache=True, fastmath=True)
+def _close(line, state, now, flux_p, flux_q):
+    """Values at the ends of the pipes that follow from the settled node pressures."""
+    n = state.flow.shape[0]
+    p, q = state.pressure[now], state.flow
+    for k in range(len(line.first)):
+        a, b = line.first[k], line.last[k]
+        settled = state.node_pressure[line.start[k]]
+        flux_p[0, a] = settled
+        flux_q[0, a] = q[0, a] + (settled - p[0, a]) / line.impedance[a]
+        settled = state.node_pressure[line.end[k]]
+        flux_p[1, b] = settled
+        flux_q[1, b] = q[n - 1, b] + (p[n - 1, b] - settled) / line.impedance[b]
+
+
+@njit(cache=True)
+def run(line, nodes, chambers, ports, source, crank, state, phase, steps, every, dt, sensors):
+    """March `steps` steps of `dt` from `state`, whose newest step is number `phase`.
+
+    The crank stands at `speed * phase * dt` plus its ripple; `crank` is (speed in rad/s, ripple), the
+    ripple (terms, 3) being order, relative amplitude of speed and phase. `source` (M,) is a flow into
+    node 0 over one revolution, added to that of the pump; `chambers` may be empty. `sensors` is
+    (element, (count, n) interpolation rows). Every `every` steps a record is kept.
+
+    Returns sensor pressures (count, records); flow into the line, and pressure, at node 0
+    (2, records); and the greatest number of Newton steps that the chambers took.
+    """
+    speed, ripple = crank
+    element, rows = sensors
+    count, n = rows.shape
+    elements = state.flow.shape[1]
+    n_nodes, pistons = nodes.shape[0], chambers.shape[0]
+    lead = 11 / (6 * dt)
+    recorded = np.zeros((count, steps // every))
+    outlet = np.zeros((2, steps // every))
+    flux_p, flux_q = np.zeros((2, elements)), np.zeros((2, elements))
+    wave_in, wave_lead = np.zeros(n_nodes), np.zeros(n_nodes)
+    history = np.zeros((NODE_STATES, n_nodes))
+    chamber_history = np.zeros(pistons)
+    x = np.zeros(pistons + 1)
+    matrix = np.zeros((pistons + 1, pistons + 2))
+    newton = 0
+    for step in range(1, steps + 1):
+        back, older, now = phase % 3, (phase + 2) % 3, (phase + 1) % 3
+        _advance(line, state, back, older, now, dt)
+        phase += 1
+        _meet(line, state, now, flux_p, flux_q, wave_in, wave_lead)
+        turn = speed * (phase * dt)
+        angle, rate = turn, 1.0
+        for order, amplitude, shift in ripple:
+            angle += amplitude / order * np.sin(order * turn + shift)
+            rate += amplitude * np.cos(order * turn + shift)
+        place = turn / (2 * np.pi) % 1.0 * len(source)
+        low = int(place) % len(source)
+        share = place - int(place)
+        given = source[low] * (1 - share) + source[(low + 1) % len(source)] * share
+        past = state.node
+        history[:] = (3 * past[back] - 1.5 * past[older] + past[now] / 3) / dt
+        if pistons > 0:
+            past = state.chamber
+            chamber_history[:] = (3 * past[back] - 1.5 * past[older] + past[now] / 3) / dt
+            x[:pistons] = 2 * past[back] - past[older]
+            x[pistons] = state.node_pressure[0]
+            used = step_chambers(
+                angle, speed * rate, chamber_history, lead, chambers, ports,
+                wave_lead[0] + lead * nodes[0, VOLUME], wave_in[0] + given + history[STORED, 0],
+                x, matrix,
+            )  # fmt: skip
+            newton = max(newton, used)
+            state.chamber[now] = x[:pistons]
+            state.node_pressure[0] = x[pistons]
+            state.node[now, STORED, 0] = nodes[0, VOLUME] * x[pistons]
+        for node in range(1 if pistons > 0 else 0, n_nodes):
+            state.node_pressure[node] = _settle_node(
+                nodes[node], history[:, node], state.node[now, :, node], lead,
+                wave_in[node] + (given if node == 0 else 0.0), wave_lead[node],
+                state.node_pressure[node],
+            )  # fmt: skip
+        _close(line, state, now, flux_p, flux_q)
+        _rates(line, state, now, flux_p, flux_q)
+        if step % every == 0:
+            for s in range(count):
+                for i in range(n):
+                    recorded[s, step // every - 1] += rows[s, i] * state.pressure[now, i, element[s]]
+            outlet[0, step // every - 1] = flux_q[0, 0]
+            outlet[1, step // every - 1] = state.node_pressure[0]
+    return recorded, outlet, newton
