@@ -1,0 +1,198 @@
+"""What an effect is: a piece of physics that a twin may lack, at a place it can be.
+
+An effect is one file in this folder that defines `EFFECT`, an instance of `Effect`. The registry
+finds it there; nothing else changes. In the frequency domain an effect mutates a network
+(`rippletwin.line.chain.Network`); `time_domain` says what it is for the method of characteristics.
+
+Values may be floats or arrays of shape (B, 1) for B parameter sets at once: everything here is
+elementwise, so that a network with leading batch dimension is mutated by the same lines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+
+@dataclass(frozen=True)
+class Prior:
+    """A proper prior, written as a map from a standard normal coordinate u to the parameter.
+
+    kind "normal":    x = centre + scale u
+    kind "lognormal": x = centre exp(scale u), for positive parameters
+    kind "uniform":   x = centre + scale Phi(u), on [centre, centre + scale]
+
+    In u every prior is N(0, 1): pulls are read off directly and Laplace's integral is over u.
+    """
+
+    kind: str
+    centre: float
+    scale: float
+
+    def value(self, u):
+        """Parameter at coordinate u, any shape."""
+        if self.kind == "normal":
+            return self.centre + self.scale * u
+        if self.kind == "lognormal":
+            return self.centre * np.exp(self.scale * u)
+        return self.centre + self.scale * ndtr(u)
+
+    def coordinate(self, x):
+        """Inverse of `value`; a uniform's ends are held off infinity."""
+        if self.kind == "normal":
+            return (x - self.centre) / self.scale
+        if self.kind == "lognormal":
+            return np.log(x / self.centre) / self.scale
+        return ndtri(np.clip((x - self.centre) / self.scale, 1e-3, 1 - 1e-3))
+
+
+def normal(mean: float, deviation: float) -> Prior:
+    """Normal prior with mean and standard deviation in the parameter's unit."""
+    return Prior("normal", mean, deviation)
+
+
+def lognormal(median: float, log_deviation: float) -> Prior:
+    """Lognormal prior: median in the parameter's unit, standard deviation of its logarithm."""
+    return Prior("lognormal", median, log_deviation)
+
+
+def uniform(low: float, high: float) -> Prior:
+    """Uniform prior on [low, high]."""
+    return Prior("uniform", low, high - low)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of an effect: name, unit (SI) and proper prior."""
+
+    name: str
+    unit: str
+    prior: Prior
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an effect acts.
+
+    element  as in a verdict: "line", "segment 2" (counted from 1), "position", "load", "source",
+             "sensor p1"
+    index    of the segment or sensor, from 0; None elsewhere
+    form     the variant where an effect has several equations, else None
+    """
+
+    element: str
+    index: int | None = None
+    form: str | None = None
+
+    def __str__(self) -> str:
+        return self.element if self.form is None else f"{self.element} ({self.form})"
+
+
+@dataclass
+class LineState:
+    """The numbers of the line at which an effect acts; each may carry a batch dimension (B, 1).
+
+    density          kg/m3
+    viscosity        kinematic, m2/s
+    diameters        (n,) of m, wave_speeds (n,) of m/s: one entry a segment, pump first
+    mean_pressure    Pa absolute, (F,) or scalar: of the operating point each frequency belongs to
+    load_resistance  static dp/dq of the load in Pa s/m3, (F,) or scalar; None where it has none
+    heat_capacity_ratio, prandtl   of a gas, else None
+    """
+
+    density: float
+    viscosity: float
+    diameters: np.ndarray
+    wave_speeds: np.ndarray
+    mean_pressure: np.ndarray | float = 1.01325e5
+    load_resistance: np.ndarray | float | None = None
+    heat_capacity_ratio: float | None = None
+    prandtl: float | None = None
+
+    def area(self, k: int):
+        """Cross section of segment k, m2."""
+        return 0.25 * np.pi * self.diameters[k] ** 2
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A piece of missing physics.
+
+    name        as in a verdict
+    element     kind of element it acts on: line, segment, position, load, source or sensor
+    medium      "liquid", "gas" or "any"
+    equation    in plain text
+    source      author, year and equation or section
+    time_domain its counterpart for the method of characteristics
+    parameters  (rig, place) -> tuple of Parameter
+    places      rig -> tuple of Place
+    apply       (network, line: LineState, values: name -> value, place) mutates the network
+    """
+
+    name: str
+    element: str
+    medium: str
+    equation: str
+    source: str
+    time_domain: str
+    parameters: Callable[[object, Place], tuple[Parameter, ...]]
+    places: Callable[[object], tuple[Place, ...]]
+    apply: Callable[[object, LineState, Mapping[str, object], Place], None]
+
+    def suits(self, rig) -> bool:
+        """Whether the effect exists in the rig's medium."""
+        gas = rig.fluid.heat_capacity_ratio is not None
+        return self.medium == "any" or (self.medium == "gas") == gas
+
+
+def line_place(rig) -> tuple[Place, ...]:
+    """The whole line."""
+    return (Place("line"),)
+
+
+def segment_places(rig) -> tuple[Place, ...]:
+    """Each segment."""
+    return tuple(Place(f"segment {k + 1}", k) for k in range(len(rig.line)))
+
+
+def position_place(rig) -> tuple[Place, ...]:
+    """Anywhere along the line: `position` is a parameter then."""
+    return (Place("position"),)
+
+
+def load_place(rig) -> tuple[Place, ...]:
+    """The load."""
+    return (Place("load"),)
+
+
+def source_place(rig) -> tuple[Place, ...]:
+    """The pump."""
+    return (Place("source"),)
+
+
+def sensor_places(rig) -> tuple[Place, ...]:
+    """Each sensor."""
+    return tuple(Place(f"sensor {sensor.name}", k) for k, sensor in enumerate(rig.sensors))
+
+
+def position_parameter(rig) -> Parameter:
+    """Distance from the pump outlet, uniform over the line."""
+    return Parameter("position", "m", uniform(0.0, sum(s.length for s in rig.line)))
+
+
+def segment_at(lengths: np.ndarray, position) -> int:
+    """Index of the segment that holds `position` (the first set's, where there is a batch)."""
+    ends = np.cumsum([np.ravel(length)[0] for length in lengths])
+    return int(min(np.searchsorted(ends, np.ravel(position)[0]), len(ends) - 1))
+
+
+def scale_sensor(network, index: int, factor) -> None:
+    """Multiply what sensor `index` reads by `factor` (..., F)."""
+    count = len(network.sensor_positions)
+    shape = np.broadcast_shapes(np.shape(network.sensor_factor), (count, *np.shape(factor)))
+    factors = np.array(np.broadcast_to(network.sensor_factor, shape), dtype=complex)
+    factors[index] = factors[index] * factor
+    network.sensor_factor = factors

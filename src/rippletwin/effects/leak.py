@@ -1,0 +1,47 @@
+"""A leak from the line to atmosphere or tank."""
+
+from __future__ import annotations
+
+from rippletwin.effects.base import (
+    Effect,
+    Parameter,
+    lognormal,
+    position_parameter,
+    position_place,
+    uniform,
+)
+from rippletwin.line.chain import Insert
+
+REFERENCE_PRESSURE = 1e7  # Pa, at which the conductance is stated
+
+
+def _apply(network, line, values, place):
+    relative = line.mean_pressure / REFERENCE_PRESSURE
+    conductance = values["conductance"] * relative ** (-values["pressure_exponent"])
+    network.inserts.append(Insert(values["position"], "shunt", conductance + 0.0 * network.s))
+
+
+def _parameters(rig, place):
+    segment = rig.line[0]
+    characteristic = 0.25 * 3.1416 * segment.diameter**2 / (
+        rig.fluid.density * segment.wave_speed
+    )  # 1/Zc: a leak well below it cannot be seen
+    return (
+        position_parameter(rig),
+        Parameter("conductance", "m3/(Pa s)", lognormal(0.1 * characteristic, 1.2)),
+        Parameter("pressure_exponent", "1", uniform(0.0, 0.5)),
+    )
+
+
+EFFECT = Effect(
+    name="leak",
+    element="position",
+    medium="any",
+    equation="q1 - q2 = G p, G = dq/dp = G_10MPa (p/10 MPa)^-m; "
+    "m = 0 for a laminar gap, 1/2 for an orifice",
+    source="Covas, Ramos & de Almeida 2005, J. Hydraul. Eng. 131:1106, eq. 7 (orifice leak)",
+    time_domain="outflow at a node, q = C p^(1-m)",
+    parameters=_parameters,
+    places=position_place,
+    apply=_apply,
+)

@@ -1,0 +1,42 @@
+"""A lumped volume on the line: a block, a filter, a short dead end."""
+
+from __future__ import annotations
+
+from rippletwin.effects.base import (
+    Effect,
+    Parameter,
+    lognormal,
+    position_parameter,
+    position_place,
+    segment_at,
+)
+from rippletwin.line.chain import Insert
+
+
+def volume_admittance(s, volume, density, wave_speed):
+    """s V/(rho a^2), m3/(Pa s)."""
+    return s * volume / (density * wave_speed**2)
+
+
+def _apply(network, line, values, place):
+    k = segment_at(network.lengths, values["position"])
+    admittance = volume_admittance(
+        network.s, values["volume"], line.density, line.wave_speeds[k]
+    )
+    network.inserts.append(Insert(values["position"], "shunt", admittance))
+
+
+EFFECT = Effect(
+    name="line_volume",
+    element="position",
+    medium="any",
+    equation="q1 - q2 = s V/(rho a^2) p",
+    source="Wylie & Streeter 1993, sec. 12.5 (lumped capacitance)",
+    time_domain="dp/dt = (rho a^2/V)(q1 - q2) at a node, trapezoidal",
+    parameters=lambda rig, place: (
+        position_parameter(rig),
+        Parameter("volume", "m3", lognormal(5e-5 * (rig.line[0].diameter / 0.02) ** 3, 1.2)),
+    ),
+    places=position_place,
+    apply=_apply,
+)

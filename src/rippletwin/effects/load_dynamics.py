@@ -1,0 +1,55 @@
+"""A load that answers with delay: a valve spool on its spring, or oil in the valve's passage."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rippletwin.effects.base import Effect, Parameter, Place, lognormal, normal
+from rippletwin.line.chain import Insert
+
+
+def _places(rig):
+    # Without a static resistance there is no valve to move; a closed end has no flow to resist.
+    if rig.load.kind == "closed":
+        return ()
+    inertance = Place("load", form="inertance")
+    return (Place("load", form="spool"), inertance) if rig.load.kind == "orifice" else (inertance,)
+
+
+def _apply(network, line, values, place):
+    s, end = network.s, network.length
+    if place.form == "inertance":
+        network.inserts.append(Insert(end, "series", s * values["inertance"]))
+        return
+    w = 2.0 * np.pi * values["natural_frequency"]
+    motion = w**2 / (s**2 + 2.0 * values["damping_ratio"] * w * s + w**2)
+    network.inserts.append(Insert(end, "shunt", values["gain"] * motion / line.load_resistance))
+
+
+def _parameters(rig, place):
+    last = rig.line[-1]
+    if place.form == "inertance":
+        area = 0.25 * np.pi * last.diameter**2
+        inertance = 0.1 * rig.fluid.density / area  # ten centimetres of the last pipe
+        return (Parameter("inertance", "Pa s2/m3", lognormal(inertance, 1.2)),)
+    return (
+        Parameter("gain", "1", normal(0.0, 2.0)),
+        Parameter("natural_frequency", "Hz", lognormal(400.0, 1.0)),
+        Parameter("damping_ratio", "1", lognormal(0.4, 0.8)),
+    )
+
+
+EFFECT = Effect(
+    name="load_dynamics",
+    element="load",
+    medium="any",
+    equation="spool: Y_load = (1/R)(1 + g w0^2/(s^2 + 2 zeta w0 s + w0^2)); "
+    "inertance: Z_load = R + s I",
+    source="Merritt 1967, Hydraulic Control Systems, sec. 8-2 (spool on its spring, linearised); "
+    "Johnston & Edge 1991, Proc. IMechE 205(I):89 (inertance)",
+    time_domain="opening x of the orifice as a second-order state driven by the load pressure; "
+    "inertance: dq/dt = (p - p_orifice)/I at the last node",
+    parameters=_parameters,
+    places=_places,
+    apply=_apply,
+)

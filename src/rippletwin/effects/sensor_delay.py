@@ -1,0 +1,24 @@
+"""A sensor whose channel is late: unsynchronised acquisition, an anti-alias filter of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rippletwin.effects.base import Effect, Parameter, normal, scale_sensor, sensor_places
+
+
+def _apply(network, line, values, place):
+    scale_sensor(network, place.index, np.exp(-network.s * values["delay"]))
+
+
+EFFECT = Effect(
+    name="sensor_delay",
+    element="sensor",
+    medium="any",
+    equation="reading = exp(-s tau) p",
+    source="Oppenheim & Willsky 1997, Signals and Systems, sec. 4.3.2 (time shift)",
+    time_domain="reading delayed by tau",
+    parameters=lambda rig, place: (Parameter("delay", "s", normal(0.0, 1e-4)),),
+    places=sensor_places,
+    apply=_apply,
+)

@@ -1,0 +1,57 @@
+"""A dead-ended branch: a gauge line, a blocked port, a quarter-wave resonator."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rippletwin.effects.base import (
+    Effect,
+    Parameter,
+    lognormal,
+    position_parameter,
+    position_place,
+    segment_at,
+)
+from rippletwin.line.chain import Insert
+
+
+def branch_admittance(s, length, diameter, wave_speed, density, viscosity):
+    """Input admittance A/(rho a) sqrt(s/z) tanh(l sqrt(s z)/a) of a closed branch, m3/(Pa s).
+
+    z = s (1 + sqrt(r) + ...) carries the laminar boundary layer to first order,
+    s I0/I2 = s (1 + 2/r), r = R sqrt(s/nu): without loss the branch would be infinitely sharp.
+    """
+    area = 0.25 * np.pi * diameter**2
+    loss = 1.0 + 2.0 / (0.5 * diameter * np.sqrt(s / viscosity))
+    root = np.sqrt(loss)
+    return area / (density * wave_speed * root) * np.tanh(length * s * root / wave_speed)
+
+
+def _apply(network, line, values, place):
+    k = segment_at(network.lengths, values["position"])
+    admittance = branch_admittance(
+        network.s,
+        values["length"],
+        values["diameter"],
+        line.wave_speeds[k],
+        line.density,
+        line.viscosity,
+    )
+    network.inserts.append(Insert(values["position"], "shunt", admittance))
+
+
+EFFECT = Effect(
+    name="side_branch",
+    element="position",
+    medium="any",
+    equation="q1 - q2 = Y p, Y = A_b/(rho a sqrt(1 + 2/r)) tanh(s l_b sqrt(1 + 2/r)/a)",
+    source="Wylie & Streeter 1993, sec. 12.5 (branch); Zielke 1968 (loss, first order in 1/r)",
+    time_domain="one more pipe at a junction, its far end closed",
+    parameters=lambda rig, place: (
+        position_parameter(rig),
+        Parameter("length", "m", lognormal(0.4, 0.8)),
+        Parameter("diameter", "m", lognormal(0.6 * rig.line[0].diameter, 0.5)),
+    ),
+    places=position_place,
+    apply=_apply,
+)

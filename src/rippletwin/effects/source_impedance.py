@@ -1,0 +1,52 @@
+"""The pump is no ideal flow source: outlet volume and leakage are parallel to its flow."""
+
+from __future__ import annotations
+
+from rippletwin.effects.base import Effect, Parameter, Place, lognormal
+from rippletwin.effects.line_volume import volume_admittance
+from rippletwin.line.chain import Insert
+
+
+def _places(rig):
+    return (Place("source", form="volume"), Place("source", form="volume and passage"))
+
+
+def _apply(network, line, values, place):
+    admittance = volume_admittance(network.s, values["volume"], line.density, line.wave_speeds[0])
+    admittance = admittance + values["conductance"]
+    network.source_admittance = network.source_admittance + admittance
+    if place.form == "volume and passage":
+        impedance = network.s * values["inertance"]
+        # First of the list at x = 0: nearest to the pump.
+        network.inserts.insert(0, Insert(0.0 * network.length, "series", impedance))
+
+
+def _parameters(rig, place):
+    first = rig.line[0]
+    area = 0.25 * 3.1416 * first.diameter**2
+    parameters = (
+        Parameter("volume", "m3", lognormal(1e-4 * (first.diameter / 0.02) ** 3, 1.2)),
+        Parameter(
+            "conductance",
+            "m3/(Pa s)",
+            lognormal(0.01 * area / (rig.fluid.density * first.wave_speed), 1.5),
+        ),
+    )
+    if place.form == "volume and passage":
+        passage = Parameter("inertance", "Pa s2/m3", lognormal(0.1 * rig.fluid.density / area, 1.0))
+        return (*parameters, passage)
+    return parameters
+
+
+EFFECT = Effect(
+    name="source_impedance",
+    element="source",
+    medium="any",
+    equation="q(0) = Q - (s V/(rho a^2) + G) p_pump, p_pump = p(0) + s I q(0)",
+    source="Edge & Johnston 1990, Proc. IMechE 204(I):33 (source impedance of pumps, "
+    "lumped volume and passage)",
+    time_domain="dp/dt = (rho a^2/V)(Q - G p - q) at the first node, and dq/dt = (p - p(0))/I",
+    parameters=_parameters,
+    places=_places,
+    apply=_apply,
+)

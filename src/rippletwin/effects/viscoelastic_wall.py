@@ -1,0 +1,28 @@
+"""A viscoelastic (hose) wall: creep adds compliance at low frequency and loss around 1/tau."""
+
+from __future__ import annotations
+
+from rippletwin.effects.base import Effect, Parameter, lognormal, segment_places
+
+
+def _apply(network, line, values, place):
+    creep = values["compliance_ratio"] / (1.0 + network.s * values["retardation_time"])
+    network.shunt[place.index] = network.shunt[place.index] * (1.0 + creep)
+
+
+EFFECT = Effect(
+    name="viscoelastic_wall",
+    element="segment",
+    medium="liquid",
+    equation="Y' = A s/(rho a^2) (1 + kappa/(1 + s tau))",
+    source="Franke & Seyler 1983, J. Hydraulic Res. 21:349; one Kelvin-Voigt element, "
+    "Covas et al. 2005, J. Hydraulic Res. 43:56, eq. 10",
+    time_domain="retarded strain as one more state a node, "
+    "d eps/dt = (kappa p/(rho a^2) - eps)/tau, integrated exactly over a step",
+    parameters=lambda rig, place: (
+        Parameter("compliance_ratio", "1", lognormal(0.15, 1.0)),
+        Parameter("retardation_time", "s", lognormal(3e-4, 1.3)),
+    ),
+    places=segment_places,
+    apply=_apply,
+)
