@@ -1,0 +1,197 @@
+"""The chambers' equations and their solution in time.
+
+For the pressure p of each chamber, with volume V and flows q (Edge & Darling 1989, J. Dyn. Sys.
+Meas. Control 111, 307; here without the oil's inertia in the ports):
+
+    V dc/dt = -dV/dt - q_delivery + q_suction - q_leak,    c(p) = p/B - x p0/p
+
+so that dc = dp/B_eff with 1/B_eff = 1/B + x p0/p^2: liquid of bulk modulus B with the volume
+fraction x of air at pressure p0, compressed isothermally (Merritt 1967, Hydraulic Control
+Systems, eq. 2-14). Air keeps p positive where a closed chamber would pull the liquid apart.
+
+Flows through ports and leaks are turbulent orifices, linear within `SMOOTHING` of no drop. That
+makes the equations stiff (rates near 1e7 1/s), so each step is a two-stage diagonally implicit
+Runge-Kutta step, second order and L-stable (Alexander 1977, SIAM J. Numer. Anal. 14, 1006). In
+each stage the chambers and the outlet, p_outlet = c_plus + impedance * q, are one Newton problem:
+coupling them one after the other loses flow.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+ATMOSPHERE = 101325.0
+SMOOTHING = 1e3  # Pa
+GAMMA = 1.0 - np.sqrt(0.5)
+TOLERANCE = 1e-11  # of a Newton step, relative to the largest pressure
+MAX_NEWTON = 60
+
+
+@njit(cache=True)
+def compression(p, bulk_modulus, air):
+    """c(p), and dc/dp in 1/Pa."""
+    gas = air * ATMOSPHERE / p
+    return p / bulk_modulus - gas, 1.0 / bulk_modulus + gas / p
+
+
+@njit(cache=True)
+def orifice(conductance, drop):
+    """Flow through a smoothed orifice, m3/s, and its slope; `conductance` = Cd A sqrt(2/rho)."""
+    square = drop * drop + SMOOTHING * SMOOTHING
+    root = 1.0 / np.sqrt(np.sqrt(square))
+    return conductance * drop * root, conductance * root * (1.0 - 0.5 * drop * drop / square)
+
+
+@njit(cache=True)
+def _eliminate(matrix, rhs):
+    """Solve in place. Rows are diagonally dominant by construction, so there is no pivoting."""
+    n = len(rhs)
+    for i in range(n):
+        for j in range(i + 1, n):
+            if matrix[j, i] != 0.0:
+                factor = matrix[j, i] / matrix[i, i]
+                for k in range(i + 1, n):
+                    matrix[j, k] -= factor * matrix[i, k]
+                rhs[j] -= factor * rhs[i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            rhs[i] -= matrix[i, k] * rhs[k]
+        rhs[i] /= matrix[i, i]
+
+
+@njit(cache=True)
+def solve_stage(p, rate, target, step, tables, pump, case_leak, cross_leak, c_plus, impedance):
+    """Pressures that satisfy c(p) = target + step * dc/dt at one instant.
+
+    p          (n + 1,) first guess, overwritten: n chambers, then the outlet, Pa
+    rate       (n,) overwritten by dc/dt, 1/s
+    target     (n,) known part of c
+    step       GAMMA times the time step, s
+    tables     (4, n) volume m3, dV/dt m3/s, delivery and suction conductance, of each chamber
+    pump       (bulk modulus, air fraction, laminar leakage m3/s/Pa, suction pressure)
+    case_leak  (n,) conductance from each chamber to the case
+    cross_leak (n,) conductance from each chamber to the next
+    Returns the outlet flow, m3/s; nan where Newton's method does not converge.
+    """
+    n = len(target)
+    bulk_modulus, air, laminar, suction_pressure = pump
+    matrix = np.empty((n + 1, n + 1))
+    rhs = np.empty(n + 1)
+    for _ in range(MAX_NEWTON):
+        matrix[:] = 0.0
+        delivered = 0.0
+        slopes = 0.0
+        for k in range(n):
+            rate[k] = -tables[1, k]
+        for k in range(n):
+            q, slope = orifice(tables[2, k], p[k] - p[n])
+            delivered += q
+            slopes += slope
+            inflow = -q
+            matrix[k, k] += slope
+            matrix[k, n] = -slope
+            matrix[n, k] = -impedance * slope
+            q, slope = orifice(tables[3, k], p[k] - suction_pressure)
+            inflow -= q
+            matrix[k, k] += slope
+            q, slope = orifice(case_leak[k], p[k] - suction_pressure)
+            inflow -= q + laminar * (p[k] - suction_pressure)
+            matrix[k, k] += slope + laminar
+            rate[k] += inflow
+            if cross_leak[k] > 0.0:
+                m = (k + 1) % n
+                q, slope = orifice(cross_leak[k], p[k] - p[m])
+                rate[k] -= q
+                rate[m] += q
+                matrix[k, k] += slope
+                matrix[m, m] += slope
+                matrix[k, m] -= slope
+                matrix[m, k] -= slope
+        for k in range(n):
+            rate[k] /= tables[0, k]
+            for m in range(n + 1):
+                matrix[k, m] *= step / tables[0, k]
+            c, slope = compression(p[k], bulk_modulus, air)
+            matrix[k, k] += slope
+            rhs[k] = target[k] + step * rate[k] - c
+        matrix[n, n] = 1.0 + impedance * slopes
+        rhs[n] = c_plus + impedance * delivered - p[n]
+        _eliminate(matrix, rhs)
+        largest = 0.0
+        for k in range(n + 1):
+            new = p[k] + rhs[k]
+            if air > 0.0 and new < 0.2 * p[k]:
+                new = 0.2 * p[k]  # c(p) is defined for positive p only
+            largest = max(largest, abs(new - p[k]))
+            p[k] = new
+        if largest <= TOLERANCE * np.max(np.abs(p)):
+            return delivered
+    return np.nan
+
+
+@njit(cache=True)
+def revolution(
+    p, tables, stage_tables, step, pump, case_leak, cross_leak, line, line_p, line_q, sensors
+):
+    """One revolution of K steps, from the state `p` and the line's, both overwritten.
+
+    p             (n + 1,) pressures of the chambers and the outlet, Pa
+    tables        (K, 4, n) at the end of each step, as for `solve_stage`
+    stage_tables  (K, 4, n) at its first stage
+    line          (Zc, half the friction of a cell Pa s/m3, K_v of the orifice, outlet pressure)
+    line_p/_q     (cells + 1,) state of the line, empty for a constant outlet pressure
+    sensors       (S, 5): first of four neighbouring nodes, and their weights
+    Returns flow (K,), pressures (K, n + 1) and sensor pressures (K, S), each at a step's end.
+    """
+    steps, _, n = tables.shape
+    zc, half, k_v, constant = line
+    flow = np.empty(steps)
+    pressures = np.empty((steps, n + 1))
+    readings = np.empty((steps, len(sensors)))
+    rate, second = np.empty(n), np.empty(n)
+    content, target = np.empty(n), np.empty(n)
+    cells = len(line_p) - 1
+    piped = cells > 0
+    new_p, new_q = np.empty_like(line_p), np.empty_like(line_q)
+    impedance = zc + half if piped else 0.0
+    c_old = line_p[0] - impedance * line_q[0] if piped else constant
+    for i in range(steps):
+        # C- characteristic arriving at the pump (Wylie & Streeter 1993, ch. 3)
+        c_new = line_p[1] - (zc - half) * line_q[1] if piped else constant
+        for k in range(n):
+            content[k], _ = compression(p[k], pump[0], pump[1])
+        c_stage = c_old + GAMMA * (c_new - c_old)
+        first = solve_stage(
+            p, rate, content, GAMMA * step, stage_tables[i], pump, case_leak, cross_leak,
+            c_stage, impedance,
+        )  # fmt: skip
+        for k in range(n):
+            target[k] = content[k] + (1.0 - GAMMA) * step * rate[k]
+        flow[i] = solve_stage(
+            p, second, target, GAMMA * step, tables[i], pump, case_leak, cross_leak,
+            c_new, impedance,
+        )  # fmt: skip
+        if np.isnan(first):
+            flow[i] = np.nan
+        c_old = c_new
+        pressures[i] = p
+        if piped:
+            new_p[0], new_q[0] = p[n], flow[i]
+            for j in range(1, cells):
+                forward = line_p[j - 1] + (zc - half) * line_q[j - 1]
+                backward = line_p[j + 1] - (zc - half) * line_q[j + 1]
+                new_p[j] = 0.5 * (forward + backward)
+                new_q[j] = 0.5 * (forward - backward) / (zc + half)
+            # orifice q = K_v sqrt(p) met by the C+ characteristic p = forward - (zc + half) q
+            forward = line_p[cells - 1] + (zc - half) * line_q[cells - 1]
+            b = (zc + half) * k_v
+            root = 0.5 * (np.sqrt(b * b + 4.0 * max(forward, 0.0)) - b)
+            new_p[cells], new_q[cells] = root * root, k_v * root
+            line_p[:], line_q[:] = new_p, new_q
+        for j in range(len(sensors)):
+            first_node = int(sensors[j, 0])
+            readings[i, j] = 0.0
+            for m in range(4):
+                readings[i, j] += sensors[j, 1 + m] * line_p[first_node + m]
+    return flow, pressures, readings
