@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 LOADS = ("open", "closed", "anechoic", "impedance", "admittance", "state")
 
@@ -81,8 +82,8 @@ class Network:
 
     def input_impedance(self) -> np.ndarray:
         """p/q at x = 0 looking at the line, (F,) Pa s/m3, inserts at x = 0 included."""
-        p, q, _ = self._sweep(*self.load_state(), ())
-        return p[-1] / q[-1]
+        entry = self._sweep([self.load_state()])[2]
+        return entry[0, 0] / entry[0, 1]
 
     def load_state(self) -> tuple[np.ndarray | complex, np.ndarray | complex]:
         """A pair (p, q) in the load's ratio, each (F,) or scalar."""
@@ -106,9 +107,9 @@ class Network:
 
         This is Thévenin's theorem without its division, so it holds at resonance too.
         """
-        sweep = self._sweep(*_UNIT_STATES)
-        a, b = sweep.flow + self.source_admittance * sweep.pressure
-        return a, b, self.source_flow * sweep.decay
+        _, _, entry, decay = self._sweep([(1.0, 0.0), (0.0, 1.0)])
+        a, b = entry[:, 1] + self.source_admittance * entry[:, 0]
+        return a, b, self.source_flow * decay
 
     def thevenin_at_load(self) -> tuple[np.ndarray, np.ndarray]:
         """Open-circuit pressure (F,) Pa and source impedance (F,) Pa s/m3 seen by the load."""
@@ -133,92 +134,119 @@ class Network:
             shunt=self.shunt,
             inserts=[(x - start, kind, value) for x, kind, value in inserts],
         )
-        sweep = part._sweep(*_UNIT_STATES)
-        matrix = np.stack([sweep.pressure, sweep.flow]) / sweep.decay  # (row, column, F)
-        return np.moveaxis(matrix, 2, 0)
+        _, _, entry, decay = part._sweep([(1.0, 0.0), (0.0, 1.0)])
+        return (entry / decay).transpose(2, 1, 0)
 
     def _respond(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pressure and flow (S, F) at `positions` with the network's own source and load."""
-        sweep = self._sweep(*self.load_state(), positions)
-        scale = self.source_flow / (sweep.flow + self.source_admittance * sweep.pressure)
-        shape = (len(positions), len(self.s))
-        pressure, flow = np.empty(shape, complex), np.empty(shape, complex)
-        for (index, p, q), decay in zip(reversed(sweep.stops), reversed(sweep.decays)):
-            scale = scale * decay
-            pressure[index] = p * scale
-            flow[index] = q * scale
-        return pressure, flow
+        pressure, flow, entry, _ = self._sweep([self.load_state()], positions)
+        p, q = entry[0]
+        scale = self.source_flow / (q + self.source_admittance * p)
+        return pressure[:, 0] * scale, flow[:, 0] * scale
 
-    def _sweep(self, p, q, positions=()) -> _Sweep:
-        """Carry the state (p, q) at the load, broadcastable to (..., F), up to x = 0."""
-        gamma = np.sqrt(self.series * self.shunt)
-        impedance = gamma / self.shunt  # on gamma's branch of the root
+    def _sweep(self, states: list, positions: np.ndarray = ()) -> tuple[np.ndarray, ...]:
+        """Carry m load states (p, q) up to x = 0: pressure and flow (S, m, F) at the positions,
+        the pairs (m, 2, F) at x = 0, and the decay (F,) of the line.
+
+        What is met at x is scaled so that dividing by the decay of the whole line would give it
+        in the scale of `states`.
+        """
+        count = len(self.s)
+        load = np.empty((len(states), 2, count), complex)
+        for given, (p, q) in zip(load, states):
+            given[0], given[1] = p, q
+        values = np.empty((len(self.inserts), count), complex)
+        for row, (_, _, value) in zip(values, self.inserts):
+            row[:] = value
+        return _sweep(
+            np.ascontiguousarray(self.series, complex),
+            np.ascontiguousarray(self.shunt, complex),
+            np.array(self._plan(positions)),
+            values,
+            load,
+            len(positions),
+        )
+
+    def _plan(self, positions: np.ndarray) -> list[tuple[int, int, float]]:
+        """Steps (what, index, distance) from the load to x = 0, for `_sweep`."""
         starts = np.cumsum(self.lengths) - self.lengths
-        here = self.length
-        # From load to pump; at one place inserts (last of the list first) before positions.
-        order = [(-x, 0, -k) for k, (x, _, _) in enumerate(self.inserts)]
-        order += [(-x, 1, k) for k, x in enumerate(positions)]
+        starts, here = starts.tolist(), self.length
+        # At one place inserts come before positions, the last of the list first.
+        order = [(-float(x), 0, -k) for k, (x, _, _) in enumerate(self.inserts)]
+        order += [(-float(x), 1, k) for k, x in enumerate(positions)]
         order.sort()
         if order and (order[0][0] < -here * (1 + 1e-12) or order[-1][0] > 0.0):
             raise ValueError(f"a position lies outside the line of {here} m")
-        order.append((0.0, 2, 0))
-
-        stops, decays, decay = [], [], 1.0
         k = len(starts) - 1
-        zc = impedance[k]
-        f, b = _waves(p, q, zc)
-        for x, what, index in order:
+        plan = [(_ENTER, k, 0.0)]
+        for x, what, index in [*order, (0.0, None, 0)]:
             x = -x
-            while True:
-                step = here - max(x, starts[k])
-                if step > 0.0:
-                    e = np.exp(-step * gamma[k])
-                    b = b * (e * e)
-                    decay = decay * e
-                    here -= step
-                if k == 0 or x >= starts[k]:
-                    break
-                p, q = f + b, (f - b) / zc
+            while k > 0 and x < starts[k]:
+                plan.append((_WALK, k, here - starts[k]))
+                here = starts[k]
                 k -= 1
-                zc = impedance[k]
-                f, b = _waves(p, q, zc)
-            p, q = f + b, (f - b) / zc
-            if what == 0:
-                _, kind, value = self.inserts[-index]
-                if kind == "shunt":
-                    q = q + value * p
-                elif kind == "series":
-                    p = p + value * q
-                else:
+                plan.append((_ENTER, k, 0.0))
+            plan.append((_WALK, k, max(here - x, 0.0)))
+            here = min(x, here)
+            if what == 1:
+                plan.append((_RECORD, index, 0.0))
+            elif what == 0:
+                kind = self.inserts[-index][1]
+                if kind not in ("shunt", "series"):
                     raise ValueError(f"an insert is 'shunt' or 'series', not {kind!r}")
-                f, b = _waves(p, q, zc)
+                plan.append((_SHUNT if kind == "shunt" else _SERIES, -index, 0.0))
+                plan.append((_ENTER, k, 0.0))
+        return plan
+
+
+_ENTER, _WALK, _RECORD, _SHUNT, _SERIES = range(5)
+
+
+@njit(cache=True, error_model="numpy")
+def _sweep(series, shunt, plan, values, load, stops):
+    """Follow `plan` at every frequency for every load state; see `Network._sweep`."""
+    states, count = load.shape[0], load.shape[2]
+    pressure = np.empty((stops, states, count), np.complex128)
+    flow = np.empty((stops, states, count), np.complex128)
+    entry = np.empty((states, 2, count), np.complex128)
+    total = np.empty(count, np.complex128)
+    p, q = np.empty(states, np.complex128), np.empty(states, np.complex128)
+    f, b = np.empty(states, np.complex128), np.empty(states, np.complex128)
+    factors = np.empty(len(plan), np.complex128)
+    for i in range(count):
+        p[:], q[:] = load[:, 0, i], load[:, 1, i]
+        gamma = zc = 0j
+        for n in range(len(plan)):
+            what, index = int(plan[n, 0]), int(plan[n, 1])
+            if what == _ENTER:
+                gamma = np.sqrt(series[index, i] * shunt[index, i])
+                zc = gamma / shunt[index, i]  # on gamma's branch of the root
+                for m in range(states):
+                    zq = zc * q[m]
+                    f[m], b[m] = 0.5 * (p[m] + zq), 0.5 * (p[m] - zq)
+            elif what == _WALK:
+                factors[n] = np.exp(-gamma * plan[n, 2])
+                for m in range(states):
+                    b[m] *= factors[n] * factors[n]
+                    p[m], q[m] = f[m] + b[m], (f[m] - b[m]) / zc
+            elif what == _SHUNT:
+                for m in range(states):
+                    q[m] += values[index, i] * p[m]
+            elif what == _SERIES:
+                for m in range(states):
+                    p[m] += values[index, i] * q[m]
             else:
-                decays.append(decay)
-                decay = 1.0
-                if what == 1:
-                    stops.append((index, p, q))
-        return _Sweep(p, q, stops, decays)
-
-
-class _Sweep(NamedTuple):
-    """States met between load and pump, each without the growth since the load."""
-
-    pressure: np.ndarray  # at x = 0
-    flow: np.ndarray
-    stops: list  # (index of the position, p, q), load first
-    decays: list  # exp(-gamma d) from load to first stop, between stops, from last stop to x = 0
-
-    @property
-    def decay(self) -> np.ndarray:
-        """exp(-gamma d) over the whole line."""
-        return np.prod(np.broadcast_arrays(*self.decays), axis=0)
-
-
-def _waves(p, q, zc):
-    """Wave towards the load and wave towards the pump, in units of pressure."""
-    zq = zc * q
-    return 0.5 * (p + zq), 0.5 * (p - zq)
-
-
-# Load states (p, q) = (1, 0) and (0, 1), side by side.
-_UNIT_STATES = np.array([[1.0], [0.0]]), np.array([[0.0], [1.0]])
+                pressure[index, :, i], flow[index, :, i] = p, q
+        entry[:, 0, i], entry[:, 1, i] = p, q
+        # Back down from the pump, each place gets the decay between it and the pump.
+        decay = 1.0 + 0j
+        for n in range(len(plan) - 1, -1, -1):
+            what, index = int(plan[n, 0]), int(plan[n, 1])
+            if what == _WALK:
+                decay *= factors[n]
+            elif what == _RECORD:
+                for m in range(states):
+                    pressure[index, m, i] *= decay
+                    flow[index, m, i] *= decay
+        total[i] = decay
+    return pressure, flow, entry, total
