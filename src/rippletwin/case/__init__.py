@@ -1,5 +1,6 @@
 """A case: the rig and the recordings a user gives, read and checked."""
 
+from rippletwin.case.load import load_case
 from rippletwin.case.model import (
     STATE_CODES,
     Case,
@@ -24,4 +25,5 @@ __all__ = [
     "Segment",
     "Sensor",
     "Uncertainty",
+    "load_case",
 ]

@@ -1,0 +1,154 @@
+"""Cut a recording into whole revolutions at equal shaft angles, without a tachometer.
+
+The ripple itself is the tachometer. Time is a smooth function t(theta) of the shaft angle theta
+(in revolutions), a cubic spline through knots every quarter of a revolution. In a window of one
+revolution around each knot the orders of the ripple, X_k, turn by exp(2 pi j k e) where the shaft
+is ahead of the estimate by e; e is solved by least squares over orders and sensors, first from the
+increments of the strong low piston harmonics, which tolerate a wrong nominal speed, then against
+the mean orders, up to ever higher ones. A window of exactly one revolution does not see what
+repeats every revolution: real speed fluctuation within a revolution stays in the ripple.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import map_coordinates, spline_filter1d
+
+KNOTS_PER_REVOLUTION = 4
+FIRST_HARMONICS = 6
+HIGHEST_TRACKED_HZ = 5000.0
+HALF_WIDTH, SHAPE = 24, 14.0  # of the interpolation kernel: 1e-6 up to 0.4 times the sampling rate
+
+
+@dataclass(frozen=True)
+class Revolutions:
+    """Whole revolutions at equal shaft angles.
+
+    windows (R, S, M) as the pressure given; speed_hz (R,), the mean of each revolution;
+    sampling_rate_hz = M times the mean speed.
+    """
+
+    windows: np.ndarray
+    speed_hz: np.ndarray
+    sampling_rate_hz: float
+
+
+def cut_revolutions(
+    pressure: np.ndarray,
+    sampling_rate_hz: float,
+    pistons: int,
+    speed_rpm: float,
+    samples_per_revolution: int | None = None,
+) -> Revolutions:
+    """Cut `pressure` (S, N) into whole revolutions of equal shaft angle steps.
+
+    The shaft angle of the first sample is unknown; half a revolution is lost at either end.
+    `samples_per_revolution` None keeps the recording's own rate, rounded up to an even number.
+    Raises ValueError for fewer than two revolutions left.
+    """
+    speed_hz = speed_rpm / 60
+    own = 2 * int(np.ceil(sampling_rate_hz / speed_hz / 2))
+    step = samples_per_revolution or own
+    time = _time_of_angle(pressure, sampling_rate_hz, pistons, speed_hz, own)
+    first, last = time.x[0], time.x[-1]
+    count = int(np.floor(last - first))
+    if count < 2:
+        raise ValueError(f"{pressure.shape[1]} samples hold fewer than two whole revolutions")
+    edges = time(first + np.arange(count + 1))
+    speed = 1 / np.diff(edges)
+    cutoff = min(1.0, step * speed.min() / sampling_rate_hz)
+    windows = np.empty((count, len(pressure), step))
+    for r in range(count):
+        angle = first + r + np.arange(step) / step
+        windows[r] = interpolate(pressure, time(angle) * sampling_rate_hz, cutoff)
+    return Revolutions(windows, speed, step * count / (edges[-1] - edges[0]))
+
+
+def interpolate(signal: np.ndarray, position: np.ndarray, cutoff: float = 1.0) -> np.ndarray:
+    """Band-limited values (S, P) of `signal` (S, N) at fractional sample numbers `position` (P,).
+
+    A sinc windowed by exp(b (sqrt(1 - u^2) - 1)) (Barnett, Magland, af Klinteberg 2019, SIAM J.
+    Sci. Comput. 41, C479, eq. 1.8); `cutoff` < 1 lowers the band to that share of Nyquist.
+    """
+    half = HALF_WIDTH / cutoff
+    base = np.floor(position).astype(int)
+    taps = np.arange(-int(np.ceil(half)) + 1, int(np.ceil(half)) + 1)
+    distance = (position - base)[:, None] - taps
+    shape = np.sqrt(np.maximum(1 - (distance / half) ** 2, 0.0))
+    weight = np.sinc(cutoff * distance) * np.exp(SHAPE * (shape - 1)) * (np.abs(distance) < half)
+    weight /= weight.sum(axis=1, keepdims=True)  # a constant stays exactly constant
+    index = np.clip(base[:, None] + taps, 0, signal.shape[1] - 1)
+    return np.array([np.einsum("pt,pt->p", row[index], weight) for row in signal])
+
+
+def _time_of_angle(
+    pressure: np.ndarray, sampling_rate_hz: float, pistons: int, speed_hz: float, step: int
+) -> CubicSpline:
+    """t(theta), s, over the angles (revolutions) that can be cut."""
+    smooth = spline_filter1d(np.asarray(pressure, float), order=3, axis=1, mode="mirror")
+    duration = (pressure.shape[1] - 1) / sampling_rate_hz
+    angle = np.array([0.0, duration * speed_hz])
+    time = CubicSpline(angle, angle / speed_hz)
+    step = KNOTS_PER_REVOLUTION * int(np.ceil(step / KNOTS_PER_REVOLUTION))
+    highest = min(step // 3, int(HIGHEST_TRACKED_HZ / speed_hz))
+    limits = [None] + [min(highest, pistons * 4**n) for n in range(1, 5)]
+    for limit in limits:
+        orders, centre = _sliding_orders(smooth, sampling_rate_hz, time, step, highest)
+        if limit is None:
+            ahead = _from_increments(orders, pistons)
+        else:
+            ahead = _from_mean_orders(orders, limit)
+        time = CubicSpline(centre + ahead, time(centre))
+    return time
+
+
+def _sliding_orders(smooth, sampling_rate_hz, time, step, highest):
+    """Orders 0..highest (windows, S, K + 1) of one revolution around each knot, and the knots."""
+    last = (smooth.shape[1] - 1) / sampling_rate_hz
+    low, high = _angles_at_ends(time, last)
+    count = int(np.floor((high - low) * step))
+    angle = low + np.arange(count) / step
+    position = time(angle) * sampling_rate_hz
+    hop = step // KNOTS_PER_REVOLUTION
+    starts = np.arange(0, count - step + 1, hop)
+    orders = np.empty((starts.size, len(smooth), highest + 1), complex)
+    for s, row in enumerate(smooth):
+        even = map_coordinates(row, position[None], order=3, prefilter=False, mode="nearest")
+        windows = np.lib.stride_tricks.sliding_window_view(even, step)[::hop]
+        orders[:, s] = np.fft.rfft(windows - row.mean(), axis=1)[:, : highest + 1]
+    # refer every window to one origin of the angle
+    turn = np.exp(-2j * np.pi * np.outer(angle[starts], np.arange(highest + 1)))
+    return orders * turn[:, None, :] * (2 / step), angle[starts] + 0.5
+
+
+def _angles_at_ends(time: CubicSpline, last: float) -> tuple[float, float]:
+    """Shaft angles at the first and the last sample: the spline's ends, continued straight."""
+    angles = time.x[[0, -1]]
+    return tuple(angles + (np.array([0.0, last]) - time(angles)) / time(angles, 1))
+
+
+def _from_increments(orders: np.ndarray, pistons: int) -> np.ndarray:
+    """How far the shaft is ahead (windows,), revolutions, from window to window turns."""
+    k = pistons * np.arange(1, FIRST_HARMONICS + 1)
+    k = k[k < orders.shape[2]]
+    turn = np.einsum("rsk,rsk->rk", orders[1:, :, k], orders[:-1, :, k].conj())
+    weight = k**2 * np.abs(turn)
+    increment = (weight * np.angle(turn) / k).sum(1) / weight.sum(1) / (2 * np.pi)
+    ahead = np.concatenate([[0.0], np.cumsum(increment)])
+    return ahead
+
+
+def _from_mean_orders(orders: np.ndarray, limit: int) -> np.ndarray:
+    """The same against the mean orders 1..limit that stand out of their scatter."""
+    some = orders[:, :, 1 : limit + 1]
+    k = np.arange(1, some.shape[2] + 1)
+    mean = some.mean(0)
+    scatter = np.mean(np.abs(some - mean) ** 2, axis=0)
+    floor = np.median(scatter, axis=1, keepdims=True)
+    weight = np.where(np.abs(mean) ** 2 > 10 * floor / len(some) * KNOTS_PER_REVOLUTION, 1.0, 0.0)
+    weight = weight / floor
+    turn = np.einsum("rsk,sk,k->r", some, weight * mean.conj(), k).imag
+    return turn / np.sum(weight * np.abs(mean) ** 2 * k**2) / (2 * np.pi)

@@ -1,0 +1,259 @@
+"""From recordings to observations: complex values with a covariance, whatever the kind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from rippletwin.case.model import FlowRipple, Recording, Rig, Sensor
+from rippletwin.revolutions import Revolutions, cut_revolutions
+
+__all__ = [
+    "Observation",
+    "Revolutions",
+    "cut_revolutions",
+    "noise_cycle_scatter",
+    "noise_mad",
+    "observe",
+]
+
+HIGHEST_HZ = 5000.0
+DEFAULT_RELATIVE_ERROR = 0.02
+SMOOTHED = 51
+ROUND_TRIPS = 20  # length of a segment of a random recording, in round trips of a wave
+REFERENCE_ERROR = 1e-4
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What every later stage sees of a recording.
+
+    values (S, F) complex: peak amplitudes in Pa (periodic, random, spectrum), or the impedance
+    (S = 1; Pa s/m3, or in units of the first segment's characteristic impedance if `normalised`).
+    covariance (F, S, S) = E[e e^H] of the complex errors e of values, taken as circular: the real
+    and the imaginary part each have half the variance. orders (F,) are shaft orders, None where the
+    source is not the shaft. mean (S,) is the mean pressure. `source` says what is known of it:
+    "known" (impedance), "nominal" (a flow ripple or a pump model exists) or "free".
+    """
+
+    kind: str
+    label: str
+    frequency_hz: np.ndarray
+    orders: np.ndarray | None
+    values: np.ndarray
+    covariance: np.ndarray
+    mean: np.ndarray
+    speed_hz: float | None
+    load_pressure: float | None
+    source: str
+    flow_ripple: FlowRipple | None
+    sensors: tuple[Sensor, ...]
+    normalised: bool = False
+
+
+def observe(
+    recording: Recording,
+    rig: Rig,
+    max_frequency_hz: float | None = None,
+    piston_harmonics_only: bool = False,
+) -> Observation:
+    """The observation in a recording.
+
+    max_frequency_hz : highest frequency kept; None is 5 kHz, or 0.4 times the sampling rate where
+        that is lower, or all of a spectrum.
+    piston_harmonics_only : keep only the orders that are multiples of the number of pistons.
+    """
+    if recording.kind == "periodic":
+        return _observe_periodic(recording, rig, max_frequency_hz, piston_harmonics_only)
+    if recording.kind == "random":
+        return _observe_random(recording, rig, max_frequency_hz)
+    return _observe_spectra(recording, rig, max_frequency_hz)
+
+
+def _observe_periodic(recording, rig, max_frequency_hz, piston_harmonics_only) -> Observation:
+    pistons = rig.pump["pistons"]
+    revolutions = cut_revolutions(
+        recording.pressure, recording.sampling_rate_hz, pistons, recording.speed_rpm
+    )
+    speed_hz = 1 / np.mean(1 / revolutions.speed_hz)
+    highest = _highest(max_frequency_hz, recording.sampling_rate_hz)
+    step = pistons if piston_harmonics_only else 1
+    orders = np.arange(step, int(highest / speed_hz) + 1, step)
+    spectra = 2 * np.fft.rfft(revolutions.windows, axis=2)[:, :, orders]
+    spectra /= revolutions.windows.shape[2]
+    values, covariance = average(spectra, revolutions.speed_hz / speed_hz - 1)
+    nominal = recording.flow_ripple is not None or len(rig.pump) > 1
+    return Observation(
+        kind=recording.kind,
+        label=recording.label,
+        frequency_hz=orders * speed_hz,
+        orders=orders,
+        values=values,
+        covariance=covariance,
+        mean=revolutions.windows.mean(axis=(0, 2)),
+        speed_hz=float(speed_hz),
+        load_pressure=recording.load_pressure,
+        source="nominal" if nominal else "free",
+        flow_ripple=recording.flow_ripple,
+        sensors=rig.sensors,
+    )
+
+
+def average(spectra: np.ndarray, deviation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (S, F) of window spectra (R, S, F) and its covariance (F, S, S).
+
+    `deviation` (R,) is each window's relative deviation from the mean speed. The line answers
+    differently at another speed (0.3 % of 5 kHz is half a radian over 5 m of oil), so the values
+    are the intercept of a regression on the deviation, up to its square where there are at least
+    forty windows. The covariance comes from the scatter about the regression; four windows' worth
+    of the channel's typical noise is mixed in, which keeps it positive definite for few windows.
+    """
+    windows, sensors = spectra.shape[:2]
+    degree = 2 if windows >= 40 else 1 if windows >= 20 else 0
+    scale = np.std(deviation) or 1.0
+    design = np.vander(deviation / scale, degree + 1, increasing=True)
+    inverse = np.linalg.pinv(design)
+    coefficients = np.einsum("dr,rsf->dsf", inverse, spectra)
+    residual = spectra - np.einsum("rd,dsf->rsf", design, coefficients)
+    freedom = windows - design.shape[1]
+    scatter = np.einsum("rsf,rtf->fst", residual, residual.conj())
+    typical = np.median(np.einsum("fss->fs", scatter).real, axis=0) / freedom
+    prior = sensors + 2
+    scatter = (scatter + prior * np.diag(typical)) / (freedom + prior)
+    return coefficients[0], scatter * np.sum(inverse[0] ** 2)
+
+
+def _observe_random(recording, rig, max_frequency_hz) -> Observation:
+    values, covariance, frequency_hz = reference_spectra(
+        recording.pressure, recording.sampling_rate_hz, rig
+    )
+    keep = frequency_hz <= _highest(max_frequency_hz, recording.sampling_rate_hz)
+    return Observation(
+        kind=recording.kind,
+        label=recording.label,
+        frequency_hz=frequency_hz[keep],
+        orders=None,
+        values=values[:, keep],
+        covariance=covariance[keep],
+        mean=recording.pressure.mean(axis=1),
+        speed_hz=None,
+        load_pressure=recording.load_pressure,
+        source="free",
+        flow_ripple=None,
+        sensors=rig.sensors,
+    )
+
+
+def reference_spectra(
+    pressure: np.ndarray, sampling_rate_hz: float, rig: Rig
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cross spectra of `pressure` (S, N) against its first row, for an unknown broadband source.
+
+    Returns values (S, F), covariance (F, S, S), frequency_hz (F,). values[s] = sqrt(G) H_s, where
+    G is the power of the coherent signal at the first sensor in a bin and H_s = G_1s / G the
+    response from there to sensor s: the H1 estimator (Bendat & Piersol 2010, Random Data, ch. 6)
+    with the noise, the smallest eigenvalue of the cross-spectral matrix, taken off G, for else
+    noise of the first sensor makes every H_s too small. The first sensor is the reference: the
+    scatter of sensor s about H_s times the first, segment by segment, is the error of the others,
+    and the reference's own error is nominal (1e-4). Hann segments overlap by half; every second bin
+    is kept, so that neighbours are almost independent.
+    """
+    samples = pressure.shape[1]
+    round_trip = 2 * sum(segment.delay for segment in rig.line)
+    wanted = max(ROUND_TRIPS * round_trip * sampling_rate_hz, 256)
+    length = min(2 ** int(np.ceil(np.log2(wanted))), 2 ** int(np.log2(samples / 8)))
+    window = np.hanning(length + 1)[:-1]
+    starts = np.arange(0, samples - length + 1, length // 2)
+    scale = 2 / window.sum()
+    spectra = np.array(
+        [
+            scale * np.fft.rfft(window * (part - part.mean(1, keepdims=True)), axis=1)[:, 2:-2:2]
+            for part in (pressure[:, start : start + length] for start in starts)
+        ]
+    )
+    power = np.einsum("rsf,rtf->fst", spectra, spectra.conj()) / len(starts)
+    noise = np.linalg.eigvalsh(power)[:, 0]
+    coherent = np.maximum(power[:, 0, 0].real - noise, 1e-3 * power[:, 0, 0].real)
+    values = power[:, :, 0].T / np.sqrt(coherent)
+    values[0] = np.sqrt(coherent)
+    error = spectra - values / values[0] * spectra[:, :1]
+    # neighbouring Hann segments correlate by 1/6 when they overlap by half
+    averages = len(starts) / (1 + 2 / 36)
+    covariance = np.einsum("rsf,rtf->fst", error, error.conj()) / len(starts) / averages
+    covariance[:, 0, :] = covariance[:, :, 0] = 0
+    covariance[:, 0, 0] = (REFERENCE_ERROR * np.abs(values[0])) ** 2
+    return values, covariance, np.fft.rfftfreq(length, 1 / sampling_rate_hz)[2:-2:2]
+
+
+def _observe_spectra(recording, rig, max_frequency_hz) -> Observation:
+    keep = slice(None)
+    if max_frequency_hz is not None:
+        keep = recording.frequency_hz <= max_frequency_hz
+    frequency_hz, repeats = recording.frequency_hz[keep], recording.spectra[:, :, keep]
+    values = repeats.mean(axis=0)
+    impedance = recording.kind == "input_impedance"
+    if impedance:
+        first = rig.line[0]
+        unit = 1.0 if recording.normalised else rig.fluid.density * first.wave_speed / first.area
+        # errors are even in the reflection coefficient (Z - Zc)/(Z + Zc); dZ = (Z + Zc)^2/(2 Zc) dR
+        size = np.abs(values + unit) ** 2 / (2 * unit)
+    else:
+        size = np.sqrt(np.mean(np.abs(values) ** 2, axis=0, keepdims=True)) * np.ones_like(values)
+    relative = recording.relative_error or DEFAULT_RELATIVE_ERROR
+    if len(repeats) > 1:
+        relative = _relative_scatter(repeats - values, np.abs(size))
+    variance = (relative * np.abs(size)) ** 2
+    return Observation(
+        kind=recording.kind,
+        label=recording.label,
+        frequency_hz=frequency_hz,
+        orders=None,
+        values=values,
+        covariance=np.einsum("sf,st->fst", variance, np.eye(len(values))).astype(complex),
+        mean=np.full(len(values), recording.load_pressure or 0.0),
+        speed_hz=None,
+        load_pressure=recording.load_pressure,
+        source="known" if impedance else "free",
+        flow_ripple=None,
+        sensors=() if impedance else rig.sensors,
+        normalised=recording.normalised,
+    )
+
+
+def _relative_scatter(residual: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Relative standard deviation (S, F) of the mean of repeats from `residual` (R, S, F).
+
+    Two or three repeats say little at one frequency, so the scatter is smoothed over SMOOTHED of
+    them.
+    """
+    count = len(residual)
+    variance = np.sum(np.abs(residual / size) ** 2, axis=0) / (count - 1) / count
+    return np.sqrt(uniform_filter1d(variance, SMOOTHED, axis=-1, mode="nearest"))
+
+
+def _highest(max_frequency_hz: float | None, sampling_rate_hz: float) -> float:
+    limit = HIGHEST_HZ if max_frequency_hz is None else max_frequency_hz
+    return min(limit, 0.4 * sampling_rate_hz)
+
+
+def noise_mad(signal: np.ndarray) -> np.ndarray:
+    """Standard deviation of white noise in `signal` (..., N), in its units, shape (...).
+
+    Median absolute deviation of the finest wavelet details over 0.6745 (Donoho & Johnstone 1994,
+    Biometrika 81, 425); the ripple of a pump has next to nothing in that top octave.
+    """
+    import pywt
+
+    details = pywt.dwt(signal, "db8", axis=-1)[1]
+    return np.median(np.abs(details), axis=-1) / 0.6744897501960817
+
+
+def noise_cycle_scatter(windows: np.ndarray) -> np.ndarray:
+    """Standard deviation (S,) of what does not repeat in `windows` (R, S, M).
+
+    Everything that varies from one revolution to the next counts, not only sensor noise.
+    """
+    residual = windows - windows.mean(axis=0)
+    return np.sqrt(np.mean(residual**2, axis=(0, 2)) * len(windows) / (len(windows) - 1))
