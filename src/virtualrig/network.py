@@ -86,7 +86,9 @@ def line(network: Network) -> tuple[stepper.Line, float]:
         count = max(1, int(np.ceil(wanted / network.degree)))
         width = pipe.length / count
         # SBDF3's limit for degree 5 with upwind fluxes is 0.046 widths; other degrees scale roughly
-        largest_step = min(largest_step, 0.04 * (5 / network.degree) ** 1.6 * width / pipe.wave_speed)
+        largest_step = min(
+            largest_step, 0.04 * (5 / network.degree) ** 1.6 * width / pipe.wave_speed
+        )
         first.append(at)
         at += count
         last.append(at - 1)

@@ -51,6 +51,10 @@ class Pump:
         values = {name: getattr(self, name) * (1 + by) for name, by in relative.items()}
         return replace(self, port_timing_deg=self.port_timing_deg + timing_deg, **values)
 
+    def with_spread(self, spread: np.ndarray) -> "Pump":
+        """This pump with deviations (pistons, 3) from piston to piston."""
+        return replace(self, spread=spread)
+
 
 @dataclass(frozen=True)
 class Fault:
@@ -115,7 +119,9 @@ def port_opening(angle, ports):
 
 
 @njit(cache=True, fastmath=True)
-def step_chambers(angle, speed, history, lead, chambers, ports, outlet_lead, outlet_rest, x, matrix):
+def step_chambers(
+    angle, speed, history, lead, chambers, ports, outlet_lead, outlet_rest, x, matrix
+):
     """One implicit step of all chambers and of the outlet that they share; returns Newton steps.
 
     Solves lead p_i - history_i = dp_i/dt for the chambers and

@@ -232,8 +232,8 @@ def run(line, nodes, chambers, ports, source, crank, state, phase, steps, every,
     node 0 over one revolution, added to that of the pump; `chambers` may be empty. `sensors` is
     (element, (count, n) interpolation rows). Every `every` steps a record is kept.
 
-    Returns sensor pressures (count, records); flow into the line, and pressure, at node 0
-    (2, records); and the greatest number of Newton steps that the chambers took.
+    Returns sensor pressures (count, records), flow into the line at x = 0 (records,), pressures of the
+    nodes (nodes, records), and the greatest number of Newton steps that the chambers took.
     """
     speed, ripple = crank
     element, rows = sensors
@@ -242,7 +242,8 @@ def run(line, nodes, chambers, ports, source, crank, state, phase, steps, every,
     n_nodes, pistons = nodes.shape[0], chambers.shape[0]
     lead = 11 / (6 * dt)
     recorded = np.zeros((count, steps // every))
-    outlet = np.zeros((2, steps // every))
+    outlet = np.zeros(steps // every)
+    nodal = np.zeros((n_nodes, steps // every))
     flux_p, flux_q = np.zeros((2, elements)), np.zeros((2, elements))
     wave_in, wave_lead = np.zeros(n_nodes), np.zeros(n_nodes)
     history = np.zeros((NODE_STATES, n_nodes))
@@ -291,7 +292,9 @@ def run(line, nodes, chambers, ports, source, crank, state, phase, steps, every,
         if step % every == 0:
             for s in range(count):
                 for i in range(n):
-                    recorded[s, step // every - 1] += rows[s, i] * state.pressure[now, i, element[s]]
-            outlet[0, step // every - 1] = flux_q[0, 0]
-            outlet[1, step // every - 1] = state.node_pressure[0]
-    return recorded, outlet, newton
+                    recorded[s, step // every - 1] += (
+                        rows[s, i] * state.pressure[now, i, element[s]]
+                    )
+            outlet[step // every - 1] = flux_q[0, 0]
+            nodal[:, step // every - 1] = state.node_pressure
+    return recorded, outlet, nodal, newton

@@ -1,0 +1,87 @@
+"""`virtualrig record`: a case folder of recordings made on the virtual test bench."""
+
+import argparse
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from virtualrig.folder import listed, prepare, write_recording, write_sheet, write_truth
+from virtualrig.recorder import Point, record
+from virtualrig.rig import SEAL, SHEET, RigError, read_rig, read_yaml
+
+_BAR = 1e5
+POINTS = {
+    "full": (
+        *(Point(f"{s}_1000_95", 1000.0, 95 * _BAR, 9.6, s) for s in ("healthy", "slipper", "cylinder")),
+        *(
+            Point(f"healthy_{n}_{p}", float(n), p * _BAR, 4.8)
+            for n, p in ((800, 95), (1200, 95), (1000, 60), (1000, 120), (800, 60), (1200, 120))
+        ),
+    ),
+    "smoke": (
+        *(Point(f"{s}_1000_95", 1000.0, 95 * _BAR, 9.6, s) for s in ("healthy", "slipper", "cylinder")),
+        Point("healthy_1200_60", 1200.0, 60 * _BAR, 4.8),
+    ),
+}  # fmt: skip
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Entry point; returns the exit status."""
+    options = _parser().parse_args(arguments)
+    try:
+        _record(options)
+    except RigError as error:
+        print(f"virtualrig: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("virtualrig: interrupted; the case folder is incomplete", file=sys.stderr)
+        return 130
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="virtualrig", description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+    make = commands.add_parser("record", help="record operating points into a new case folder")
+    make.add_argument("--out", type=Path, required=True, help="case folder to write (new or empty)")
+    make.add_argument("--seed", type=int, default=0, help="noise, wander, settings, shaft angles")
+    make.add_argument("--seconds", type=float, help="length of every recording")
+    make.add_argument(
+        "--points", default="full", help="full, smoke, or a YAML file with a list `points`"
+    )
+    make.add_argument("--sheet", type=Path, default=SHEET, help="what the rig's owner knows")
+    make.add_argument("--sealed", type=Path, default=SEAL, help="what the rig really is")
+    make.add_argument("--true-flow", type=Path, help="folder for the true outlet flow (sealed)")
+    return parser
+
+
+def _points(choice: str) -> tuple[Point, ...]:
+    if choice in POINTS:
+        return POINTS[choice]
+    listing = read_yaml(choice).get("points")
+    try:
+        return tuple(Point(**entry) for entry in listing)
+    except TypeError as error:
+        raise RigError(f"{choice}: field points: {error}") from None
+
+
+def _record(options: argparse.Namespace) -> None:
+    points = _points(options.points)
+    if options.seconds is not None:
+        if not options.seconds > 0:
+            raise RigError(f"--seconds {options.seconds}: must be positive")
+        points = tuple(replace(point, seconds=options.seconds) for point in points)
+    known, rig = read_rig(options.sheet, options.sealed)
+    unknown = {fault for point in points for fault in point.faults} - set(rig.faults)
+    if unknown:
+        raise RigError(f"{options.sealed}: field faults: no {', '.join(sorted(unknown))}")
+    prepare(options.out, options.true_flow)
+    for index, point in enumerate(points):
+        print(f"virtualrig: {index + 1}/{len(points)} {point.label}", file=sys.stderr, flush=True)
+        take = record(rig, point, np.random.default_rng([options.seed, index]))
+        write_recording(options.out / "recordings" / f"{point.label}.h5", take)
+        if options.true_flow is not None:
+            write_truth(options.true_flow / f"{point.label}.h5", take)
+    write_sheet(options.out, known, [listed(point) for point in points])

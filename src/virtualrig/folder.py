@@ -1,0 +1,62 @@
+"""Writing a case folder: rig.yaml with the sheet's values and HDF5 recordings. Nothing of the truth."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import yaml
+
+from virtualrig.recorder import SAMPLING_RATE_HZ, Point, Take
+from virtualrig.rig import RigError
+
+_HEADER = """\
+# Written by virtualrig. SI units; values are those of drawings and catalogues, not calibrated.
+# Pump: a port opens over port_opening_deg to its whole area port_area and closes the same way;
+# about each dead centre a chamber is shut off for port_overlap_deg; dead_volume is a chamber's
+# smallest volume; case_leakage is laminar, m3/s/Pa a chamber.
+"""
+
+
+def write_recording(path: Path, take: Take) -> None:
+    """`pressure` (sensors, samples), Pa, with the sampling rate as attribute."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with h5py.File(path, "w") as file:
+        data = file.create_dataset("pressure", data=take.pressure.astype(np.float32))
+        data.attrs["unit"] = "Pa"
+        file.attrs["sampling_rate_hz"] = data.attrs["sampling_rate_hz"] = SAMPLING_RATE_HZ
+
+
+def write_truth(path: Path, take: Take) -> None:
+    """True outlet flow and pressure over one revolution, and the crank turns of the samples."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with h5py.File(path, "w") as file:
+        file["outlet_flow"] = take.orbit.outlet_flow
+        file["outlet_pressure"] = take.orbit.outlet_pressure
+        file["turns"] = take.turns
+        file.attrs["speed_rpm"] = take.orbit.speed_rpm
+        file.attrs["sampling_rate_hz"] = SAMPLING_RATE_HZ
+
+
+def write_sheet(folder: Path, known: dict, recordings: list[dict]) -> None:
+    """rig.yaml of a case."""
+    text = yaml.safe_dump(known | {"recordings": recordings}, sort_keys=False, width=100)
+    (folder / "rig.yaml").write_text(_HEADER + text)
+
+
+def listed(point: Point) -> dict:
+    """The entry of one recording in rig.yaml."""
+    return {
+        "file": f"recordings/{point.label}.h5",
+        "speed_rpm": point.speed_rpm,
+        "load_pressure": point.load_pressure,
+        "state": point.state,
+    }
+
+
+def prepare(folder: Path, truth: Path | None) -> None:
+    """An empty case folder; raises RigError where it has content, or the truth would go into it."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise RigError(f"--out {folder}: exists and is not empty; name a new folder")
+    if truth is not None and truth.resolve().is_relative_to(folder.resolve()):
+        raise RigError(f"--true-flow {truth}: lies in the case folder; keep the truth out of it")
+    folder.mkdir(parents=True, exist_ok=True)

@@ -1,0 +1,103 @@
+"""Periodic orbits of a rig at one operating point, and recordings made of them.
+
+At constant speed the bench settles into a motion that repeats every revolution. A recording with a
+slowly wandering speed is composed of such orbits: at each instant that of the speed at that instant,
+at the crank angle reached by then. The line forgets within some 0.1 s while the speed wanders over
+seconds, and `march` run with a varying speed shows what the shortcut costs (docs/virtualrig.md).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from virtualrig import pump, stepper
+from virtualrig.network import line, node_table, sensor_rows, still
+from virtualrig.rig import Rig
+
+RECORDS = 4608
+"""Records a revolution; a multiple of three, the depth of the stepper's ring of states."""
+
+_REVOLUTIONS_OF_ADJUSTING = 8
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """One revolution, at crank turns k/RECORDS, k = 0, 1, ...: what is there, before any sensor.
+
+    `pressure` (sensors, RECORDS) Pa; `outlet_flow` (RECORDS,) m3/s into the line at x = 0;
+    `outlet_pressure` (RECORDS,); `valve` the load's orifice coefficient, m3/s/Pa^0.5; `residual` the
+    greatest change of any pressure over the last revolution, Pa.
+    """
+
+    speed_rpm: float
+    pressure: np.ndarray
+    outlet_flow: np.ndarray
+    outlet_pressure: np.ndarray
+    valve: float
+    residual: float
+    revolutions: int
+
+
+class Bench:
+    """A rig ready to run: compiled tables and a state that is kept from one run to the next."""
+
+    def __init__(self, rig: Rig, faults: tuple[str, ...] = (), refine: int = 1):
+        self.rig, self.refine = rig, refine
+        self.line, self.largest_step = line(rig.network)
+        self.nodes = node_table(rig.network)
+        self.sensors = sensor_rows(rig.network, self.line)
+        chosen = tuple(rig.faults[kind] for kind in faults)
+        self.chambers, self.ports = pump.tables(rig.pump, rig.network.density, chosen)
+        self.state = None
+
+    def settle(
+        self,
+        speed_rpm: float,
+        load_pressure: float,
+        valve: float | None = None,
+        tolerance: float = 20.0,
+        most: int = 80,
+    ) -> Orbit:
+        """Run until no pressure changes by more than `tolerance` Pa from one revolution to the next.
+
+        `load_pressure` is the mean pressure at the load that the operator sets, unless the `valve`
+        (orifice coefficient) is given. Raises RuntimeError where it does not settle.
+        """
+        speed = 2 * np.pi * speed_rpm / 60
+        period = 2 * np.pi / speed
+        every = int(np.ceil(period / RECORDS / self.largest_step)) * self.refine
+        steps = every * RECORDS
+        flow = 0.97 * self.rig.pump.displacement * speed_rpm / 60
+        if self.state is None:
+            pistons = len(self.chambers)
+            self.state = still(self.rig.network, self.line, load_pressure, flow, pistons)
+        load = self.nodes[self.rig.load_node]
+        load[stepper.VALVE_SET] = load_pressure
+        load[stepper.ORIFICE] = valve or self._valve(flow, load_pressure)
+        crank = (speed, np.array(self.rig.ripple, dtype=float).reshape(-1, 3))
+        before = np.inf
+        for revolution in range(1, most + 1):
+            pressure, outlet, nodal, newton = stepper.run(
+                self.line, self.nodes, self.chambers, self.ports, np.zeros(1), crank, self.state,
+                0, steps, every, period / steps, self.sensors,
+            )  # fmt: skip
+            if newton > 30:
+                raise RuntimeError("the pump's chambers did not converge; refine the time step")
+            residual = np.abs(pressure - before).max()
+            before = pressure
+            adjusting = valve is None and revolution <= _REVOLUTIONS_OF_ADJUSTING
+            if adjusting:
+                load[stepper.ORIFICE] = self._valve(outlet.mean(), load_pressure)
+            elif residual < tolerance:
+                return Orbit(
+                    speed_rpm, *(np.roll(x, 1, axis=-1) for x in (pressure, outlet, nodal[0])),
+                    float(load[stepper.ORIFICE]), float(residual), revolution,
+                )  # fmt: skip
+        raise RuntimeError(f"not periodic after {most} revolutions: still moving {residual:.0f} Pa")
+
+    def _valve(self, pump_flow: float, load_pressure: float) -> float:
+        """Orifice coefficient that passes the pump's flow, less what leaks on the way."""
+        others = np.delete(self.nodes, self.rig.load_node, axis=0)
+        lost = others[:, stepper.LEAK] * (load_pressure - others[:, stepper.TANK])
+        lost = lost.sum() + others[:, stepper.ORIFICE].sum() * np.sqrt(load_pressure)
+        return (pump_flow - lost) / np.sqrt(load_pressure)

@@ -1,0 +1,109 @@
+"""Recordings of a rig as a data logger sees them: wandering speed, sensors, noise, a fixed rate."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d
+
+from virtualrig.orbit import Bench, Orbit
+from virtualrig.rig import Rig, Sensing
+
+SAMPLING_RATE_HZ = 51200.0
+
+
+@dataclass(frozen=True)
+class Point:
+    """An operating point as the operator sets it; `faults` are keys of the rig's faults."""
+
+    label: str
+    speed_rpm: float
+    load_pressure: float
+    seconds: float
+    state: str = "healthy"
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        return () if self.state == "healthy" else (self.state,)
+
+
+@dataclass(frozen=True)
+class Take:
+    """A recording: `pressure` (sensors, samples) Pa; `turns` (samples,) true crank turns; `orbit`."""
+
+    pressure: np.ndarray
+    turns: np.ndarray
+    orbit: Orbit
+
+
+def record(rig: Rig, point: Point, rng: np.random.Generator) -> Take:
+    """One recording of `rig` at `point`. Its first sample falls at a random crank angle."""
+    set_speed = point.speed_rpm * (1 + rig.speed_error * rng.standard_normal())
+    set_pressure = point.load_pressure * (1 + rig.load_pressure_error * rng.standard_normal())
+    count = round(point.seconds * SAMPLING_RATE_HZ)
+    speed = set_speed * (1 + wander(count, rig.wander, rig.correlation_s, rng))
+    turns = rng.uniform() + np.concatenate([[0.0], np.cumsum(speed[:-1])]) / 60 / SAMPLING_RATE_HZ
+    orbits = family(Bench(rig, point.faults), speed, set_pressure)
+    pressure = follow(orbits, rig.sensing, speed, turns)
+    pressure += rig.noise * rng.standard_normal(pressure.shape)
+    return Take(pressure, turns, orbits[len(orbits) // 2])
+
+
+def wander(
+    count: int, deviation: float, correlation_s: float, rng: np.random.Generator
+) -> np.ndarray:
+    """Slow relative deviation of speed (count,): Gaussian, smooth, zero mean, as correlated as told."""
+    step = 0.02
+    grid = np.arange(int(np.ceil(count / SAMPLING_RATE_HZ / step)) + 2)
+    width = correlation_s / 2 / step
+    pad = int(np.ceil(4 * width))
+    rough = rng.standard_normal(len(grid) + 2 * pad)
+    smooth = gaussian_filter1d(rough, width)[pad : pad + len(grid)]
+    smooth *= deviation * np.sqrt(2 * np.sqrt(np.pi) * width)  # std of white noise so filtered
+    values = CubicSpline(grid * step, smooth)(np.arange(count) / SAMPLING_RATE_HZ)
+    return values - values.mean()
+
+
+def family(bench: Bench, speed: np.ndarray, load_pressure: float) -> list[Orbit]:
+    """Orbits at the mean of `speed` (r/min) and, where it wanders, at its extremes; one valve setting."""
+    middle = bench.settle(speed.mean(), load_pressure)
+    reach = np.abs(speed - speed.mean()).max()
+    if reach < 1e-6 * speed.mean():
+        return [middle]
+    low, high = (
+        bench.settle(speed.mean() + side * reach, load_pressure, middle.valve) for side in (-1, 1)
+    )
+    return [low, middle, high]
+
+
+def follow(
+    orbits: list[Orbit], sensing: tuple[Sensing, ...], speed: np.ndarray, turns: np.ndarray
+) -> np.ndarray:
+    """Sensed pressure (sensors, samples) along the orbits at `speed` (r/min) and crank `turns`.
+
+    Quadratic interpolation in speed between three orbits, splines in crank angle.
+    """
+    phase = turns % 1.0
+    total = np.zeros((len(sensing), len(turns)))
+    knots = np.array([orbit.speed_rpm for orbit in orbits])
+    for k, orbit in enumerate(orbits):
+        others = np.delete(knots, k)
+        share = np.prod([(speed - other) / (knots[k] - other) for other in others], axis=0)
+        sensed = sense(orbit, sensing)
+        grid = np.linspace(0, 1, sensed.shape[1] + 1)
+        closed = np.concatenate([sensed, sensed[:, :1]], axis=1)
+        total += share * CubicSpline(grid, closed, axis=1, bc_type="periodic")(phase)
+    return total
+
+
+def sense(orbit: Orbit, sensing: tuple[Sensing, ...]) -> np.ndarray:
+    """What the sensors make of an orbit's pressures: gain, delay and resonance, order by order."""
+    spectrum = np.fft.rfft(orbit.pressure, axis=1)
+    s = 2j * np.pi * np.arange(spectrum.shape[1]) * orbit.speed_rpm / 60
+    for row, chain in zip(spectrum, sensing, strict=True):
+        row *= chain.gain * np.exp(-s * chain.delay)
+        if chain.resonance is not None:
+            frequency, damping = chain.resonance
+            omega = 2 * np.pi * frequency
+            row *= omega**2 / (s**2 + 2 * damping * omega * s + omega**2)
+    return np.fft.irfft(spectrum, n=orbit.pressure.shape[1], axis=1)
