@@ -37,7 +37,8 @@ CONVERGED = 1e-3  # change of minus the log posterior
 
 @dataclass(frozen=True)
 class Settings:
-    """limits_hz and scalings as above; max_frequency_hz cuts the data; friction is the twin's."""
+    """Limits (Hz) and scalings (prior standard deviations) of the continuation; data above
+    `max_frequency_hz` are not used."""
 
     limits_hz: tuple[float, ...] = LIMITS_HZ
     scalings: tuple[float, ...] = SCALINGS
@@ -88,21 +89,21 @@ def calibrate(
         top = min(top, settings.max_frequency_hz)
     limits = [*(x for x in settings.limits_hz if x < top), top]
     speeds = np.array([p.name.startswith("wave_speed") for p in twin.parameters])
-    states = [(0.0, twin.theta + scale * speeds, 0.1) for scale in settings.scalings]
+    states = [(0.0, twin.theta + scale * speeds) for scale in settings.scalings]
     for stage, limit in enumerate(limits):
         likelihood = Likelihood(twin, observations, limit)
         fits = []
-        for _, theta, floor in states:
-            likelihood.floor = floor
+        for _, theta in states:
             if stage == 0:
                 theta = align(likelihood, theta)
             theta, value = fit(likelihood, theta)
-            fits.append((value, theta, likelihood.floor))
+            fits.append((value, theta))
         fits.sort(key=lambda f: f[0])
         states = _distinct(fits)[: KEPT[min(stage, len(KEPT) - 1)]]
         if progress is not None:
-            progress(f"below {limit:.0f} Hz: error floor {states[0][2]:.3g}")
-    value, theta, likelihood.floor = states[0]
+            left = misfit(likelihood, states[0][1]).relative
+            progress(f"below {limit:.0f} Hz: {len(fits)} starts, best misfit {left:.2%}")
+    value, theta = states[0]
     likelihood.estimate_errors(likelihood.forward(theta))
     covariance = laplace(likelihood, theta)
     fitted = twin.with_(theta=theta)

@@ -3,14 +3,6 @@
 Made once for a set of observations and called very often, so everything that does not depend on
 the parameters is worked out beforehand, and the costly friction functions are kept while their
 own parameters stand still (as they do in most columns of a finite-difference Jacobian).
-
-The square-law orifice q = K sqrt(p - p_back) at the load is solved at full amplitude. Its linear
-part sits in the network; the harmonics n of what is left couple the harmonics of one recording,
-
-    a p + b (Y p + n(p)) = c,
-
-and are found by repeated substitution. With ripple p and mean pressure drop P, n/(Y p) is about
-|p|/(4 P), a per cent or so, hence each pass gains two digits.
 """
 
 from __future__ import annotations
@@ -24,10 +16,9 @@ from rippletwin.case import FlowRipple
 from rippletwin.effects.base import LineState
 from rippletwin.line.chain import Network
 from rippletwin.line.segment import series_impedance, shunt_admittance
+from rippletwin.orifice import Orifice
 
-MAX_PASSES, TOLERANCE = 30, 1e-10
 ATMOSPHERE = 101325.0  # Pa
-LOWEST_DROP = 1e-3  # of the mean pressure drop: below it the orifice law is held, to stay real
 
 
 def flow_harmonics(ripple: FlowRipple, orders: np.ndarray) -> np.ndarray:
@@ -93,9 +84,15 @@ class Forward:
                 self.frequency_hz, rig.load.frequency_hz, rig.load.impedance
             )
         self._friction = {}
-        self._harmonics = None
-        if rig.load.kind == "orifice":
-            self._harmonics = _Harmonics.of(self.order, self.slices, points)
+        self._orifice = None
+        periodic = [r for r, point in enumerate(points) if point.ripple is not None]
+        if rig.load.kind == "orifice" and periodic:
+            self._orifice = Orifice(
+                [self.slices[r] for r in periodic],
+                self.order,
+                np.array([points[r].load_pressure for r in periodic]) - self.back_pressure,
+                np.array([points[r].coefficient for r in periodic]),
+            )
 
     def __call__(self, theta: np.ndarray) -> list[np.ndarray]:
         network = self.network(theta)
@@ -142,7 +139,7 @@ class Forward:
             line = self._line_state(v)
             for effect, place, values in twin.effect_values(theta):
                 effect.apply(network, line, values, place)
-        if self._harmonics is not None:
+        if self._orifice is not None:
             self._balance(network, v.load)
         return network
 
@@ -190,76 +187,19 @@ class Forward:
     def _balance(self, network: Network, factor: float) -> None:
         """Put the orifice's full-amplitude state at the load of `network`.
 
-        An effect may have changed the load: its change of the linear part is kept, its place as
-        the orifice's own admittance too.
+        Where an effect changed the load, its linear part is the changed one.
         """
         kind, value = network.load
-        if kind == "state":
-            return
         if kind != "admittance":
             p, q = network.load_state()
             value = q / p
-        a, b, c = network.load_relation()
-        total = a + b * value
-        remainder = np.zeros_like(c)
-        p = c / total
-        for _ in range(MAX_PASSES):
-            remainder = self._harmonics.remainder(p, factor, self.back_pressure)
-            new = (c - b * remainder) / total
-            change = np.max(np.abs(new - p)) / np.max(np.abs(new))
-            p = new
-            if change < TOLERANCE:
-                break
-        network.load = "state", (p, value * p + remainder)
+        state = self._orifice.solve(*network.load_relation(), value, factor)
+        network.load = "state", state
 
 
-class _Harmonics:
-    """The harmonics of each recording with a periodic orifice, as rows of one padded array."""
-
-    def __init__(self, columns, row, harmonic, count, pressure, coefficient):
-        self.columns, self.row, self.harmonic = columns, row, harmonic
-        self.pressure, self.coefficient = pressure[:, None], coefficient[:, None]
-        top = int(harmonic.max())
-        samples = 1 << int(np.ceil(np.log2(4 * top + 4)))
-        phase = 2j * np.pi * np.outer(np.arange(1, top + 1), np.arange(samples)) / samples
-        self.synthesis = np.exp(phase)
-        self.analysis = 2 / samples * np.exp(-phase).T
-        self.shape = count, top
-
-    @classmethod
-    def of(cls, order, slices, points):
-        """None where no observation is periodic (the linear orifice is then all there is)."""
-        columns, row, harmonic, kept = [], [], [], []
-        for part, point in zip(slices, points):
-            if point.ripple is None:
-                continue
-            orders = order[part].astype(int)
-            columns.append(np.arange(part.start, part.stop))
-            row.append(np.full(len(orders), len(kept)))
-            harmonic.append(orders // np.gcd.reduce(orders))
-            kept.append(point)
-        if not kept:
-            return None
-        return cls(
-            np.concatenate(columns),
-            np.concatenate(row),
-            np.concatenate(harmonic),
-            len(kept),
-            np.array([p.load_pressure for p in kept]),
-            np.array([p.coefficient for p in kept]),
-        )
-
-    def remainder(self, p, factor, back_pressure):
-        """Harmonics (F,) of K sqrt(P + p(t)) - Y p(t), the orifice without its linear part."""
-        padded = np.zeros(self.shape, complex)
-        padded[self.row, self.harmonic - 1] = p[self.columns]
-        drop = self.pressure - back_pressure
-        ripple = (padded @ self.synthesis).real
-        flow = factor * self.coefficient * np.sqrt(np.maximum(drop + ripple, LOWEST_DROP * drop))
-        flow -= factor * self.coefficient / (2 * np.sqrt(drop)) * ripple
-        result = np.zeros_like(p)
-        result[self.columns] = (flow @ self.analysis)[self.row, self.harmonic - 1]
-        return result
+def characteristic_impedance(fluid, segment) -> float:
+    """rho a/A of a segment without loss, Pa s/m3."""
+    return fluid.density * segment.wave_speed / segment.area
 
 
 def reflection(impedance: np.ndarray) -> np.ndarray:

@@ -18,10 +18,11 @@ shorten the part along the prediction by 1/sqrt(1 + sigma^2 |h|^2).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from rippletwin.forward import Forward, reflection
+from rippletwin.forward import Forward, characteristic_impedance, reflection
 
 FLOORS = np.geomspace(1e-4, 2.0, 40)
 SOURCE_STEPS = np.array([0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0])
@@ -43,14 +44,19 @@ class Likelihood:
     """
 
     def __init__(
-        self, twin, observations: Sequence, max_frequency_hz: float | None = None, floor=0.1
+        self,
+        twin,
+        observations: Sequence,
+        max_frequency_hz: float | None = None,
+        piston_orders: bool = True,
     ):
         self.twin = twin
-        self.observations = [cut(o, max_frequency_hz) for o in observations]
+        pistons = twin.rig.pump["pistons"] if piston_orders else 1
+        self.observations = [select(o, max_frequency_hz, pistons) for o in observations]
         self.forward = Forward(twin, self.observations)
-        self.floor, self.source_sd = floor, 0.0
+        self.floor, self.source_sd = 0.1, 0.0
         self.prior = np.array([not p.flat for p in twin.parameters])
-        self._groups = [_Group(o) for o in self.observations]
+        self._groups = [_Group(comparable(o, twin.rig)) for o in self.observations]
         free = sum(g.values.shape[1] for g in self._groups if g.source == "free")
         self.count = 2 * (sum(g.values.size for g in self._groups) - free)
 
@@ -102,8 +108,7 @@ class Likelihood:
 class _Group:
     """One observation in the eigenbasis of its covariance."""
 
-    def __init__(self, observation):
-        o = comparable(observation)
+    def __init__(self, o):
         variances, basis = np.linalg.eigh(o.covariance)  # (F, S), (F, S, S)
         self.source = o.source
         self.variances = np.maximum(variances, 0.0).T  # (S, F)
@@ -161,40 +166,41 @@ class _Group:
         )
 
 
-def comparable(observation):
+def comparable(observation, rig):
     """The observation in the quantity that `Forward` predicts.
 
     An input impedance becomes a reflection coefficient (see `rippletwin.forward.reflection`), its
-    covariance with it: dR = 2 dz/(z + 1)^2. Everything else stays.
+    covariance with it: dR = 2 dz/(z + 1)^2 with z over the data sheet's rho a/A. The rest stays.
     """
     if observation.kind != "input_impedance":
         return observation
-    z = observation.values
-    slope = np.abs(2.0 / (z[0] + 1.0) ** 2) ** 2
-    return _replace(
+    unit = 1.0 if observation.normalised else characteristic_impedance(rig.fluid, rig.line[0])
+    z = observation.values / unit
+    slope = np.abs(2.0 / (z[0] + 1.0) ** 2) ** 2 / unit**2
+    return replace(
         observation,
         values=reflection(z),
         covariance=observation.covariance * slope[:, None, None],
     )
 
 
-def cut(observation, max_frequency_hz: float | None):
-    """The observation at and below a frequency."""
-    if max_frequency_hz is None or np.all(observation.frequency_hz <= max_frequency_hz):
+def select(observation, max_frequency_hz: float | None = None, pistons: int = 1):
+    """The observation at and below a frequency, and at multiples of `pistons` shaft orders.
+
+    At least its lowest frequency is kept.
+    """
+    keep = np.ones(len(observation.frequency_hz), dtype=bool)
+    if observation.orders is not None:
+        keep &= np.asarray(observation.orders) % pistons == 0
+    if max_frequency_hz is not None:
+        lowest = np.min(observation.frequency_hz[keep])
+        keep &= observation.frequency_hz <= max(max_frequency_hz, lowest)
+    if np.all(keep):
         return observation
-    keep = observation.frequency_hz <= max_frequency_hz
-    if not np.any(keep):
-        keep = np.arange(len(keep)) == np.argmin(observation.frequency_hz)
-    return _replace(
+    return replace(
         observation,
         frequency_hz=observation.frequency_hz[keep],
         orders=None if observation.orders is None else observation.orders[keep],
         values=observation.values[:, keep],
         covariance=observation.covariance[keep],
     )
-
-
-def _replace(observation, **changes):
-    from dataclasses import replace
-
-    return replace(observation, **changes)

@@ -49,7 +49,7 @@ def misfit(likelihood, theta: np.ndarray) -> Misfit:
     """
     pairs = {}
     for o, h in zip(likelihood.observations, likelihood.forward(theta)):
-        measured = comparable(o).values
+        measured = comparable(o, likelihood.twin.rig).values
         if o.source == "free":
             h = h * (np.sum(np.conj(h) * measured, 0) / np.sum(np.abs(h) ** 2, 0))
         for name, v, x in zip(_names(o), measured, h):

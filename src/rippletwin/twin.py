@@ -28,9 +28,13 @@ from rippletwin.case import FlowRipple, Fluid, Load, Rig, Segment, Sensor, Uncer
 from rippletwin.effects import EFFECTS, Place
 from rippletwin.effects.base import lognormal, normal
 from rippletwin.errors import InputError
-from rippletwin.forward import Forward, flow_harmonics
+from rippletwin.forward import Forward, characteristic_impedance, flow_harmonics
 from rippletwin.line.segment import FRICTIONS
 from rippletwin.parameters import Parameter
+
+GUESSED_VELOCITY, GUESSED_SD = 2.0, 1.0
+"""Mean flow velocity (m/s) in the last segment, and the load's relative uncertainty, where neither
+a flow ripple nor an orifice coefficient is known: oil lines run at half to six metres a second."""
 
 SOURCE_SD = 0.05
 """Largest relative error of a nominal flow ripple's harmonic that is put down to the ripple."""
@@ -72,6 +76,8 @@ class Twin:
     effects : physics beyond that, applied in order.
     source_sd : largest relative standard deviation of a nominal ripple's harmonics.
     theta : where the twin stands, (P,); nominal by default.
+    guessed_load : whether the orifice's coefficient is but a guess; by default it is where an
+        observation has neither a flow ripple nor a coefficient to tell the mean flow.
 
     Raises ValueError for an unknown friction or a theta of the wrong length.
     """
@@ -84,6 +90,7 @@ class Twin:
         effects: Sequence = (),
         source_sd: float = SOURCE_SD,
         theta: np.ndarray | None = None,
+        guessed_load: bool | None = None,
     ):
         if friction not in FRICTIONS:
             raise ValueError(f"friction must be one of {FRICTIONS}, not {friction!r}")
@@ -94,9 +101,16 @@ class Twin:
         )
         if len(set(self.labels)) < len(self.labels):
             raise ValueError(f"recordings need labels of their own, not {self.labels}")
+        if guessed_load is None:
+            guessed_load = (
+                rig.load.kind == "orifice"
+                and rig.load.coefficient is None
+                and any(o.source == "free" and o.flow_ripple is None for o in observations)
+            )
+        self.guessed_load = bool(guessed_load)
         self._effect_parameters = [effect.parameters(rig, place) for effect, place in self.effects]
         self.parameters = (
-            *_line_parameters(rig),
+            *_line_parameters(rig, self.guessed_load),
             *(_angle(label) for label in self.labels),
             *_named_apart(self.effects, self._effect_parameters),
         )
@@ -146,7 +160,7 @@ class Twin:
         """Mean pressure and flow, orifice coefficient and source of an observation.
 
         The coefficient is that of the data sheet, or what mean flow and load pressure give.
-        Raises InputError where an orifice load cannot be had from what is known.
+        Raises InputError for an orifice load without a mean pressure.
         """
         load, kind = self.rig.load, observation.kind
         ripple = None
@@ -170,12 +184,7 @@ class Twin:
         elif ripple is not None or observation.flow_ripple is not None:
             coefficient = _mean_flow(ripple or observation.flow_ripple) / root
         else:
-            raise InputError(
-                observation.label,
-                "load.coefficient",
-                "an orifice load with an unknown source has no mean flow to go by",
-                "give load.coefficient (m3/s/sqrt(Pa)) in rig.yaml or a flow_ripple",
-            )
+            coefficient = GUESSED_VELOCITY * self.rig.line[-1].area / root
         return OperatingPoint(mean, coefficient * root, coefficient, ripple)
 
     def respond(
@@ -210,10 +219,10 @@ class Twin:
         is taken for it; one given in Pa s/m3 is divided by the data sheet's, as the data are.
         """
         first = self.rig.line[0]
-        if getattr(observation, "normalised", False):
+        if observation.normalised:
             v = self.arrays(theta)
             first = Segment(first.length, v.diameters[0], v.wave_speeds[0])
-        return self.rig.fluid.density * first.wave_speed / first.area
+        return characteristic_impedance(self.rig.fluid, first)
 
     # copies
 
@@ -223,6 +232,7 @@ class Twin:
             "friction": self.friction,
             "effects": self.effects,
             "source_sd": self.source_sd,
+            "guessed_load": self.guessed_load,
             "theta": None if "effects" in changes else self.theta,
         }
         labels = [_Point(label=label) for label in self.labels]
@@ -259,6 +269,7 @@ class Twin:
             "recordings": list(self.labels),
             "friction": self.friction,
             "source_sd": self.source_sd,
+            "guessed_load": self.guessed_load,
             "effects": [{"name": e.name, "place": asdict(place)} for e, place in self.effects],
             "theta": self.theta.tolist(),
             "values": self.values(),
@@ -275,6 +286,7 @@ class Twin:
             friction=data["friction"],
             effects=effects,
             source_sd=data["source_sd"],
+            guessed_load=data["guessed_load"],
             theta=np.array(data["theta"]),
         )
 
@@ -307,9 +319,10 @@ class _Point:
     source: str = "nominal"
     mean: np.ndarray | None = None
     sensors: tuple | None = None
+    normalised: bool = False
 
 
-def _line_parameters(rig: Rig) -> list[Parameter]:
+def _line_parameters(rig: Rig, guessed_load: bool) -> list[Parameter]:
     sheet = rig.uncertainty
     relative = (
         ("wave_speed", sheet.wave_speed, "m/s"),
@@ -333,7 +346,8 @@ def _line_parameters(rig: Rig) -> list[Parameter]:
     viscosity = lognormal(rig.fluid.kinematic_viscosity, sheet.viscosity)
     out.append(Parameter("viscosity", "m2/s", viscosity, "fluid"))
     if rig.load.kind in ("orifice", "impedance"):
-        out.append(Parameter("load", "", lognormal(1.0, sheet.load), "load"))
+        sd = GUESSED_SD if guessed_load else sheet.load
+        out.append(Parameter("load", "", lognormal(1.0, sd), "load"))
     return out
 
 
