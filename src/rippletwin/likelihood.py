@@ -35,6 +35,7 @@ class Likelihood:
     ----------
     twin, observations : see rippletwin.twin and rippletwin.spectra.
     max_frequency_hz : use nothing above it; None for all.
+    floor : relative model error to begin with.
 
     Columns are the frequencies of all observations side by side. With `piston_orders` the shaft
     orders that no healthy nominal pump makes are left out of periodic recordings.
@@ -48,13 +49,14 @@ class Likelihood:
         twin,
         observations: Sequence,
         max_frequency_hz: float | None = None,
+        floor: float = 0.1,
         piston_orders: bool = True,
     ):
         self.twin = twin
         pistons = twin.rig.pump["pistons"] if piston_orders else 1
-        self.observations = [select(o, max_frequency_hz, pistons) for o in observations]
+        self.observations = [cut(o, max_frequency_hz, pistons) for o in observations]
         self.forward = Forward(twin, self.observations)
-        self.floor, self.source_sd = 0.1, 0.0
+        self.floor, self.source_sd = floor, 0.0
         self.prior = np.array([not p.flat for p in twin.parameters])
         self._groups = [_Group(comparable(o, twin.rig)) for o in self.observations]
         free = sum(g.values.shape[1] for g in self._groups if g.source == "free")
@@ -184,7 +186,7 @@ def comparable(observation, rig):
     )
 
 
-def select(observation, max_frequency_hz: float | None = None, pistons: int = 1):
+def cut(observation, max_frequency_hz: float | None = None, pistons: int = 1):
     """The observation at and below a frequency, and at multiples of `pistons` shaft orders.
 
     At least its lowest frequency is kept.
