@@ -1,7 +1,7 @@
 """The lumped chamber pump: from geometry and leaks to the flow ripple at the outlet."""
 
 from rippletwin.pump.geometry import Geometry, kinematic_flow
-from rippletwin.pump.simulate import (
+from rippletwin.pump.simulation import (
     ConstantPressure,
     Cylinder,
     Pipe,

@@ -25,7 +25,8 @@ ATMOSPHERE = 101325.0
 SMOOTHING = 1e3  # Pa
 GAMMA = 1.0 - np.sqrt(0.5)
 TOLERANCE = 1e-11  # of a Newton step, relative to the largest pressure
-MAX_NEWTON = 60
+TANGENT_STEPS = 10  # with the true slopes; then steeper ones, see `orifice`
+MAX_NEWTON = 80
 
 
 @njit(cache=True)
@@ -36,11 +37,17 @@ def compression(p, bulk_modulus, air):
 
 
 @njit(cache=True)
-def orifice(conductance, drop):
-    """Flow through a smoothed orifice, m3/s, and its slope; `conductance` = Cd A sqrt(2/rho)."""
+def orifice(conductance, drop, tangency):
+    """Flow through a smoothed orifice, m3/s, and a slope; `conductance` = Cd A sqrt(2/rho).
+
+    The slope is the tangent's for `tangency` 1 and the chord's from the origin for 0. On a square
+    root Newton's tangent jumps between +drop and -drop for ever, a slope in between contracts.
+    """
     square = drop * drop + SMOOTHING * SMOOTHING
     root = 1.0 / np.sqrt(np.sqrt(square))
-    return conductance * drop * root, conductance * root * (1.0 - 0.5 * drop * drop / square)
+    return conductance * drop * root, conductance * root * (
+        1.0 - 0.5 * tangency * drop * drop / square
+    )
 
 
 @njit(cache=True)
@@ -78,30 +85,31 @@ def solve_stage(p, rate, target, step, tables, pump, case_leak, cross_leak, c_pl
     bulk_modulus, air, laminar, suction_pressure = pump
     matrix = np.empty((n + 1, n + 1))
     rhs = np.empty(n + 1)
-    for _ in range(MAX_NEWTON):
+    for iteration in range(MAX_NEWTON):
+        tangency = 1.0 if iteration < TANGENT_STEPS else 2.0 / 3.0
         matrix[:] = 0.0
         delivered = 0.0
         slopes = 0.0
         for k in range(n):
             rate[k] = -tables[1, k]
         for k in range(n):
-            q, slope = orifice(tables[2, k], p[k] - p[n])
+            q, slope = orifice(tables[2, k], p[k] - p[n], tangency)
             delivered += q
             slopes += slope
             inflow = -q
             matrix[k, k] += slope
             matrix[k, n] = -slope
             matrix[n, k] = -impedance * slope
-            q, slope = orifice(tables[3, k], p[k] - suction_pressure)
+            q, slope = orifice(tables[3, k], p[k] - suction_pressure, tangency)
             inflow -= q
             matrix[k, k] += slope
-            q, slope = orifice(case_leak[k], p[k] - suction_pressure)
+            q, slope = orifice(case_leak[k], p[k] - suction_pressure, tangency)
             inflow -= q + laminar * (p[k] - suction_pressure)
             matrix[k, k] += slope + laminar
             rate[k] += inflow
             if cross_leak[k] > 0.0:
                 m = (k + 1) % n
-                q, slope = orifice(cross_leak[k], p[k] - p[m])
+                q, slope = orifice(cross_leak[k], p[k] - p[m], tangency)
                 rate[k] -= q
                 rate[m] += q
                 matrix[k, k] += slope

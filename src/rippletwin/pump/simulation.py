@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rippletwin.case.model import Fluid, FlowRipple, Segment
+from rippletwin.case.model import FlowRipple, Fluid, Segment
 from rippletwin.pump import chambers
 from rippletwin.pump.geometry import Geometry
 
@@ -115,7 +115,7 @@ def simulate(
     state = np.append(np.where(delivering, load_pressure, geometry.suction_pressure), load_pressure)
 
     previous, change = None, np.inf
-    for revolutions in range(1, MAX_REVOLUTIONS + 1):
+    for revolutions in range(1, MAX_REVOLUTIONS + 1):  # noqa: B007 (reported)
         flow, pressures, readings = chambers.revolution(
             state, end_of_step, first_stage, period / steps, constants, case_leak, cross_leak,
             line, line_p, line_q, sensors,
