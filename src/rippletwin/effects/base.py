@@ -66,11 +66,16 @@ def uniform(low: float, high: float) -> Prior:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of an effect: name, unit (SI) and proper prior."""
+    """A parameter of an effect: name, unit (SI), proper prior.
+
+    `scan` holds the prior's coordinates that a fit should set out from, each of them, because the
+    likelihood has several valleys along this parameter.
+    """
 
     name: str
     unit: str
     prior: Prior
+    scan: tuple[float, ...] = (0.0,)
 
 
 @dataclass(frozen=True)
@@ -117,7 +122,7 @@ class LineState:
         return 0.25 * np.pi * self.diameters[k] ** 2
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Effect:
     """A piece of missing physics.
 
@@ -130,6 +135,8 @@ class Effect:
     parameters  (rig, place) -> tuple of Parameter
     places      rig -> tuple of Place
     apply       (network, line: LineState, values: name -> value, place) mutates the network
+    certain     no real line is without it: where something is missing at all, it is taken in
+                unless the data speak against it
     """
 
     name: str
@@ -141,11 +148,22 @@ class Effect:
     parameters: Callable[[object, Place], tuple[Parameter, ...]]
     places: Callable[[object], tuple[Place, ...]]
     apply: Callable[[object, LineState, Mapping[str, object], Place], None]
+    certain: bool = False
+
+    def __reduce__(self):
+        """Pickled by name, for the registry has it in every process."""
+        return _by_name, (self.name,)
 
     def suits(self, rig) -> bool:
         """Whether the effect exists in the rig's medium."""
         gas = rig.fluid.heat_capacity_ratio is not None
         return self.medium == "any" or (self.medium == "gas") == gas
+
+
+def _by_name(name: str) -> Effect:
+    from rippletwin.effects import EFFECTS
+
+    return EFFECTS[name]
 
 
 def line_place(rig) -> tuple[Place, ...]:
@@ -179,14 +197,20 @@ def sensor_places(rig) -> tuple[Place, ...]:
 
 
 def position_parameter(rig) -> Parameter:
-    """Distance from the pump outlet, uniform over the line."""
-    return Parameter("position", "m", uniform(0.0, sum(s.length for s in rig.line)))
+    """Distance from the pump outlet, uniform over the line; set out from six places."""
+    prior = uniform(0.0, sum(s.length for s in rig.line))
+    return Parameter("position", "m", prior, tuple(ndtri((np.arange(6) + 0.5) / 6)))
 
 
 def segment_at(lengths: np.ndarray, position) -> int:
     """Index of the segment that holds `position` (the first set's, where there is a batch)."""
     ends = np.cumsum([np.ravel(length)[0] for length in lengths])
     return int(min(np.searchsorted(ends, np.ravel(position)[0]), len(ends) - 1))
+
+
+def on_line(network, position):
+    """`position` (m), held on the line, which a fit may have made a little shorter."""
+    return np.clip(position, 0.0, network.length)
 
 
 def scale_sensor(network, index: int, factor) -> None:

@@ -45,4 +45,5 @@ EFFECT = Effect(
     parameters=lambda rig, place: (Parameter("end_correction", "1", normal(0.7, 0.1)),),
     places=lambda rig: load_place(rig) if rig.load.kind == "open" else (),
     apply=_apply,
+    certain=True,
 )

@@ -15,8 +15,8 @@ def air_compressibility(gas_fraction, exponent, mean_pressure):
 
     `gas_fraction` alpha is by volume at atmospheric pressure, `exponent` n the polytropic one.
     """
-    return gas_fraction * (ATMOSPHERE / mean_pressure) ** (1.0 / exponent) / (
-        exponent * mean_pressure
+    return (
+        gas_fraction * (ATMOSPHERE / mean_pressure) ** (1.0 / exponent) / (exponent * mean_pressure)
     )
 
 

@@ -2,29 +2,36 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from rippletwin.effects.base import (
     Effect,
     Parameter,
     lognormal,
+    on_line,
     position_parameter,
     position_place,
     uniform,
 )
 from rippletwin.line.chain import Insert
 
+ATMOSPHERE = 1.01325e5  # Pa
 REFERENCE_PRESSURE = 1e7  # Pa, at which the conductance is stated
 
 
 def _apply(network, line, values, place):
-    relative = line.mean_pressure / REFERENCE_PRESSURE
+    # Spectra may come without a mean pressure: then as at the atmosphere.
+    relative = np.maximum(line.mean_pressure, ATMOSPHERE) / REFERENCE_PRESSURE
     conductance = values["conductance"] * relative ** (-values["pressure_exponent"])
-    network.inserts.append(Insert(values["position"], "shunt", conductance + 0.0 * network.s))
+    network.inserts.append(
+        Insert(on_line(network, values["position"]), "shunt", conductance + 0.0 * network.s)
+    )
 
 
 def _parameters(rig, place):
     segment = rig.line[0]
-    characteristic = 0.25 * 3.1416 * segment.diameter**2 / (
-        rig.fluid.density * segment.wave_speed
+    characteristic = (
+        0.25 * np.pi * segment.diameter**2 / (rig.fluid.density * segment.wave_speed)
     )  # 1/Zc: a leak well below it cannot be seen
     return (
         position_parameter(rig),

@@ -6,6 +6,7 @@ from rippletwin.effects.base import (
     Effect,
     Parameter,
     lognormal,
+    on_line,
     position_parameter,
     position_place,
     segment_at,
@@ -20,10 +21,8 @@ def volume_admittance(s, volume, density, wave_speed):
 
 def _apply(network, line, values, place):
     k = segment_at(network.lengths, values["position"])
-    admittance = volume_admittance(
-        network.s, values["volume"], line.density, line.wave_speeds[k]
-    )
-    network.inserts.append(Insert(values["position"], "shunt", admittance))
+    admittance = volume_admittance(network.s, values["volume"], line.density, line.wave_speeds[k])
+    network.inserts.append(Insert(on_line(network, values["position"]), "shunt", admittance))
 
 
 EFFECT = Effect(

@@ -33,8 +33,8 @@ def _parameters(rig, place):
         inertance = 0.1 * rig.fluid.density / area  # ten centimetres of the last pipe
         return (Parameter("inertance", "Pa s2/m3", lognormal(inertance, 1.2)),)
     return (
-        Parameter("gain", "1", normal(0.0, 2.0)),
-        Parameter("natural_frequency", "Hz", lognormal(400.0, 1.0)),
+        Parameter("gain", "1", normal(0.0, 2.0), (0.2,)),
+        Parameter("natural_frequency", "Hz", lognormal(400.0, 1.0), (-1.0, 0.5)),
         Parameter("damping_ratio", "1", lognormal(0.4, 0.8)),
     )
 

@@ -8,9 +8,7 @@ from rippletwin.line.chain import Insert
 
 
 def _apply(network, line, values, place):
-    admittance = volume_admittance(
-        network.s, values["volume"], line.density, line.wave_speeds[-1]
-    )
+    admittance = volume_admittance(network.s, values["volume"], line.density, line.wave_speeds[-1])
     network.inserts.append(Insert(network.length, "shunt", admittance))
 
 

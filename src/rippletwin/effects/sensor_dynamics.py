@@ -21,7 +21,7 @@ EFFECT = Effect(
     source="Holman 2011, Experimental Methods for Engineers, sec. 2.7 and 6.5",
     time_domain="second-order state driven by the pressure, integrated exactly over a step",
     parameters=lambda rig, place: (
-        Parameter("natural_frequency", "Hz", lognormal(5000.0, 0.7)),
+        Parameter("natural_frequency", "Hz", lognormal(5000.0, 0.7), (-1.0, 0.5)),
         Parameter("damping_ratio", "1", lognormal(0.2, 0.9)),
     ),
     places=sensor_places,

@@ -8,6 +8,7 @@ from rippletwin.effects.base import (
     Effect,
     Parameter,
     lognormal,
+    on_line,
     position_parameter,
     position_place,
     segment_at,
@@ -37,7 +38,7 @@ def _apply(network, line, values, place):
         line.density,
         line.viscosity,
     )
-    network.inserts.append(Insert(values["position"], "shunt", admittance))
+    network.inserts.append(Insert(on_line(network, values["position"]), "shunt", admittance))
 
 
 EFFECT = Effect(
@@ -49,7 +50,7 @@ EFFECT = Effect(
     time_domain="one more pipe at a junction, its far end closed",
     parameters=lambda rig, place: (
         position_parameter(rig),
-        Parameter("length", "m", lognormal(0.4, 0.8)),
+        Parameter("length", "m", lognormal(0.4, 0.8), (-1.2, 0.0, 1.2)),
         Parameter("diameter", "m", lognormal(0.6 * rig.line[0].diameter, 0.5)),
     ),
     places=position_place,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from rippletwin.effects.base import Effect, Parameter, Place, lognormal
 from rippletwin.effects.line_volume import volume_admittance
 from rippletwin.line.chain import Insert
@@ -23,7 +25,7 @@ def _apply(network, line, values, place):
 
 def _parameters(rig, place):
     first = rig.line[0]
-    area = 0.25 * 3.1416 * first.diameter**2
+    area = 0.25 * np.pi * first.diameter**2
     parameters = (
         Parameter("volume", "m3", lognormal(1e-4 * (first.diameter / 0.02) ** 3, 1.2)),
         Parameter(

@@ -21,7 +21,7 @@ EFFECT = Effect(
     "d eps/dt = (kappa p/(rho a^2) - eps)/tau, integrated exactly over a step",
     parameters=lambda rig, place: (
         Parameter("compliance_ratio", "1", lognormal(0.15, 1.0)),
-        Parameter("retardation_time", "s", lognormal(3e-4, 1.3)),
+        Parameter("retardation_time", "s", lognormal(3e-4, 1.3), (-1.0, 0.7)),
     ),
     places=segment_places,
     apply=_apply,

@@ -1,0 +1,1 @@
+"""Missing physics: detect it, locate it, describe it, name it, validate it, and say so."""
