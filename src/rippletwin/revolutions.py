@@ -14,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.fft import next_fast_len
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import map_coordinates, spline_filter1d
 
@@ -92,7 +93,7 @@ def _time_of_angle(
     duration = (pressure.shape[1] - 1) / sampling_rate_hz
     angle = np.array([0.0, duration * speed_hz])
     time = CubicSpline(angle, angle / speed_hz)
-    step = KNOTS_PER_REVOLUTION * int(np.ceil(step / KNOTS_PER_REVOLUTION))
+    step = KNOTS_PER_REVOLUTION * next_fast_len(-(-step // KNOTS_PER_REVOLUTION), real=True)
     highest = min(step // 3, int(HIGHEST_TRACKED_HZ / speed_hz))
     limits = [None] + [min(highest, pistons * 4**n) for n in range(1, 5)]
     for limit in limits:
@@ -101,8 +102,18 @@ def _time_of_angle(
             ahead = _from_increments(orders, pistons)
         else:
             ahead = _from_mean_orders(orders, limit)
-        time = CubicSpline(centre + ahead, time(centre))
+        time = CubicSpline(centre + _smooth(ahead), time(centre))
     return time
+
+
+def _smooth(ahead: np.ndarray) -> np.ndarray:
+    """Average over one revolution.
+
+    A window of one revolution answers speed changes faster than one a revolution with the wrong
+    sign; averaged once more it never does, so that the iteration converges.
+    """
+    weight = np.array([0.5, 1, 1, 1, 0.5]) / KNOTS_PER_REVOLUTION
+    return np.convolve(np.pad(ahead, 2, mode="reflect", reflect_type="odd"), weight, mode="valid")
 
 
 def _sliding_orders(smooth, sampling_rate_hz, time, step, highest):

@@ -17,6 +17,7 @@ __all__ = [
     "noise_cycle_scatter",
     "noise_mad",
     "observe",
+    "revolutions_of",
 ]
 
 HIGHEST_HZ = 5000.0
@@ -58,32 +59,53 @@ def observe(
     rig: Rig,
     max_frequency_hz: float | None = None,
     piston_harmonics_only: bool = False,
+    revolutions: Revolutions | None = None,
 ) -> Observation:
     """The observation in a recording.
 
     max_frequency_hz : highest frequency kept; None is 5 kHz, or 0.4 times the sampling rate where
         that is lower, or all of a spectrum.
     piston_harmonics_only : keep only the orders that are multiples of the number of pistons.
+    revolutions : of a periodic recording, where they have been cut already (`revolutions_of`).
     """
     if recording.kind == "periodic":
-        return _observe_periodic(recording, rig, max_frequency_hz, piston_harmonics_only)
+        revolutions = revolutions or revolutions_of(recording, rig)
+        return _observe_periodic(
+            recording, rig, revolutions, max_frequency_hz, piston_harmonics_only
+        )
     if recording.kind == "random":
         return _observe_random(recording, rig, max_frequency_hz)
     return _observe_spectra(recording, rig, max_frequency_hz)
 
 
-def _observe_periodic(recording, rig, max_frequency_hz, piston_harmonics_only) -> Observation:
-    pistons = rig.pump["pistons"]
-    revolutions = cut_revolutions(
-        recording.pressure, recording.sampling_rate_hz, pistons, recording.speed_rpm
+def revolutions_of(
+    recording: Recording, rig: Rig, samples_per_revolution: int | None = None
+) -> Revolutions:
+    """The whole revolutions of a periodic recording."""
+    return cut_revolutions(
+        recording.pressure,
+        recording.sampling_rate_hz,
+        rig.pump["pistons"],
+        recording.speed_rpm,
+        samples_per_revolution,
     )
+
+
+def _observe_periodic(
+    recording, rig, revolutions, max_frequency_hz, piston_harmonics_only
+) -> Observation:
     speed_hz = 1 / np.mean(1 / revolutions.speed_hz)
     highest = _highest(max_frequency_hz, recording.sampling_rate_hz)
-    step = pistons if piston_harmonics_only else 1
-    orders = np.arange(step, int(highest / speed_hz) + 1, step)
+    orders = np.arange(1, int(highest / speed_hz) + 1)
     spectra = 2 * np.fft.rfft(revolutions.windows, axis=2)[:, :, orders]
     spectra /= revolutions.windows.shape[2]
-    values, covariance = average(spectra, revolutions.speed_hz / speed_hz - 1)
+    delay = sum(segment.delay for segment in rig.line)
+    values, covariance = average(
+        spectra, revolutions.speed_hz / speed_hz - 1, 2 * np.pi * orders * speed_hz * delay
+    )
+    if piston_harmonics_only:
+        kept = orders % rig.pump["pistons"] == 0
+        orders, values, covariance = orders[kept], values[:, kept], covariance[kept]
     nominal = recording.flow_ripple is not None or len(rig.pump) > 1
     return Observation(
         kind=recording.kind,
@@ -101,28 +123,62 @@ def _observe_periodic(recording, rig, max_frequency_hz, piston_harmonics_only) -
     )
 
 
-def average(spectra: np.ndarray, deviation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean (S, F) of window spectra (R, S, F) and its covariance (F, S, S).
+def average(
+    spectra: np.ndarray, deviation: np.ndarray, phase_rad: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (S, F) of window spectra (R, S, F) at the mean speed and its covariance (F, S, S).
 
-    `deviation` (R,) is each window's relative deviation from the mean speed. The line answers
-    differently at another speed (0.3 % of 5 kHz is half a radian over 5 m of oil), so the values
-    are the intercept of a regression on the deviation, up to its square where there are at least
-    forty windows. The covariance comes from the scatter about the regression; four windows' worth
-    of the channel's typical noise is mixed in, which keeps it positive definite for few windows.
+    `deviation` (R,) is each window's relative deviation from the mean speed. A line answers
+    differently at another speed: where a path has a phase of `phase_rad` (F,), X changes by about
+    X (j phase d - (phase d)^2 / 2) at the deviation d, half a radian at 5 kHz for 0.3 % over 5 m of
+    oil. So the values are the intercept of a regression on d and d^2. The coefficient of d^2 has a
+    prior of mean zero and just that size: it costs a weak order, which does not need it, no
+    precision. The covariance is the scatter about the regression with the prior's share added;
+    `sensors + 2` windows' worth of the channel's typical noise is mixed into the scatter, which
+    keeps it positive definite where there are few windows.
     """
     windows, sensors = spectra.shape[:2]
-    degree = 2 if windows >= 40 else 1 if windows >= 20 else 0
-    scale = np.std(deviation) or 1.0
-    design = np.vander(deviation / scale, degree + 1, increasing=True)
-    inverse = np.linalg.pinv(design)
-    coefficients = np.einsum("dr,rsf->dsf", inverse, spectra)
-    residual = spectra - np.einsum("rd,dsf->rsf", design, coefficients)
-    freedom = windows - design.shape[1]
+    if windows < 8:
+        design = np.ones((windows, 1))
+    else:
+        design = np.column_stack([np.ones(windows), deviation, deviation**2])
+        design[:, 1] -= design[:, 1].mean()
+    # scatter about the unrestricted regression: free of what the speed does
+    hat = design @ np.linalg.pinv(design)
+    residual = spectra - np.einsum("rq,qsf->rsf", hat, spectra)
+    freedom = windows - np.linalg.matrix_rank(design)
     scatter = np.einsum("rsf,rtf->fst", residual, residual.conj())
     typical = np.median(np.einsum("fss->fs", scatter).real, axis=0) / freedom
     prior = sensors + 2
     scatter = (scatter + prior * np.diag(typical)) / (freedom + prior)
-    return coefficients[0], scatter * np.sum(inverse[0] ** 2)
+    weights, curvature = _intercept(spectra, scatter, design, phase_rad)
+    values = np.einsum("sfr,rsf->sf", weights, spectra)
+    covariance = scatter * np.einsum("sfr,tfr->fst", weights, weights)
+    for s in range(sensors):
+        covariance[:, s, s] += curvature[s]
+    return values, covariance
+
+
+def _intercept(spectra, scatter, design, phase_rad):
+    """Weights (S, F, R) of the windows in the intercept, and the variance (S, F) that the prior on
+    the coefficient of d^2 adds to it."""
+    sensors, orders = spectra.shape[1:]
+    if design.shape[1] == 1:
+        return np.full((sensors, orders, len(design)), 1 / len(design)), np.zeros((sensors, orders))
+    scale = np.max(np.abs(design), axis=0)
+    scale[scale == 0] = 1.0
+    design = design / scale
+    noise = np.einsum("fss->sf", scatter).real
+    power = np.abs(spectra.mean(axis=0)) ** 2 + 1e-300
+    size = power * (0.5 * phase_rad**2 * scale[2]) ** 2 + 1e-300
+    precision = np.zeros((sensors, orders, 3, 3))
+    precision[..., 1, 1] = noise / (power * (phase_rad * scale[1]) ** 2 + 1e-300)
+    precision[..., 2, 2] = noise / size
+    gram = design.T @ design + precision
+    weights = np.linalg.solve(gram, np.broadcast_to(design.T, (sensors, orders, *design.T.shape)))[
+        ..., 0, :
+    ]
+    return weights, (weights @ design[:, 2]) ** 2 * size
 
 
 def _observe_random(recording, rig, max_frequency_hz) -> Observation:

@@ -1,0 +1,41 @@
+"""xarray datasets in zarr stores that are either whole or not there."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+import xarray as xr
+
+
+def save(dataset: xr.Dataset, path: str | Path, compressed: bool = True) -> None:
+    """Write `dataset` to the zarr store `path`, replacing what is there.
+
+    It is written beside it under a temporary name and moved into place, so that a killed run leaves
+    nothing half-written that looks whole. `compressed=False` makes random reads of large images
+    several times faster.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    scratch = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
+    encoding = {} if compressed else {name: {"compressors": None} for name in dataset.variables}
+    try:
+        # what a dataset read from another store remembers of its encoding is not this store's
+        dataset.drop_encoding().to_zarr(
+            scratch / "new", mode="w", encoding=encoding, zarr_format=3, consolidated=False
+        )
+        if path.exists():
+            os.replace(path, scratch / "old")
+        os.replace(scratch / "new", path)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+
+
+def load(path: str | Path) -> xr.Dataset:
+    """Open a zarr store; arrays are read when they are used. Raises FileNotFoundError."""
+    path = Path(path)
+    if not path.is_dir():
+        raise FileNotFoundError(f"no store at {path}")
+    return xr.open_zarr(path, chunks=None, consolidated=False)
