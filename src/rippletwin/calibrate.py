@@ -45,19 +45,24 @@ class Settings:
     max_frequency_hz: float | None = None
 
 
+DEFAULTS = Settings()
+
+
 @dataclass(frozen=True)
 class Calibration:
     """A calibrated twin and how well it is known.
 
     twin        with `theta` at the posterior mode
+    nominal     the twin it set out from, its shaft angles aligned with the recordings
     covariance  (P, P) of theta (Laplace: inverse Hessian of minus the log posterior)
     floor, source_sd   estimated relative errors of the model and of nominal sources
     objective   minus the log posterior at the mode
-    before, after      misfits of the nominal twin (shaft angles aligned) and of the calibrated one
+    before, after      misfits of `nominal` and of `twin`
     warnings    in plain words
     """
 
     twin: Twin
+    nominal: Twin
     covariance: np.ndarray
     floor: float
     source_sd: float
@@ -75,7 +80,7 @@ class Calibration:
 def calibrate(
     twin: Twin,
     observations: Sequence,
-    settings: Settings = Settings(),
+    settings: Settings = DEFAULTS,
     progress: Callable[[str], None] | None = None,
 ) -> Calibration:
     """Fit all parameters of `twin` to `observations`; deterministic.
@@ -84,10 +89,7 @@ def calibrate(
     """
     if not observations:
         raise ValueError("calibration needs at least one observation")
-    top = max(float(o.frequency_hz[-1]) for o in observations)
-    if settings.max_frequency_hz is not None:
-        top = min(top, settings.max_frequency_hz)
-    limits = [*(x for x in settings.limits_hz if x < top), top]
+    limits = limits_of(observations, settings)
     speeds = np.array([p.name.startswith("wave_speed") for p in twin.parameters])
     states = [(0.0, twin.theta + scale * speeds) for scale in settings.scalings]
     for stage, limit in enumerate(limits):
@@ -103,22 +105,34 @@ def calibrate(
         if progress is not None:
             left = misfit(likelihood, states[0][1]).relative
             progress(f"below {limit:.0f} Hz: {len(fits)} starts, best misfit {left:.2%}")
-    value, theta = states[0]
-    likelihood.estimate_errors(likelihood.forward(theta))
+    return conclude(likelihood, states[0][1], limits[0])
+
+
+def limits_of(observations: Sequence, settings: Settings) -> list[float]:
+    """Upper frequencies (Hz) of the continuation, the last one being all the data."""
+    top = max(float(o.frequency_hz[-1]) for o in observations)
+    if settings.max_frequency_hz is not None:
+        top = min(top, settings.max_frequency_hz)
+    return [*(x for x in settings.limits_hz if x < top), top]
+
+
+def conclude(likelihood: Likelihood, theta: np.ndarray, lowest_hz: float) -> Calibration:
+    """What is known at a mode theta; the nominal twin's shaft angles are sought below a limit."""
+    twin, prediction = likelihood.twin, likelihood.forward(theta)
+    likelihood.estimate_errors(prediction)
     covariance = laplace(likelihood, theta)
-    fitted = twin.with_(theta=theta)
-    start = align(Likelihood(twin, observations, limits[0]), twin.theta)
-    before = misfit(likelihood, start)
-    after = misfit(likelihood, theta)
+    nominal = align(Likelihood(twin, likelihood.observations, lowest_hz), twin.theta)
+    fitted, after = twin.with_(theta=theta), misfit(likelihood, theta)
     return Calibration(
-        fitted,
-        covariance,
-        likelihood.floor,
-        likelihood.source_sd,
-        value,
-        before,
-        after,
-        _warnings(fitted, covariance, after),
+        twin=fitted,
+        nominal=twin.with_(theta=nominal),
+        covariance=covariance,
+        floor=likelihood.floor,
+        source_sd=likelihood.source_sd,
+        objective=likelihood.objective(theta, prediction),
+        before=misfit(likelihood, nominal),
+        after=after,
+        warnings=_warnings(fitted, covariance, after),
     )
 
 
@@ -191,7 +205,11 @@ def align(likelihood: Likelihood, theta: np.ndarray) -> np.ndarray:
         grid = grid / len(grid)
         match = np.sum(np.conj(h) * o.values, axis=0)
         likeness = (np.exp(-1j * np.outer(grid, orders)) @ match).real
-        angle = twin.parameters[index].value(theta[index]) + grid[np.argmax(likeness)]
+        best = int(np.argmax(likeness))
+        before, peak, after = likeness[[best - 1, best, (best + 1) % len(grid)]]
+        curvature = before - 2 * peak + after
+        between = 0.5 * (before - after) / curvature if curvature else 0.0  # of the parabola
+        angle = twin.parameters[index].value(theta[index]) + grid[best] + between * grid[1]
         angle = (angle + turn / 2) % turn - turn / 2
         theta[index] = twin.parameters[index].prior.coordinate(angle)
     return theta
@@ -210,7 +228,7 @@ def _warnings(twin: Twin, covariance: np.ndarray, after: Misfit) -> tuple[str, .
     out = []
     if after.relative > BAD_FIT:
         out.append(
-            f"bad fit: {100 * after.relative:.0f} % of the measured ripple is left over after "
+            f"bad fit: {100 * after.relative:.0f} % of what was measured is left over after "
             "calibration; the model lacks physics, or the data sheet is wrong"
         )
     sd = np.sqrt(np.diag(covariance))
@@ -220,6 +238,8 @@ def _warnings(twin: Twin, covariance: np.ndarray, after: Misfit) -> tuple[str, .
             if p.unit == "rad" and value_sd > 0.1:
                 out.append(f"{p.name} is not determined by the data")
             continue
+        if p.prior.scale == 0.0:
+            continue  # taken for exact
         if abs(u) > IMPLAUSIBLE:
             out.append(
                 f"{p.name} is implausible: {value:.4g} {p.unit} is {abs(u):.1f} standard "

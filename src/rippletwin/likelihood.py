@@ -53,7 +53,7 @@ class Likelihood:
         piston_orders: bool = True,
     ):
         self.twin = twin
-        pistons = twin.rig.pump["pistons"] if piston_orders else 1
+        pistons = twin.rig.pump.get("pistons", 1) if piston_orders else 1
         self.observations = [cut(o, max_frequency_hz, pistons) for o in observations]
         self.forward = Forward(twin, self.observations)
         self.floor, self.source_sd = floor, 0.0

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 
 from rippletwin.calibrate import Calibration
@@ -129,6 +134,54 @@ def markdown(calibration: Calibration) -> str:
         f"relative error of the source: {calibration.source_sd:.2%}.",
     ]
     return "\n".join(lines) + "\n"
+
+
+def ripples(
+    calibration: Calibration, observations: Sequence, samples: int = 1024
+) -> list[dict[str, np.ndarray]]:
+    """Pressure ripples to draw, one dict a periodic observation.
+
+    label; sensors (S,); angle_deg (samples,) over one revolution; measured, nominal and calibrated
+    (S, samples) in Pa without mean, all from the same harmonics.
+    """
+    out = []
+    angle = 2 * np.pi * np.arange(samples) / samples
+    for o in observations:
+        if o.orders is None:
+            continue
+        turn = np.exp(1j * np.outer(o.orders, angle))
+        spectra = {
+            "measured": o.values,
+            "nominal": calibration.nominal.predict([o])[0],
+            "calibrated": calibration.twin.predict([o])[0],
+        }
+        out.append(
+            {
+                "label": o.label,
+                "sensors": np.array([s.name for s in o.sensors]),
+                "angle_deg": np.rad2deg(angle),
+                **{name: (x @ turn).real for name, x in spectra.items()},
+            }
+        )
+    return out
+
+
+def save(calibration: Calibration, folder: str | Path) -> None:
+    """Write twin.json and report.md into `folder`, each whole or not at all."""
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in (
+        ("twin.json", json.dumps(to_dict(calibration), indent=1) + "\n"),
+        ("report.md", markdown(calibration)),
+    ):
+        scratch = folder / f".{name}.new"
+        scratch.write_text(text)
+        os.replace(scratch, folder / name)
+
+
+def load_twin(path: str | Path) -> Twin:
+    """The calibrated twin of a twin.json."""
+    return twin_of(json.loads(Path(path).read_text()))
 
 
 def _root(weights: np.ndarray, covariance: np.ndarray) -> float:
