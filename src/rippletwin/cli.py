@@ -29,7 +29,51 @@ def check(commands) -> None:
     parser.set_defaults(run=run)
 
 
-COMMANDS = (check,)
+def calibrate(commands) -> None:
+    """rippletwin calibrate CASE --out DIR"""
+    parser = commands.add_parser("calibrate", help="fit the twin to a case's healthy recordings")
+    parser.add_argument("case", help="a folder with a rig.yaml")
+    parser.add_argument("--out", required=True, help="folder for twin.json and report.md")
+    parser.add_argument(
+        "--friction",
+        choices=("none", "steady", "unsteady"),
+        default="steady",
+        help="the line's friction law; steady is the paper's",
+    )
+    parser.add_argument("--max-frequency", type=float, metavar="HZ", help="use nothing above it")
+
+    def run(arguments) -> int:
+        from rippletwin import report
+        from rippletwin.calibrate import Settings
+        from rippletwin.calibrate import calibrate as fit
+        from rippletwin.case import load_case
+        from rippletwin.spectra import observe
+        from rippletwin.twin import Twin
+
+        case = load_case(arguments.case, states={"healthy"})
+        if not case.recordings:
+            raise InputError(
+                f"{arguments.case}/rig.yaml",
+                "recordings",
+                "none has state: healthy",
+                "calibration needs at least one healthy recording",
+            )
+        observations = [observe(r, case.rig, piston_harmonics_only=True) for r in case.recordings]
+        twin = Twin(case.rig, observations, friction=arguments.friction)
+        settings = Settings(max_frequency_hz=arguments.max_frequency)
+        calibration = fit(twin, observations, settings, progress=print)
+        report.save(calibration, arguments.out)
+        before, after = calibration.before, calibration.after
+        print(f"relative misfit {before.relative:.1%} -> {after.relative:.1%}")
+        print(f"Theil's coefficient {before.theil:.3f} -> {after.theil:.3f}")
+        for warning in calibration.warnings:
+            print(f"warning: {warning}")
+        return 0
+
+    parser.set_defaults(run=run)
+
+
+COMMANDS = (check, calibrate)
 
 
 def main(argv: list[str] | None = None) -> int:
