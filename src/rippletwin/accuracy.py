@@ -1,0 +1,144 @@
+"""How often a classifier is right on recordings, and the paper's accuracy table.
+
+Recordings are healthy (H), slipper (S) or cylinder (C) of unknown severity, while the classifiers
+know two severities, C1 and C2. The paper counts a cylinder recording as right when a pressure
+classifier calls it C1 and a flow classifier C2; here that mapping is an argument, and accuracy with
+either severity is reported beside it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from rippletwin.networks import ARCHITECTURES, CLASSES
+
+TRUE_STATES = ("H", "S", "C")
+SEVERITY = {"pressure": "C1", "flow": "C2"}  # what the paper calls right for C
+DOMAINS = {"time": "Time domain", "image": "Time-frequency domain"}
+
+
+def score(
+    truth: np.ndarray,
+    predicted: np.ndarray,
+    signal: str,
+    severity: dict[str, str] = SEVERITY,
+) -> dict[str, float | np.ndarray]:
+    """Accuracies (fractions) of predictions on recordings.
+
+    truth : (n,) states of the recordings, of ``TRUE_STATES`` (C1 or C2 where severity is known).
+    predicted : (n,) indices into ``CLASSES``.  signal : a key of ``severity``.
+
+    Returns ``accuracy`` (the paper's scoring), ``accuracy_either`` (C1 and C2 both right for a C),
+    ``confusion`` (3, 4) counts and ``n``. Raises ValueError for an unknown state or no window.
+    """
+    truth, predicted = np.asarray(truth, dtype=str), np.asarray(predicted)
+    if truth.shape != predicted.shape or not truth.size:
+        raise ValueError(f"{truth.shape} states for {predicted.shape} predictions")
+    said = np.array(CLASSES)[predicted]
+    wanted = np.where(truth == "C", severity[signal], truth)
+    cylinder = np.isin(truth, ("C", "C1", "C2"))
+    either = np.where(cylinder, np.isin(said, ("C1", "C2")), said == truth)
+    return {
+        "accuracy": float((said == wanted).mean()),
+        "accuracy_either": float(either.mean()),
+        "confusion": confusion(truth, predicted),
+        "n": truth.size,
+    }
+
+
+def confusion(truth: np.ndarray, predicted: np.ndarray) -> np.ndarray:
+    """Counts (3 true states, 4 predicted classes); C1 and C2 of known severity count as C."""
+    truth = np.asarray(truth, dtype=str)
+    counts = np.zeros((len(TRUE_STATES), len(CLASSES)), dtype=int)
+    unknown = set(truth) - {*TRUE_STATES, *CLASSES}
+    if unknown:
+        raise ValueError(f"unknown states {sorted(unknown)}; known are H, S, C, C1, C2")
+    row = [TRUE_STATES.index(state[0]) for state in truth]
+    np.add.at(counts, (row, predicted), 1)
+    return counts
+
+
+def result_row(architecture: str, dataset: str, seed: int, scored: dict, history=None) -> dict:
+    """One training's line of the tidy results table; accuracies in per cent.
+
+    Confusion counts become columns ``H_H`` (true_predicted) and so on; ``history`` (of ``train``)
+    adds how the training ended.
+    """
+    row = {
+        "domain": ARCHITECTURES[architecture].domain,
+        "architecture": architecture,
+        "dataset": dataset,
+        "seed": seed,
+        "accuracy": 100 * scored["accuracy"],
+        "accuracy_either": 100 * scored["accuracy_either"],
+        "windows": scored["n"],
+    }
+    for i, true in enumerate(TRUE_STATES):
+        for j, said in enumerate(CLASSES):
+            row[f"{true}_{said}"] = int(scored["confusion"][i, j])
+    if history is not None:
+        row |= {
+            "epochs": history.epochs,
+            "converged": history.converged,
+            "validation_loss": history.validation_loss[history.best_epoch],
+            "validation_accuracy": 100 * history.validation_accuracy[history.best_epoch],
+        }
+    return row
+
+
+def confusion_of(rows: pd.DataFrame) -> np.ndarray:
+    """The (3, 4) confusion counts of tidy rows, summed."""
+    counts = [[rows[f"{true}_{said}"].sum() for said in CLASSES] for true in TRUE_STATES]
+    return np.array(counts, dtype=int)
+
+
+def summarise(rows: pd.DataFrame, column: str = "accuracy") -> pd.DataFrame:
+    """Mean, standard deviation (of the sample; 0 for one run) and runs of each table cell."""
+    cells = rows.groupby(["architecture", "dataset"], sort=False)[column]
+    table = cells.agg(["mean", "std", "count"]).reset_index()
+    return table.fillna({"std": 0.0})
+
+
+def accuracy_table(rows: pd.DataFrame, paper: pd.DataFrame, column: str = "accuracy") -> str:
+    """The paper's table in markdown: ours, with the paper's mean and deviation in brackets.
+
+    rows : tidy results (``result_row``); paper : columns architecture, dataset, mean, std.
+    Datasets appear in the paper's order, then those the paper has not; a cell nobody ran is a dash.
+    """
+    ours, theirs = _cells(summarise(rows, column)), _cells(paper)
+    known = list(dict.fromkeys(paper["dataset"]))
+    ran = list(dict.fromkeys(rows["dataset"]))
+    extra = [d for d in ran if d not in known]
+    simulated = [d for d in known if d != "experimental"]
+    datasets = simulated + extra + [d for d in known if d not in simulated]
+
+    lines = [
+        "| Input | Architecture | " + " | ".join(datasets) + " |",
+        "|---|---|" + "---|" * len(datasets),
+    ]
+    domain = None
+    for name, architecture in ARCHITECTURES.items():
+        first = DOMAINS[architecture.domain] if architecture.domain != domain else ""
+        domain = architecture.domain
+        cells = []
+        for dataset in datasets:
+            cell = ours.get((name, dataset), "–")
+            if (name, dataset) in theirs:
+                cell += f" ({theirs[name, dataset]})"
+            cells.append(cell)
+        lines.append(f"| {first} | {architecture.title} | " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def confusion_table(counts: np.ndarray) -> str:
+    """Markdown of one (3, 4) confusion matrix: true states down, predicted classes across."""
+    lines = ["| true \\ predicted | " + " | ".join(CLASSES) + " |", "|---|" + "---|" * len(CLASSES)]
+    for state, row in zip(TRUE_STATES, counts):
+        lines.append(f"| {state} | " + " | ".join(str(n) for n in row) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _cells(table: pd.DataFrame) -> dict[tuple[str, str], str]:
+    keys = zip(table["architecture"], table["dataset"])
+    return {key: f"{m:.1f} ± {s:.1f}" for key, m, s in zip(keys, table["mean"], table["std"])}
