@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from virtualrig import pump, stepper
-from virtualrig.network import line, node_table, sensor_rows, still
+from virtualrig.network import largest_step, line, node_table, sensor_rows, still
 from virtualrig.rig import Rig
 
 RECORDS = 4608
@@ -43,9 +43,9 @@ class Bench:
 
     def __init__(self, rig: Rig, faults: tuple[str, ...] = (), refine: int = 1):
         self.rig, self.refine = rig, refine
-        self.line, self.largest_step = line(rig.network)
+        self.largest_step = largest_step(rig.network)
         self.nodes = node_table(rig.network)
-        self.sensors = sensor_rows(rig.network, self.line)
+        self.sensors = sensor_rows(rig.network)
         chosen = tuple(rig.faults[kind] for kind in faults)
         self.chambers, self.ports = pump.tables(rig.pump, rig.network.density, chosen)
         self.state = None
@@ -67,10 +67,11 @@ class Bench:
         period = 2 * np.pi / speed
         every = int(np.ceil(period / RECORDS / self.largest_step)) * self.refine
         steps = every * RECORDS
+        cut = line(self.rig.network, period / steps)
         flow = 0.97 * self.rig.pump.displacement * speed_rpm / 60
         if self.state is None:
             pistons = len(self.chambers)
-            self.state = still(self.rig.network, self.line, load_pressure, flow, pistons)
+            self.state = still(self.rig.network, cut, load_pressure, flow, pistons)
         load = self.nodes[self.rig.load_node]
         load[stepper.VALVE_SET] = load_pressure
         load[stepper.ORIFICE] = valve or self._valve(flow, load_pressure)
@@ -78,10 +79,10 @@ class Bench:
         before = np.inf
         for revolution in range(1, most + 1):
             pressure, outlet, nodal, newton = stepper.run(
-                self.line, self.nodes, self.chambers, self.ports, np.zeros(1), crank, self.state,
+                cut, self.nodes, self.chambers, self.ports, np.zeros(1), crank, self.state,
                 0, steps, every, period / steps, self.sensors,
             )  # fmt: skip
-            if newton > 30:
+            if newton > pump.MOST_NEWTON_STEPS:
                 raise RuntimeError("the pump's chambers did not converge; refine the time step")
             residual = np.abs(pressure - before).max()
             before = pressure

@@ -12,6 +12,7 @@ from numba import njit
 
 # columns of the chamber table
 BORE, STROKE_RADIUS, DEAD_VOLUME, ANGLE, CASE_LEAK, SLIPPER, NEIGHBOUR, CHAMBER_COLUMNS = range(8)
+MOST_NEWTON_STEPS = 30
 # entries of the port table
 AREA, OPENING, OVERLAP, TIMING, ORIFICE, MODULUS, SUCTION, LAMINAR, PORT_ENTRIES = range(9)
 
@@ -119,64 +120,78 @@ def port_opening(angle, ports):
 
 
 @njit(cache=True, fastmath=True)
-def step_chambers(
-    angle, speed, history, lead, chambers, ports, outlet_lead, outlet_rest, x, matrix
-):
+def crank(angle, speed, chambers, ports, stations):
+    """What the crank angle settles for each chamber, into `stations` (pistons, 4).
+
+    Bulk modulus over volume, displaced flow, and orifice coefficients of delivery and suction port.
+    """
+    full = ports[ORIFICE] * ports[AREA]
+    for i in range(len(chambers)):
+        phi = angle + chambers[i, ANGLE]
+        swept = chambers[i, BORE] * chambers[i, STROKE_RADIUS]
+        volume = chambers[i, DEAD_VOLUME] + swept * (1 + np.cos(phi))
+        stations[i, 0] = ports[MODULUS] / volume
+        stations[i, 1] = swept * np.sin(phi) * speed
+        stations[i, 2] = full * port_opening(phi, ports)
+        stations[i, 3] = full * port_opening(phi + np.pi, ports)
+
+
+@njit(cache=True, fastmath=True)
+def step_chambers(stations, history, lead, chambers, ports, outlet_lead, outlet_rest, x, matrix):
     """One implicit step of all chambers and of the outlet that they share; returns Newton steps.
 
     Solves lead p_i - history_i = dp_i/dt for the chambers and
     outlet_lead p - outlet_rest = sum of delivered flows for the outlet pressure, by Newton's method.
     `x` (pistons + 1,) holds the chamber pressures and the outlet pressure: start values in, solution
-    out. `speed` is the crank's, rad/s. `matrix` (pistons + 1, pistons + 2) is workspace.
+    out. `stations` are those of `crank`; `matrix` (pistons + 1, pistons + 2) is workspace.
     """
-    n = chambers.shape[0]
-    orifice, laminar = ports[ORIFICE] * ports[AREA], ports[LAMINAR]
-    for iteration in range(30):
+    n = len(chambers)
+    laminar = ports[LAMINAR]
+    for iteration in range(MOST_NEWTON_STEPS):
         matrix[:] = 0.0
         matrix[n, n] = outlet_lead
         matrix[n, n + 1] = outlet_rest - outlet_lead * x[n]
         for i in range(n):
-            phi = angle + chambers[i, ANGLE]
-            swept = chambers[i, BORE] * chambers[i, STROKE_RADIUS]
-            stiffness = ports[MODULUS] / (chambers[i, DEAD_VOLUME] + swept * (1 + np.cos(phi)))
-            delivery, d_slope = orifice_flow(x[i] - x[n], laminar)
-            suction, s_slope = orifice_flow(ports[SUCTION] - x[i], laminar)
-            opening = orifice * port_opening(phi, ports)
-            inlet = orifice * port_opening(phi + np.pi, ports)
-            slipper, l_slope = orifice_flow(x[i], laminar)
-            leak = chambers[i, CASE_LEAK] * x[i] + chambers[i, SLIPPER] * slipper
-            leak_slope = chambers[i, CASE_LEAK] + chambers[i, SLIPPER] * l_slope
-            gain = swept * np.sin(phi) * speed - opening * delivery + inlet * suction - leak
-            matrix[i, n + 1] += history[i] + stiffness * gain - lead * x[i]
-            matrix[i, i] += lead + stiffness * (opening * d_slope + inlet * s_slope + leak_slope)
-            matrix[i, n] -= stiffness * opening * d_slope
-            matrix[n, i] -= opening * d_slope
-            matrix[n, n] += opening * d_slope
-            matrix[n, n + 1] += opening * delivery
+            stiffness, gain, opening, inlet = stations[i]
+            slope = chambers[i, CASE_LEAK]
+            gain -= slope * x[i]
+            if chambers[i, SLIPPER] > 0:
+                leak, tangent = orifice_flow(x[i], laminar)
+                gain -= chambers[i, SLIPPER] * leak
+                slope += chambers[i, SLIPPER] * tangent
+            if inlet > 0:
+                suction, tangent = orifice_flow(ports[SUCTION] - x[i], laminar)
+                gain += inlet * suction
+                slope += inlet * tangent
+            if opening > 0:
+                delivery, tangent = orifice_flow(x[i] - x[n], laminar)
+                gain -= opening * delivery
+                slope += opening * tangent
+                matrix[i, n] = -stiffness * opening * tangent
+                matrix[n, i] = -opening * tangent
+                matrix[n, n] += opening * tangent
+                matrix[n, n + 1] += opening * delivery
+            matrix[i, n + 1] += history[i] - lead * x[i] + stiffness * gain
+            matrix[i, i] += lead + stiffness * slope
             if chambers[i, NEIGHBOUR] > 0:
                 k = (i + 1) % n
-                swept_k = chambers[k, BORE] * chambers[k, STROKE_RADIUS]
-                volume_k = chambers[k, DEAD_VOLUME] + swept_k * (
-                    1 + np.cos(angle + chambers[k, ANGLE])
-                )
-                across, slope = orifice_flow(x[i] - x[k], laminar)
+                across, tangent = orifice_flow(x[i] - x[k], laminar)
                 across *= chambers[i, NEIGHBOUR]
-                slope *= chambers[i, NEIGHBOUR]
-                stiffness_k = ports[MODULUS] / volume_k
+                tangent *= chambers[i, NEIGHBOUR]
                 matrix[i, n + 1] -= stiffness * across
-                matrix[k, n + 1] += stiffness_k * across
-                matrix[i, i] += stiffness * slope
-                matrix[i, k] -= stiffness * slope
-                matrix[k, k] += stiffness_k * slope
-                matrix[k, i] -= stiffness_k * slope
+                matrix[i, i] += stiffness * tangent
+                matrix[i, k] -= stiffness * tangent
+                matrix[k, n + 1] += stations[k, 0] * across
+                matrix[k, k] += stations[k, 0] * tangent
+                matrix[k, i] -= stations[k, 0] * tangent
         _eliminate(matrix)
         largest = 0.0
         for i in range(n + 1):
             x[i] += matrix[i, n + 1]
             largest = max(largest, abs(matrix[i, n + 1]))
-        if largest < 1e-2:
+        if largest < 1.0:
             return iteration + 1
-    return 31
+    return MOST_NEWTON_STEPS + 1
 
 
 @njit(cache=True, fastmath=True)

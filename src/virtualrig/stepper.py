@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from virtualrig.pump import crank as stations_at
 from virtualrig.pump import orifice_flow, step_chambers
 
 # columns of the node table; flows leave the node, pressures in Pa
@@ -37,17 +38,20 @@ from virtualrig.pump import orifice_flow, step_chambers
 STORED, ARM_FLOW, ARM_VOLUME, VALVE, VALVE_SPEED, NODE_STATES = range(6)
 
 
+ATMOSPHERE = 1.01325e5
+
+
 class Line(NamedTuple):
-    """Pipes cut into E elements of n nodes; K velocity modes. All constants of the time step."""
+    """Pipes cut into E elements of n nodes; K velocity modes. Constants of the time step."""
 
     derivative: np.ndarray  # (n, n)
     lift: float  # 1/first quadrature weight
-    slope: np.ndarray  # (E,) 2/element length
-    stiffness: np.ndarray  # (E,) rho a^2/A
-    mobility: np.ndarray  # (E,) A/rho
+    inflow: np.ndarray  # (E,) -2/width rho a^2/A: pressure rate of a flow's derivative
+    push: np.ndarray  # (E,) -2/width A/rho: flow rate of a pressure's derivative
     impedance: np.ndarray  # (E,) rho a/A
-    rates: np.ndarray  # (K, E) decay rates of the velocity modes, 1/s
-    weights: np.ndarray  # (K, E)
+    gains: np.ndarray  # (K, n, E) 1/(11/6 + dt rate) of the velocity modes
+    pushes: np.ndarray  # (K, n, E) dt weight gain
+    special: bool  # any wall, air, growing modulus or drag
     wall: np.ndarray  # (2, E) relative compliance and retardation time of the wall
     air: np.ndarray  # (2, E) air fraction at one atmosphere and polytropic exponent
     modulus: np.ndarray  # (3, E) rho a^2, its relative growth per Pa, reference pressure
@@ -74,71 +78,96 @@ class State(NamedTuple):
 
 @njit(cache=True, fastmath=True)
 def _rates(line, state, now, flux_p, flux_q):
-    """Right-hand sides of the waves at step `now`; flux_* (2, E) are the settled end values."""
+    """Right-hand sides of the waves at step `now`; flux_* (2, E) are the settled end values.
+
+    Inner loops touch few arrays at a time, so that the compiler vectorises them.
+    """
     n, elements = state.flow.shape
     p, q = state.pressure[now], state.flow
     dp, dq = state.pressure_rate[now], state.flow_drive[now]
-    for i in range(n):
-        for e in range(elements):
-            dp[i, e] = 0.0
-            dq[i, e] = 0.0
-        for j in range(n):
-            d = line.derivative[i, j]
-            for e in range(elements):
-                dp[i, e] += d * q[j, e]
-                dq[i, e] += d * p[j, e]
+    np.dot(line.derivative, q, dp)
+    np.dot(line.derivative, p, dq)
     for e in range(elements):
         dp[0, e] -= line.lift * (flux_q[0, e] - q[0, e])
         dq[0, e] -= line.lift * (flux_p[0, e] - p[0, e])
         dp[n - 1, e] += line.lift * (flux_q[1, e] - q[n - 1, e])
         dq[n - 1, e] += line.lift * (flux_p[1, e] - p[n - 1, e])
     for i in range(n):
+        row = dp[i]
         for e in range(elements):
-            softness = 1.0
-            if line.air[0, e] > 0:
-                absolute = max(p[i, e], 0.0) + 1.01325e5
+            row[e] *= line.inflow[e]
+        row = dq[i]
+        for e in range(elements):
+            row[e] *= line.push[e]
+    if line.special:
+        _special_rates(line, p, q, state.strain[now], dp, dq)
+
+
+@njit(cache=True, fastmath=True)
+def _special_rates(line, p, q, strain, dp, dq):
+    """Retarded wall, gas, stiffening liquid and turbulent drag, where there are any."""
+    n, elements = p.shape
+    for e in range(elements):
+        wall, air, growth, drag = line.wall[0, e], line.air[0, e], line.modulus[1, e], line.drag[e]
+        if wall == 0 and air == 0 and growth == 0 and drag == 0:
+            continue
+        for i in range(n):
+            dp[i, e] -= wall / line.wall[1, e] * (p[i, e] - strain[i, e])
+            softness = 1 / (1 + growth * (p[i, e] - line.modulus[2, e]))
+            if air > 0:
+                absolute = max(p[i, e], 0.0) + ATMOSPHERE
                 exponent = 1 / line.air[1, e]
-                gas = line.air[0, e] * exponent * (1.01325e5 / absolute) ** exponent / absolute
+                gas = air * exponent * (ATMOSPHERE / absolute) ** exponent / absolute
                 softness += line.modulus[0, e] * gas
-            if line.modulus[1, e] != 0:
-                softness -= 1 - 1 / (1 + line.modulus[1, e] * (p[i, e] - line.modulus[2, e]))
-            rate = -line.slope[e] * line.stiffness[e] * dp[i, e]
-            if line.wall[0, e] > 0:
-                rate -= line.wall[0, e] / line.wall[1, e] * (p[i, e] - state.strain[now, i, e])
-            dp[i, e] = rate / softness
-            dq[i, e] = -line.slope[e] * line.mobility[e] * dq[i, e]
-            if line.drag[e] > 0:
-                dq[i, e] -= line.drag[e] * q[i, e] * abs(q[i, e])
+            dp[i, e] /= softness
+            dq[i, e] -= drag * q[i, e] * abs(q[i, e])
+
+
+@njit(cache=True, fastmath=True)
+def _extrapolate(rates, now, back, old):
+    """The oldest of three (.., n, E) rates becomes their extrapolation to the next step."""
+    r0, r1, r2 = rates[now].reshape(-1), rates[back].reshape(-1), rates[old].reshape(-1)
+    for i in range(len(r2)):
+        r2[i] += 3 * (r0[i] - r1[i])
 
 
 @njit(cache=True, fastmath=True)
 def _advance(line, state, now, back, old, dt):
     """Fields of the next step, written over the oldest one (index `old`)."""
     n, elements = state.flow.shape
-    modes = line.rates.shape[0]
-    lead = 11 / (6 * dt)
-    p, r, q = state.pressure, state.strain, state.flow
-    np_, nq = state.pressure_rate, state.flow_drive
-    for i in range(n):
+    third, share = 1 / 3, 6 / 11
+    _extrapolate(state.pressure_rate, now, back, old)
+    _extrapolate(state.flow_drive, now, back, old)
+    p0, p1, p2 = (
+        state.pressure[now].reshape(-1),
+        state.pressure[back].reshape(-1),
+        state.pressure[old].reshape(-1),
+    )
+    rate = state.pressure_rate[old].reshape(-1)
+    for i in range(len(p2)):
+        p2[i] = share * (3 * p0[i] - 1.5 * p1[i] + third * p2[i] + dt * rate[i])
+    drive, total = state.flow_drive[old].reshape(-1), state.flow.reshape(-1)
+    total[:] = 0.0
+    for k in range(line.gains.shape[0]):
+        gain, push = line.gains[k].reshape(-1), line.pushes[k].reshape(-1)
+        m0, m1, m2 = (
+            state.modes[now, k].reshape(-1),
+            state.modes[back, k].reshape(-1),
+            state.modes[old, k].reshape(-1),
+        )
+        for i in range(len(total)):
+            m2[i] = gain[i] * (3 * m0[i] - 1.5 * m1[i] + third * m2[i])
+        for i in range(len(total)):
+            m2[i] += push[i] * drive[i]
+            total[i] += m2[i]
+    if line.special:
         for e in range(elements):
-            rate = 3 * np_[now, i, e] - 3 * np_[back, i, e] + np_[old, i, e]
-            history = (3 * p[now, i, e] - 1.5 * p[back, i, e] + p[old, i, e] / 3) / dt
-            p[old, i, e] = (history + rate) / lead
-            # from here on flow_drive[old] holds the extrapolated drive of this step
-            nq[old, i, e] = 3 * nq[now, i, e] - 3 * nq[back, i, e] + nq[old, i, e]
-            q[i, e] = 0.0
             if line.wall[0, e] > 0:
-                bent = (3 * r[now, i, e] - 1.5 * r[back, i, e] + r[old, i, e] / 3) / dt
-                pull = 1 / line.wall[1, e]
-                r[old, i, e] = (bent + pull * p[old, i, e]) / (lead + pull)
-    for k in range(modes):
-        m0, m1, m2 = state.modes[now, k], state.modes[back, k], state.modes[old, k]
-        for i in range(n):
-            for e in range(elements):
-                history = (3 * m0[i, e] - 1.5 * m1[i, e] + m2[i, e] / 3) / dt
-                value = (history + line.weights[k, e] * nq[old, i, e]) / (lead + line.rates[k, e])
-                m2[i, e] = value
-                q[i, e] += value
+                pull = dt / line.wall[1, e]
+                for i in range(n):
+                    s = state.strain
+                    bent = 3 * s[now, i, e] - 1.5 * s[back, i, e] + third * s[old, i, e]
+                    s[old, i, e] = (bent + pull * state.pressure[old, i, e]) / (11 / 6 + pull)
 
 
 @njit(cache=True)
@@ -250,6 +279,7 @@ def run(line, nodes, chambers, ports, source, crank, state, phase, steps, every,
     chamber_history = np.zeros(pistons)
     x = np.zeros(pistons + 1)
     matrix = np.zeros((pistons + 1, pistons + 2))
+    stations = np.zeros((pistons, 4))
     newton = 0
     for step in range(1, steps + 1):
         back, older, now = phase % 3, (phase + 2) % 3, (phase + 1) % 3
@@ -272,11 +302,18 @@ def run(line, nodes, chambers, ports, source, crank, state, phase, steps, every,
             chamber_history[:] = (3 * past[back] - 1.5 * past[older] + past[now] / 3) / dt
             x[:pistons] = 2 * past[back] - past[older]
             x[pistons] = state.node_pressure[0]
+            stations_at(angle, speed * rate, chambers, ports, stations)
             used = step_chambers(
-                angle, speed * rate, chamber_history, lead, chambers, ports,
-                wave_lead[0] + lead * nodes[0, VOLUME], wave_in[0] + given + history[STORED, 0],
-                x, matrix,
-            )  # fmt: skip
+                stations,
+                chamber_history,
+                lead,
+                chambers,
+                ports,
+                wave_lead[0] + lead * nodes[0, VOLUME],
+                wave_in[0] + given + history[STORED, 0],
+                x,
+                matrix,
+            )
             newton = max(newton, used)
             state.chamber[now] = x[:pistons]
             state.node_pressure[0] = x[pistons]
