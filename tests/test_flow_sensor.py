@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from rippletwin.flow_sensor.estimate import band_limit, orders_within
 from rippletwin.flow_sensor.line import line_response
-from rippletwin.flow_sensor.spectral import band_limit, estimate_flow, orders_within
+from rippletwin.flow_sensor.spectral import estimate_flow
 from rippletwin.line.chain import Network
 from rippletwin.line.segment import series_impedance, shunt_admittance
 

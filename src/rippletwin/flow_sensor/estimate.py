@@ -1,0 +1,94 @@
+"""From pressure windows to flow ripples, whatever inverts the line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+SPEED_STEP = 2e-4  # relative: windows closer than that share one inversion
+
+
+@dataclass(frozen=True)
+class FlowEstimate:
+    """Flow ripple at the pump outlet of n windows, zero mean, nothing above the bandwidth.
+
+    flow (n, M) m3/s; orders (F,); harmonics (n, F) complex peak amplitudes; standard_deviation
+    (F,) of the complex harmonics' error as the model of errors has it, and `prior` (F,) what it
+    would be without any sensor: where the first is not far below, an order is not measured.
+    """
+
+    flow: np.ndarray
+    orders: np.ndarray
+    harmonics: np.ndarray
+    standard_deviation: np.ndarray
+    prior: np.ndarray
+
+
+Inversion = Callable[
+    [float, np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]
+]
+"""(speed_hz, orders (F,), noise power (S,), wave power (F,)) -> matrix (F, S) from the sensors'
+harmonics to the flow's; the variance (F,) of its error; the prior variance (F,) of the flow.
+Powers are variances of complex peak amplitudes, Pa2."""
+
+
+def estimate(
+    windows: np.ndarray,
+    speed_hz: float | np.ndarray,
+    inversion: Inversion,
+    noise: float | np.ndarray,
+    bandwidth_hz: float,
+) -> FlowEstimate:
+    """Invert (n, S, M) windows, those of one speed together; see `spectral.estimate_flow`."""
+    windows = np.asarray(windows, dtype=float)
+    count, sensors, samples = windows.shape
+    speeds = np.broadcast_to(np.asarray(speed_hz, dtype=float), (count,))
+    orders = orders_within(bandwidth_hz, speeds.mean(), samples)
+    measured = np.fft.rfft(windows, axis=-1)[..., orders] * (2 / samples)  # (n, S, F)
+    noise_power = 4 / samples * np.broadcast_to(np.asarray(noise, float) ** 2, (sensors,))
+    # The largest reading stands for the waves: a node at one sensor is rarely one at the others.
+    power = np.max(np.mean(np.abs(measured) ** 2, axis=0), axis=0)  # (F,)
+
+    harmonics = np.empty((count, len(orders)), complex)
+    variance = np.zeros(len(orders))
+    bins = np.rint((speeds / speeds.mean() - 1) / SPEED_STEP)
+    for step in np.unique(bins):
+        members = np.flatnonzero(bins == step)
+        matrix, error, prior = inversion(speeds[members].mean(), orders, noise_power, power)
+        harmonics[members] = np.einsum("fs,nsf->nf", matrix, measured[members])
+        variance += error * len(members) / count
+    spectrum = np.zeros((count, samples // 2 + 1), complex)
+    spectrum[:, orders] = harmonics * (samples / 2)
+    return FlowEstimate(
+        flow=np.fft.irfft(spectrum, samples, axis=-1),
+        orders=orders,
+        harmonics=harmonics,
+        standard_deviation=np.sqrt(variance),
+        prior=np.sqrt(prior),
+    )
+
+
+def orders_within(bandwidth_hz: float, speed_hz: float, samples: int) -> np.ndarray:
+    """Shaft orders 1, 2, ... up to `bandwidth_hz`, (F,) integers."""
+    highest = int(np.floor(bandwidth_hz / speed_hz * (1 + 1e-9)))
+    if not 1 <= highest < samples / 2:
+        raise ValueError(
+            f"a bandwidth of {bandwidth_hz} Hz at {speed_hz} rev/s needs between 1 and "
+            f"{(samples - 1) // 2} orders"
+        )
+    return np.arange(1, highest + 1)
+
+
+def band_limit(flow: np.ndarray, speed_hz: float, bandwidth_hz: float) -> np.ndarray:
+    """`flow` (..., M) over one revolution with only the orders that a sensor estimates.
+
+    Whatever is compared with an estimate, or learnt from to judge one, should pass this first.
+    """
+    samples = flow.shape[-1]
+    orders = orders_within(bandwidth_hz, speed_hz, samples)
+    spectrum = np.fft.rfft(flow, axis=-1)
+    kept = np.zeros_like(spectrum)
+    kept[..., orders] = spectrum[..., orders]
+    return np.fft.irfft(kept, samples, axis=-1)
