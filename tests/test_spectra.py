@@ -82,7 +82,7 @@ def test_harmonics_survive_speed_wander(wander_hz):
     piston = seen.orders % PISTONS == 0
     error = np.abs(found - truth) / np.abs(truth).max(axis=0)
     assert error[:, piston].max() < 1e-3
-    assert np.linalg.norm(found - truth) < 5e-4 * np.linalg.norm(truth)
+    assert np.linalg.norm(found - truth) < 2e-4 * np.linalg.norm(truth)
 
 
 def test_covariance_is_that_of_repeated_draws():
@@ -101,7 +101,6 @@ def test_covariance_is_that_of_repeated_draws():
     for _ in range(8):
         seen = observe(recording(clean + mix @ rng.normal(size=clean.shape)), RIG)
         found = turned(seen.values, truth.values, truth.orders)
-        # the covariance turns with the values: the phase of both sensors is the same
         error = (found - truth.values)[:, judged].T
         solved = np.linalg.solve(seen.covariance[judged], error[:, :, None])[:, :, 0]
         chi2.append(np.sum(error.conj() * solved, axis=1).real)
@@ -141,7 +140,7 @@ def test_windows_have_the_asked_length_and_repeat():
     clean = ripple(harmonics(np.random.default_rng(4)), seconds=2.0)
     cut = cut_revolutions(clean, RATE, PISTONS, 1000.0, 3072)
     assert cut.windows.shape[1:] == (2, 3072)
-    assert len(cut.windows) == len(cut.speed_hz) >= 31
+    assert len(cut.windows) == len(cut.speed_hz) >= 30
     assert np.all(noise_cycle_scatter(cut.windows) < 1e-3 * np.std(clean, axis=1))
 
 
@@ -157,12 +156,12 @@ def test_both_noise_estimates_find_the_noise():
 
 
 def test_piston_harmonics_only_and_highest_frequency():
-    """The choice of orders is a choice only: the values kept are the same."""
+    """The choice of orders is a choice only: the values kept are the same to 1e-5."""
     clean = ripple(harmonics(np.random.default_rng(6)), seconds=1.0)
     everything = observe(recording(clean), RIG)
     some = observe(recording(clean), RIG, max_frequency_hz=1500, piston_harmonics_only=True)
     assert list(some.orders) == list(range(9, 90, 9))
-    np.testing.assert_allclose(some.values, everything.values[:, some.orders - 1])
+    np.testing.assert_allclose(some.values, everything.values[:, some.orders - 1], rtol=1e-5)
 
 
 def test_random_recording_gives_the_response_between_sensors():

@@ -21,6 +21,7 @@ from scipy.ndimage import map_coordinates, spline_filter1d
 KNOTS_PER_REVOLUTION = 4
 FIRST_HARMONICS = 6
 HIGHEST_TRACKED_HZ = 5000.0
+ENOUGH = 20
 HALF_WIDTH, SHAPE = 24, 14.0  # of the interpolation kernel: 1e-6 up to 0.4 times the sampling rate
 
 
@@ -46,7 +47,8 @@ def cut_revolutions(
 ) -> Revolutions:
     """Cut `pressure` (S, N) into whole revolutions of equal shaft angle steps.
 
-    The shaft angle of the first sample is unknown; half a revolution is lost at either end.
+    The shaft angle of the first sample is unknown. Half a revolution is lost at either end, one
+    and a half where there are more than twenty.
     `samples_per_revolution` None keeps the recording's own rate, rounded up to an even number.
     Raises ValueError for fewer than two revolutions left.
     """
@@ -55,6 +57,8 @@ def cut_revolutions(
     step = samples_per_revolution or own
     time = _time_of_angle(pressure, sampling_rate_hz, pistons, speed_hz, own)
     first, last = time.x[0], time.x[-1]
+    if last - first > ENOUGH:  # the angle is least sure at the ends
+        first, last = first + 1, last - 1
     count = int(np.floor(last - first))
     if count < 2:
         raise ValueError(f"{pressure.shape[1]} samples hold fewer than two whole revolutions")

@@ -98,6 +98,10 @@ class FlowRipple:
     flow: np.ndarray
     pressure_mean: float | None = None
 
+    def source_admittance(self, s: np.ndarray) -> np.ndarray:
+        """Admittance (F,), m3/s/Pa, beside this flow: none, a given ripple is an ideal source."""
+        return np.zeros(np.shape(s), complex)
+
 
 @dataclass(frozen=True)
 class Recording:
