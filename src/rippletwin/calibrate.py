@@ -6,7 +6,8 @@ from nominal values ends in a wrong valley. Hence
 
 * all observations together and in absolute frequency: first below 800 Hz, then 1.5, 2.5, 4 kHz
   and what is left;
-* from several scalings of all wave speeds at once, the best of them carried on;
+* from several scalings of the wave speeds, of the longest segment's and of the others' together,
+  the best of them carried on;
 * the shaft angle of each recording first sought on a grid over a full turn of its lowest order;
 * the model's error floor estimated as the fit goes: large at first, which evens out the valleys.
 """
@@ -15,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 
@@ -23,8 +25,9 @@ from rippletwin.misfit import Misfit, misfit
 from rippletwin.twin import Twin
 
 LIMITS_HZ = (800.0, 1500.0, 2500.0, 4000.0)
-SCALINGS = (0.0, -1.0, 1.0, -2.0, 2.0)  # of all wave speeds, in prior standard deviations
-KEPT = (3, 2, 1)  # starts carried on after the first, second and every later limit
+SCALINGS = (0.0, -0.8, 0.8, -1.6, 1.6, -2.4, 2.4)  # in prior standard deviations
+TRIED = 8  # starts that are fitted below the first limit, the likeliest after alignment
+KEPT = (4, 2, 1)  # starts carried on after the first, second and every later limit
 
 UNDETERMINED = 0.7  # posterior over prior standard deviation above which data say little
 IMPLAUSIBLE = 3.0  # prior standard deviations
@@ -37,8 +40,8 @@ CONVERGED = 1e-3  # change of minus the log posterior
 
 @dataclass(frozen=True)
 class Settings:
-    """Limits (Hz) and scalings (prior standard deviations) of the continuation; data above
-    `max_frequency_hz` are not used."""
+    """Limits (Hz) of the continuation and scalings of the wave speeds (prior standard deviations)
+    to start from; data above `max_frequency_hz` are not used."""
 
     limits_hz: tuple[float, ...] = LIMITS_HZ
     scalings: tuple[float, ...] = SCALINGS
@@ -90,14 +93,11 @@ def calibrate(
     if not observations:
         raise ValueError("calibration needs at least one observation")
     limits = limits_of(observations, settings)
-    speeds = np.array([p.name.startswith("wave_speed") for p in twin.parameters])
-    states = [(0.0, twin.theta + scale * speeds) for scale in settings.scalings]
+    states = _starts(Likelihood(twin, observations, limits[0]), settings.scalings)
     for stage, limit in enumerate(limits):
         likelihood = Likelihood(twin, observations, limit)
         fits = []
         for _, theta in states:
-            if stage == 0:
-                theta = align(likelihood, theta)
             theta, value = fit(likelihood, theta)
             fits.append((value, theta))
         fits.sort(key=lambda f: f[0])
@@ -213,6 +213,24 @@ def align(likelihood: Likelihood, theta: np.ndarray) -> np.ndarray:
         angle = (angle + turn / 2) % turn - turn / 2
         theta[index] = twin.parameters[index].prior.coordinate(angle)
     return theta
+
+
+def _starts(likelihood: Likelihood, scalings: Sequence[float]) -> list:
+    """(objective, theta) of the TRIED likeliest starts, their shaft angles aligned."""
+    twin = likelihood.twin
+    delays = [segment.delay for segment in twin.rig.line]
+    speeds = [twin.index[f"wave_speed[{k + 1}]"] for k in range(len(delays))]
+    longest = speeds[int(np.argmax(delays))]
+    starts = []
+    for scale, others in product(scalings, scalings if len(delays) > 1 else (0.0,)):
+        theta = twin.theta.copy()
+        theta[speeds] += others
+        theta[longest] = twin.theta[longest] + scale
+        theta = align(likelihood, theta)
+        prediction = likelihood.forward(theta)
+        likelihood.estimate_errors(prediction)
+        starts.append((likelihood.objective(theta, prediction), theta))
+    return sorted(starts, key=lambda s: s[0])[:TRIED]
 
 
 def _distinct(fits: list) -> list:
