@@ -109,6 +109,11 @@ def test_source_admittance_is_part_of_the_source():
     windows = record(network, flow, 0.0, rng)
     found = estimate_flow(windows, SPEED, network, 1.0, BAND, model_error=1e-5)
     assert error(found.flow, flow) < 1e-4
+    outlet = estimate_flow(windows, SPEED, network, 1.0, BAND, model_error=1e-5, of="outlet")
+    at_pump = network(SPEED, outlet.orders).flow_at([0.0])[0]  # of unit source flow
+    expected = at_pump * np.fft.rfft(flow)[:, outlet.orders] * 2 / SAMPLES
+    np.testing.assert_allclose(outlet.harmonics, expected, atol=1e-4 * np.abs(expected).max())
+    assert error(outlet.flow, flow) > 0.1
 
 
 @pytest.mark.parametrize("positions,limit", [(TWO, 0.03), (THREE, 0.01)])

@@ -20,7 +20,7 @@ class LineResponse:
 
     p(0) = f + b and q(0) = (f - b)/Zc, Zc the first segment's characteristic impedance (modulus).
     to_sensors (F, S, 2)  sensors' readings, Pa
-    to_flow    (F, 2)     flow of the ideal source, m3/s: Q(0) and what its own admittance takes
+    to_flow    (F, 2)     the flow wanted, m3/s
     to_load    (F, 2)     b - r f, zero where the waves agree with the load's reflection r; scaled
                           to unit length, Pa
     """
@@ -30,9 +30,11 @@ class LineResponse:
     to_load: np.ndarray
 
 
-def line_response(network: Network) -> LineResponse:
+def line_response(network: Network, of: str = "source") -> LineResponse:
     """What `network`'s line does with a state at the pump, whatever source and load are.
 
+    `of` is the flow wanted: the ideal "source"'s, or the "outlet"'s Q(0), which lacks what the
+    source's own admittance takes; ValueError for another.
     Upstream of a sensor [p, q](0) = T [p, q](x) with det T = 1, so p(x) = T22 p(0) - T12 q(0).
     """
     zc = np.abs(np.sqrt(network.series[0] / network.shunt[0]))
@@ -43,7 +45,7 @@ def line_response(network: Network) -> LineResponse:
         matrix = network.transfer(0.0, x)
         from_p, from_q = k * matrix[:, 1, 1], -k * matrix[:, 0, 1] / zc
         rows.append(np.stack([from_p + from_q, from_p - from_q], axis=-1))
-    own = np.broadcast_to(network.source_admittance, (size,))
+    own = own_admittance(network, of)
     z = network.input_impedance()
     mismatch = np.stack([zc - z, zc + z], axis=-1)  # times w: (z + zc)(b - r f)
     return LineResponse(
@@ -53,23 +55,33 @@ def line_response(network: Network) -> LineResponse:
     )
 
 
+def own_admittance(network: Network, of: str) -> np.ndarray:
+    """Admittance (F,) between Q(0) and the flow wanted, see `line_response`."""
+    if of not in ("source", "outlet"):
+        raise ValueError(f"of must be 'source' or 'outlet', not {of!r}")
+    own = network.source_admittance if of == "source" else 0.0
+    return np.broadcast_to(own, network.s.shape)
+
+
 def network_of(twin, load_pressure: float, ripple: FlowRipple | None = None) -> NetworkFactory:
     """Networks of a calibrated twin at one operating point, the load linearised there.
 
     `load_pressure` in Pa; the mean of `ripple` (m3/s) sets an orifice whose coefficient the rig
-    does not give; None takes the lumped pump's.
+    does not give, and what admittance the ripple has is the source's. None takes the lumped pump.
     """
     from rippletwin.forward import Forward
     from rippletwin.spectra import Observation
 
+    sensors = twin.rig.sensors
+
     def network(speed_hz: float, orders: np.ndarray) -> Network:
-        flow = ripple
-        if flow is None:
+        nonlocal ripple
+        if ripple is None:
             from rippletwin.pump import ConstantPressure, simulate
 
             outlet = ConstantPressure(load_pressure)
-            flow = simulate(twin.rig.pump, twin.rig.fluid, 60 * speed_hz, outlet)
-        size, sensors = len(orders), twin.rig.sensors
+            ripple = simulate(twin.rig.pump, twin.rig.fluid, 60 * speed_hz, outlet)
+        size = len(orders)
         point = Observation(
             kind="periodic",
             label="",
@@ -81,9 +93,11 @@ def network_of(twin, load_pressure: float, ripple: FlowRipple | None = None) -> 
             speed_hz=speed_hz,
             load_pressure=load_pressure,
             source="free",  # its load stays linear: no ripple to balance an orifice with
-            flow_ripple=flow,
+            flow_ripple=ripple,
             sensors=sensors,
         )
-        return Forward(twin, [point]).network(twin.theta)
+        line = Forward(twin, [point]).network(twin.theta)
+        line.source_admittance = line.source_admittance + ripple.source_admittance(line.s)
+        return line
 
     return network

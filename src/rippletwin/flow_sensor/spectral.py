@@ -17,8 +17,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from rippletwin.flow_sensor.estimate import FlowEstimate, estimate
+from rippletwin.flow_sensor.estimate import FlowEstimate, band_limit, estimate
 from rippletwin.flow_sensor.line import LineResponse, NetworkFactory, line_response
+
+__all__ = ["band_limit", "estimate_flow", "flow_operator"]
 
 MODEL_ERROR = 0.01
 LOAD_ERROR = 0.1
@@ -32,6 +34,7 @@ def estimate_flow(
     bandwidth_hz: float,
     model_error: float = MODEL_ERROR,
     load_error: float | None = LOAD_ERROR,
+    of: str = "source",
 ) -> FlowEstimate:
     """Outlet flow of each one-revolution window.
 
@@ -44,12 +47,14 @@ def estimate_flow(
     bandwidth_hz : shaft orders up to this frequency are estimated, the others are zero.
     model_error : error of a predicted pressure relative to the wave amplitude.
     load_error : error of the load's reflection coefficient; None leaves the load out.
+    of : "source", the ideal flow source in the network, or "outlet", Q(0): they differ by what
+        the source's own admittance takes.
 
     Raises ValueError for a bandwidth below the speed or above half the sampling rate.
     """
 
     def inversion(speed, orders, noise_power, power):
-        response = line_response(network(speed, orders))
+        response = line_response(network(speed, orders), of)
         return flow_operator(response, noise_power, power, model_error, load_error)
 
     return estimate(windows, speed_hz, inversion, noise, bandwidth_hz)
