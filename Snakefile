@@ -1,0 +1,32 @@
+# The DAG's front door: config, its schema, the stages, the targets.
+from snakemake.utils import min_version, validate
+
+min_version("9.0")
+
+
+configfile: "config/config.yaml"
+
+
+validate(config, "workflow/schemas/config.schema.yaml")
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/recordings.smk"
+include: "workflow/rules/calibrate.smk"
+include: "workflow/rules/faults.smk"
+include: "workflow/rules/propagate.smk"
+include: "workflow/rules/flow_sensor.smk"
+include: "workflow/rules/augment.smk"
+include: "workflow/rules/image.smk"
+include: "workflow/rules/train.smk"
+include: "workflow/rules/evaluate.smk"
+include: "workflow/rules/report.smk"
+
+
+rule all:
+    default_target: True
+    input:
+        rules.report.output,
+        rules.plot_accuracy.output,
+        rules.plot_calibration.output,
+        expand(rules.plot_confusion.output, dataset=config["datasets"]),

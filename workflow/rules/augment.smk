@@ -1,0 +1,43 @@
+# Signals -> labelled samples: seeds shifted and noisy (one store a seed), recordings as they are.
+rule augment:
+    input:
+        signals=f"{RESULTS}/seeds/{{dataset}}.zarr",
+        recorded=lambda wildcards: f"{RESULTS}/recordings/{signal_of(wildcards.dataset)}.zarr",
+        source=library("augment.py"),
+    output:
+        temp(directory(f"{RESULTS}/samples/{{dataset}}/{{seed}}x{{revolutions}}.zarr")),
+    params:
+        samples_per_class=lambda wildcards: config["samples_per_class"][
+            "time" if wildcards.revolutions == "1" else "image"
+        ],
+        noise=config["noise"]["factor"],
+    log:
+        f"{RESULTS}/logs/augment/{{dataset}}/{{seed}}x{{revolutions}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/augment/{{dataset}}/{{seed}}x{{revolutions}}.tsv"
+    conda:
+        ENVIRONMENT
+    threads: 1
+    resources:
+        mem_mb=2000,
+    script:
+        "../scripts/augment.py"
+
+
+rule pair:
+    input:
+        recorded=lambda wildcards: f"{RESULTS}/recordings/{signal_of(wildcards.dataset)}.zarr",
+        source=library("pair.py"),
+    output:
+        temp(directory(f"{RESULTS}/samples/{{dataset}}/recordedx2.zarr")),
+    log:
+        f"{RESULTS}/logs/pair/{{dataset}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/pair/{{dataset}}.tsv"
+    conda:
+        ENVIRONMENT
+    threads: 1
+    resources:
+        mem_mb=1000,
+    script:
+        "../scripts/pair.py"

@@ -1,0 +1,156 @@
+# What several stages share: where files are, and what a job depends on besides them.
+import ast
+import os
+from pathlib import Path
+
+import yaml
+
+ROOT = Path(workflow.basedir)
+SOURCE = ROOT / "src"
+SCRIPTS = ROOT / "workflow" / "scripts"
+RESULTS = config["results"]
+ENVIRONMENT = "rippletwin"  # a conda environment made from environment.txt; used with --sdm conda
+
+# numba does not follow `threads:`.
+os.environ.setdefault("NUMBA_NUM_THREADS", "1")
+# Training spends half its time on page faults unless the heap keeps what is freed; malloc reads
+# these when a process starts.
+os.environ.setdefault("MALLOC_MMAP_MAX_", "0")
+os.environ.setdefault("MALLOC_TRIM_THRESHOLD_", str(16 * 2**30))
+os.environ.setdefault("MALLOC_TOP_PAD_", str(256 * 2**20))
+
+
+# ---- the case -------------------------------------------------------------------------------
+
+RECORDED_HERE = config["case"] == "virtualrig"
+CASE = f"{RESULTS}/case" if RECORDED_HERE else config["case"].rstrip("/")
+RIG = f"{CASE}/rig.yaml"
+
+
+def recordings():
+    """The case's files besides rig.yaml: one folder where the virtual rig makes them."""
+    if RECORDED_HERE:
+        return [f"{CASE}/recordings"]
+    entries = yaml.safe_load(Path(RIG).read_text()).get("recordings", [])
+    named = [
+        name
+        for entry in entries
+        for name in (entry.get("file"), entry.get("flow_ripple"), *entry.get("repeats", ()))
+        if name
+    ]
+    return sorted({f"{CASE}/{name}" for name in named})
+
+
+def rig(*sections):
+    """Params: these sections of rig.yaml, so that editing another one reruns nothing.
+
+    The rule's own input is ancient(RIG).
+    """
+
+    def read(wildcards, input):
+        sheet = yaml.safe_load(Path(input.rig).read_text())
+        return {section: sheet.get(section) for section in sections}
+
+    return read
+
+
+# ---- datasets, networks, seeds --------------------------------------------------------------
+
+STATES = ["H", "S", "C1", "C2"]
+EXPERIMENTAL = "experimental"  # the dataset that learns from recordings
+SEEDS = range(config["seeds"])
+# Longest first, as measured; see benchmarks/ of a run.
+SLOWEST = ["resnet34_2d", "resnet18_2d", "cnn2d_30_3", "cnn1d_3_1", "cnn2d_3_1", "resnet34_1d"]
+
+
+wildcard_constraints:
+    state="|".join(STATES),
+    dataset=f"CFD-P|CFD-MOC-P|CFD-Q|{EXPERIMENTAL}",
+    signal="pressure|flow",
+    architecture="[a-z0-9_]+",
+    seed="[0-9]+",
+    revolutions="1|2",
+    windows="[0-9]+|recorded",
+
+
+def signal_of(dataset):
+    return "flow" if dataset.startswith("CFD-Q") else "pressure"
+
+
+def domain_of(architecture):
+    return "image" if "2d" in architecture else "time"
+
+
+def recorded_of(wildcards):
+    """What a network is tested on."""
+    if domain_of(wildcards.architecture) == "image":
+        return f"{RESULTS}/images/{wildcards.dataset}/recorded.zarr"
+    return f"{RESULTS}/recordings/{signal_of(wildcards.dataset)}.zarr"
+
+
+def samples_of(wildcards):
+    """What a network learns from: a store a seed, or the recordings."""
+    if wildcards.dataset == EXPERIMENTAL:
+        return [recorded_of(wildcards)]
+    if domain_of(wildcards.architecture) == "image":
+        return [f"{RESULTS}/images/{wildcards.dataset}/{seed}.zarr" for seed in SEEDS]
+    return [f"{RESULTS}/samples/{wildcards.dataset}/{seed}x1.zarr" for seed in SEEDS]
+
+
+def reference_of(wildcards):
+    """What the images of a dataset are scaled by."""
+    if wildcards.dataset == EXPERIMENTAL:
+        return f"{RESULTS}/recordings/pressure.zarr"
+    return f"{RESULTS}/seeds/{wildcards.dataset}.zarr"
+
+
+def urgency_of(wildcards):
+    """Start the longest trainings first."""
+    architecture = wildcards.architecture
+    return 20 - SLOWEST.index(architecture) if architecture in SLOWEST else 10
+
+
+# ---- what a script imports ------------------------------------------------------------------
+
+
+def imported(file):
+    """Dotted names that a Python file imports, late imports included."""
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            name = node.module or ""
+            if node.level:
+                package = file.relative_to(SOURCE).parts[: -node.level]
+                name = ".".join([*package, *filter(None, [name])])
+            yield name
+            yield from (f"{name}.{alias.name}" for alias in node.names)
+
+
+def files_of(name):
+    """This repository's source files that importing a name runs."""
+    parts = name.split(".")
+    for folder in (SOURCE, SCRIPTS):
+        for depth in range(1, len(parts) + 1):
+            path = folder.joinpath(*parts[:depth])
+            for file in (path / "__init__.py", path.with_suffix(".py")):
+                if file.exists():
+                    yield file
+
+
+def library(script):
+    """Every source file that a script of workflow/scripts runs: its jobs rerun when one changes."""
+    pending, found = [SCRIPTS / script], set()
+    while pending:
+        for name in imported(pending.pop()):
+            for file in files_of(name):
+                if file not in found:
+                    found.add(file)
+                    pending.append(file)
+    return sorted(str(file) for file in found)
+
+
+def virtualrig():
+    """Every file of the virtual rig, another program: its code, its sheet and what it conceals."""
+    files = (SOURCE / "virtualrig").rglob("*")
+    return sorted(str(file) for file in files if file.suffix in (".py", ".yaml"))

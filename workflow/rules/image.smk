@@ -1,0 +1,26 @@
+# Windows of two revolutions, simulated or recorded -> synchrosqueezed images.
+# Recordings are scaled as the simulation that learns from them, or as themselves.
+rule image:
+    input:
+        samples=f"{RESULTS}/samples/{{dataset}}/{{windows}}x2.zarr",
+        reference=reference_of,
+        source=library("image.py"),
+    output:
+        temp(directory(f"{RESULTS}/images/{{dataset}}/{{windows}}.zarr")),
+    params:
+        size=config["sst"]["size"],
+        min_frequency_hz=config["sst"]["min_frequency_hz"],
+        max_frequency_hz=config["sst"]["max_frequency_hz"],
+        voices=config["sst"]["voices"],
+        k=config["sst"]["k"],
+    log:
+        f"{RESULTS}/logs/image/{{dataset}}/{{windows}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/image/{{dataset}}/{{windows}}.tsv"
+    conda:
+        ENVIRONMENT
+    threads: 1
+    resources:
+        mem_mb=4000,
+    script:
+        "../scripts/image.py"

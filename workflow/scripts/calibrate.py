@@ -1,0 +1,49 @@
+"""The calibrated twin, its report, and the ripples to draw."""
+
+from pathlib import Path
+
+import xarray as xr
+from job import start
+
+from rippletwin import report, store
+from rippletwin.calibrate import Settings, calibrate
+from rippletwin.case import load_case
+from rippletwin.pareto import calibrate_pareto
+from rippletwin.spectra import observe
+from rippletwin.twin import Twin
+
+tell = start(snakemake)
+params = snakemake.params
+case = load_case(Path(snakemake.input.rig).parent, states={"healthy"})
+observations = [observe(r, case.rig, piston_harmonics_only=True) for r in case.recordings]
+twin = Twin(case.rig, observations, friction=params.friction)
+settings = Settings(max_frequency_hz=params.max_frequency_hz)
+if params.method == "pareto":
+    calibration = calibrate_pareto(twin, observations, settings, progress=tell).calibration
+else:
+    calibration = calibrate(twin, observations, settings, progress=tell)
+for warning in calibration.warnings:
+    tell(f"warning: {warning}")
+tell(
+    f"relative misfit {calibration.before.relative:.1%} -> {calibration.after.relative:.1%}, "
+    f"Theil {calibration.before.theil:.3f} -> {calibration.after.theil:.3f}"
+)
+
+names = ("measured", "nominal", "calibrated")
+ripples = report.ripples(calibration, observations)
+store.save(
+    xr.Dataset(
+        {
+            name: (("point", "channel", "time"), [r[name] for r in ripples], {"units": "Pa"})
+            for name in names
+        },
+        coords={
+            "point": [r["label"] for r in ripples],
+            "channel": ripples[0]["sensors"],
+            "angle_deg": ("time", ripples[0]["angle_deg"], {"units": "degrees"}),
+        },
+        attrs={"source": "piston harmonics of healthy recordings"},
+    ),
+    snakemake.output.ripples,
+)
+report.save(calibration, Path(snakemake.output.twin).parent)

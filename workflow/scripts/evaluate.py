@@ -1,0 +1,33 @@
+"""What the networks of every seed say of the recorded windows (of none that they learnt from)."""
+
+import numpy as np
+import pandas as pd
+import torch
+from job import start
+
+from rippletwin import store
+from rippletwin.dataset import split_by_time
+from rippletwin.networks import CLASSES, build
+from rippletwin.training import predict
+
+tell = start(snakemake)
+torch.set_num_threads(snakemake.threads)
+recorded = store.load(snakemake.input.recorded)
+kept = np.arange(recorded.sizes["window"])
+if snakemake.wildcards.dataset == "experimental":
+    _, kept = split_by_time(np.bincount(recorded.recording), snakemake.params.share)
+x, truth = recorded.signal.values[kept], recorded.state.values[kept]
+
+tables = []
+for seed, weights in enumerate(torch.load(snakemake.input.weights)):
+    network = build(snakemake.wildcards.architecture, channels=x.shape[1])
+    network.load_state_dict(weights)
+    predicted, probability = predict(network, x)
+    table = pd.DataFrame(probability, columns=[f"p_{name}" for name in CLASSES]).round(5)
+    table.insert(0, "predicted", np.array(CLASSES)[predicted])
+    table.insert(0, "truth", truth)
+    table.insert(0, "window", kept)
+    table.insert(0, "seed", seed)
+    tables.append(table)
+pd.concat(tables).to_csv(snakemake.output[0], index=False)
+tell(f"{len(x)} windows, {len(tables)} seeds")

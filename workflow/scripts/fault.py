@@ -1,0 +1,59 @@
+"""Outlet flow of the pump in one state, coupled to an uncalibrated pipe, and the pressure in it."""
+
+from pathlib import Path
+
+import xarray as xr
+from job import start
+
+from rippletwin import store
+from rippletwin.case import load_case
+from rippletwin.case.model import Segment
+from rippletwin.pump import Cylinder, Pipe, Slipper, simulate
+
+tell = start(snakemake)
+params, state = snakemake.params, snakemake.wildcards.state
+rig = load_case(Path(snakemake.input.rig).parent, states=()).rig
+recorded = store.load(snakemake.input.recordings)
+first = rig.line[0]
+pipe = Segment(params.pipe_length, first.diameter, first.wave_speed)
+positions = tuple(sensor.position for sensor in rig.sensors)
+
+
+def ripple(load, fault=None):
+    return simulate(
+        rig.pump,
+        rig.fluid,
+        60 * recorded.speed_hz,
+        Pipe(pipe, positions, **load),
+        fault,
+        recorded.sizes["time"],
+    )
+
+
+# A faulty pump meets the orifice that the healthy one left.
+result = healthy = ripple({"load_pressure": recorded.load_pressure})
+if state != "H":
+    kind = Slipper if state == "S" else Cylinder
+    result = ripple({"orifice": healthy.orifice}, kind(params.leak_area))
+tell(f"mean flow {result.flow.mean():.4g} m3/s, periodic to {result.change:.1g}")
+store.save(
+    xr.Dataset(
+        {
+            "flow": (("channel_q", "time"), result.flow[None], {"units": "m3/s"}),
+            "pressure": (("channel", "time"), result.sensor_pressure, {"units": "Pa"}),
+        },
+        coords={
+            "angle_deg": ("time", result.angle_deg),
+            "channel": [sensor.name for sensor in rig.sensors],
+            "channel_q": ["outlet"],
+        },
+        attrs={
+            "state": state,
+            "speed_hz": recorded.speed_hz,
+            "leak_area_m2": params.leak_area,
+            "pressure_mean": result.pressure_mean,
+            "source": f"lumped pump model and an uncalibrated pipe of {params.pipe_length} m",
+        },
+    ),
+    snakemake.output[0],
+)

@@ -1,0 +1,32 @@
+"""Synchrosqueezed images of windows of two revolutions, scaled as the reference's healthy state."""
+
+from dataclasses import replace
+
+import numpy as np
+from job import start
+
+from rippletwin import store
+from rippletwin.imaging import SstSettings, amplitude_scale, sst_images
+
+tell = start(snakemake)
+params = snakemake.params
+samples = store.load(snakemake.input.samples)
+reference = store.load(snakemake.input.reference)
+rate = reference.sizes["time"] * reference.speed_hz
+settings = SstSettings(
+    size=params.size,
+    min_frequency_hz=params.min_frequency_hz,
+    max_frequency_hz=params.max_frequency_hz,
+    voices=params.voices,
+    k=params.k,
+)
+healthy = reference.signal.values[reference.state.values == "H"][:1]
+settings = replace(settings, scale=amplitude_scale(np.tile(healthy, 2), rate, settings))
+images = sst_images(samples.signal.values, rate, settings)
+axes = (samples.signal.dims[0], "channel", "frequency", "column")
+store.save(
+    samples.drop_vars("signal").assign(signal=(axes, images, {"units": "1"})),
+    snakemake.output[0],
+    compressed=False,
+)
+tell(f"{len(images)} images of {settings.size} x {settings.size}, scale {settings.scale:.3g}")

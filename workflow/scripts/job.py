@@ -1,0 +1,30 @@
+"""What every script does first: send its output to the job's log, and progress to the terminal too."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+
+from rippletwin.errors import InputError
+
+
+def start(snakemake):
+    """Redirect this process's output to the job's log; returns tell(text) for progress.
+
+    Bad input ends the job with its message alone, anything else with a traceback in the log.
+    """
+    terminal = sys.stderr
+    log = open(snakemake.log[0], "w", buffering=1)  # noqa: SIM115 (open as long as the process)
+    sys.stdout = sys.stderr = log
+    name = " ".join([snakemake.rule, *map(str, snakemake.wildcards)])
+
+    def tell(text: str) -> None:
+        print(text, file=log)
+        print(f"{name}: {text}", file=terminal, flush=True)
+
+    def fail(kind, error, trace):
+        traceback.print_exception(kind, error, trace, file=log)
+        print(f"{name}: {error if kind is InputError else repr(error)}", file=terminal, flush=True)
+
+    sys.excepthook = fail
+    return tell

@@ -1,0 +1,18 @@
+"""Measured, nominal and calibrated ripple at each sensor, one picture an operating point."""
+
+from pathlib import Path
+
+from job import start
+
+from rippletwin import store
+from rippletwin.figures import ripple, save
+
+tell = start(snakemake)
+ripples = store.load(snakemake.input.ripples)
+folder = Path(snakemake.output[0])
+for label in ripples.point.values:
+    point = ripples.sel(point=label)
+    curves = {name: values.values for name, values in point.data_vars.items()}
+    figure = ripple.overlay(point.angle_deg.values, curves, point.channel.values, str(label))
+    save(figure, folder / f"{label}.png", folder / f"{label}.svg")
+tell(f"{ripples.sizes['point']} operating points")

@@ -1,0 +1,18 @@
+"""Confusion matrices of one dataset, a panel a network, all seeds together."""
+
+import pandas as pd
+from job import start
+
+from rippletwin.accuracy import CLASSES, TRUE_STATES, confusion_of
+from rippletwin.figures import diagnosis, save
+from rippletwin.networks import ARCHITECTURES
+
+tell = start(snakemake)
+results = pd.read_csv(snakemake.input.table)
+rows = results[results.dataset == snakemake.wildcards.dataset]
+matrices = {}
+for architecture, trainings in rows.groupby("architecture", sort=False):
+    counts = confusion_of(trainings)
+    matrices[ARCHITECTURES[architecture].title] = counts / counts.sum(1, keepdims=True).clip(1)
+save(diagnosis.confusion(matrices, TRUE_STATES, CLASSES), *snakemake.output)
+tell(f"{len(matrices)} matrices")

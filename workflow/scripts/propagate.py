@@ -1,0 +1,40 @@
+"""Pressure at the sensors of the calibrated line, driven by the pump in one state."""
+
+import xarray as xr
+from job import start
+
+from rippletwin import store
+from rippletwin.propagation import propagate
+from rippletwin.report import load_twin
+
+tell = start(snakemake)
+params = snakemake.params
+recorded = store.load(snakemake.input.recordings)
+fault, healthy = store.load(snakemake.input.flow), store.load(snakemake.input.healthy)
+result = propagate(
+    load_twin(snakemake.input.twin),
+    fault.flow[0].values,
+    healthy.flow[0].values,
+    recorded.speed_hz,
+    recorded.load_pressure,
+    params.steps,
+    params.tolerance,
+)
+tell(
+    f"{result.periods} revolutions to a change of {result.change:.1g}, "
+    f"largest at {result.worst_position:.2f} m"
+)
+if not result.converged:
+    raise ArithmeticError(f"the line does not repeat itself to {params.tolerance}")
+store.save(
+    xr.Dataset(
+        {"pressure": (("channel", "time"), result.pressure, {"units": "Pa"})},
+        coords={"channel": recorded.channel.values},
+        attrs={
+            "state": snakemake.wildcards.state,
+            "speed_hz": recorded.speed_hz,
+            "source": "the calibrated line by the method of characteristics",
+        },
+    ),
+    snakemake.output[0],
+)

@@ -1,0 +1,28 @@
+"""The noise-free revolution of every state in one store; flow as far as the sensor sees it."""
+
+import numpy as np
+import xarray as xr
+from job import start
+
+from rippletwin import store
+from rippletwin.flow_sensor.spectral import band_limit
+
+tell = start(snakemake)
+params = snakemake.params
+stores = [store.load(path) for path in snakemake.input.states]
+signals = [dataset[params.signal] for dataset in stores]
+values = np.array([signal.values for signal in signals])
+if params.signal == "flow":
+    values = band_limit(values, stores[0].attrs["speed_hz"], params.bandwidth_hz)
+store.save(
+    xr.Dataset(
+        {"signal": (("state", "channel", "time"), values, signals[0].attrs)},
+        coords={
+            "state": [dataset.attrs["state"] for dataset in stores],
+            "channel": signals[0][signals[0].dims[0]].values,
+        },
+        attrs={key: stores[0].attrs[key] for key in ("speed_hz", "source")},
+    ),
+    snakemake.output[0],
+)
+tell(f"{len(stores)} states from {stores[0].attrs['source']}")

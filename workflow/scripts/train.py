@@ -1,0 +1,50 @@
+"""One network trained on every seed's samples; of recordings, the early windows."""
+
+import json
+from dataclasses import asdict
+
+import numpy as np
+import torch
+from job import start
+
+from rippletwin import store
+from rippletwin.dataset import split_by_time
+from rippletwin.networks import CLASSES, build
+from rippletwin.training import TrainingSettings, train
+
+tell = start(snakemake)
+params, paths = snakemake.params, snakemake.input.samples
+settings = TrainingSettings(**params.settings, threads=snakemake.threads)
+
+
+def samples(path):
+    """x and y of a store; a recorded cylinder fault has the severity that scoring gives it."""
+    data = store.load(path)
+    if "label" in data:
+        return data.signal.values, data.label.values
+    kept, _ = split_by_time(np.bincount(data.recording), params.share)
+    state = np.where(data.state == "C", params.cylinder, data.state)[kept]
+    return data.signal.values[kept], np.array([CLASSES.index(s) for s in state])
+
+
+weights, histories = [], []
+for seed in range(params.seeds):
+    x, y = samples(paths[min(seed, len(paths) - 1)])
+    network = build(snakemake.wildcards.architecture, channels=x.shape[1])
+    network, history = train(
+        network,
+        x,
+        y,
+        settings,
+        seed,
+        lambda epoch, so_far: print(f"epoch {epoch}: {so_far.validation_loss[-1]:.4f}"),
+    )
+    weights.append(network.state_dict())
+    histories.append(asdict(history))
+    tell(
+        f"seed {seed + 1} of {params.seeds}: {history.epochs} epochs, {history.reason}, "
+        f"validation accuracy {history.validation_accuracy[history.best_epoch]:.1%}"
+    )
+torch.save(weights, snakemake.output.weights)
+with open(snakemake.output.history, "w") as file:
+    json.dump(histories, file, indent=1)
