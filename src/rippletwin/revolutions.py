@@ -12,6 +12,7 @@ repeats every revolution: real speed fluctuation within a revolution stays in th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.fft import next_fast_len
@@ -23,6 +24,7 @@ FIRST_HARMONICS = 6
 HIGHEST_TRACKED_HZ = 5000.0
 ENOUGH = 20
 HALF_WIDTH, SHAPE = 24, 14.0  # of the interpolation kernel: 1e-6 up to 0.4 times the sampling rate
+FRACTIONS = 4096
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ def cut_revolutions(
         raise ValueError(f"{pressure.shape[1]} samples hold fewer than two whole revolutions")
     edges = time(first + np.arange(count + 1))
     speed = 1 / np.diff(edges)
-    cutoff = min(1.0, step * speed.min() / sampling_rate_hz)
+    cutoff = min(1.0, float(step * speed.min() / sampling_rate_hz))
     windows = np.empty((count, len(pressure), step))
     for r in range(count):
         angle = first + r + np.arange(step) / step
@@ -75,18 +77,33 @@ def cut_revolutions(
 def interpolate(signal: np.ndarray, position: np.ndarray, cutoff: float = 1.0) -> np.ndarray:
     """Band-limited values (S, P) of `signal` (S, N) at fractional sample numbers `position` (P,).
 
+    `cutoff` < 1 lowers the band to that share of Nyquist. Beyond its ends the signal is constant.
+    """
+    table, before = _kernel(cutoff)
+    base = np.floor(position).astype(int)
+    entry, share = np.divmod((position - base) * FRACTIONS, 1)
+    entry, share = entry.astype(int), share[:, None]
+    weight = table[entry] * (1 - share) + table[entry + 1] * share
+    first, last = base.min() - before, base.max() - before + table.shape[1]
+    near = signal[:, np.clip(np.arange(first, last), 0, signal.shape[1] - 1)]
+    taps = np.lib.stride_tricks.sliding_window_view(near, table.shape[1], axis=1)
+    return np.einsum("spt,pt->sp", taps[:, base - before - first], weight)
+
+
+@lru_cache(maxsize=4)
+def _kernel(cutoff: float) -> tuple[np.ndarray, int]:
+    """Weights (FRACTIONS + 1, taps) of the samples around a position at each fraction of a sample,
+    and the number of taps before it.
+
     A sinc windowed by exp(b (sqrt(1 - u^2) - 1)) (Barnett, Magland, af Klinteberg 2019, SIAM J.
-    Sci. Comput. 41, C479, eq. 1.8); `cutoff` < 1 lowers the band to that share of Nyquist.
+    Sci. Comput. 41, C479, eq. 1.8). Linear interpolation between 4096 entries errs by 1e-7.
     """
     half = HALF_WIDTH / cutoff
-    base = np.floor(position).astype(int)
-    taps = np.arange(-int(np.ceil(half)) + 1, int(np.ceil(half)) + 1)
-    distance = (position - base)[:, None] - taps
+    before = int(np.ceil(half)) - 1
+    distance = np.linspace(0, 1, FRACTIONS + 1)[:, None] - np.arange(-before, before + 2)
     shape = np.sqrt(np.maximum(1 - (distance / half) ** 2, 0.0))
     weight = np.sinc(cutoff * distance) * np.exp(SHAPE * (shape - 1)) * (np.abs(distance) < half)
-    weight /= weight.sum(axis=1, keepdims=True)  # a constant stays exactly constant
-    index = np.clip(base[:, None] + taps, 0, signal.shape[1] - 1)
-    return np.array([np.einsum("pt,pt->p", row[index], weight) for row in signal])
+    return weight / weight.sum(axis=1, keepdims=True), before  # a constant stays constant
 
 
 def _time_of_angle(

@@ -20,11 +20,12 @@ def save(dataset: xr.Dataset, path: str | Path, compressed: bool = True) -> None
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     scratch = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
-    encoding = {} if compressed else {name: {"compressors": None} for name in dataset.variables}
+    encoding = {} if compressed else {name: {"compressor": None} for name in dataset.variables}
     try:
-        # what a dataset read from another store remembers of its encoding is not this store's
+        # a dataset read from another store remembers that store's encoding; format 3 of zarr has no
+        # text arrays yet
         dataset.drop_encoding().to_zarr(
-            scratch / "new", mode="w", encoding=encoding, zarr_format=3, consolidated=False
+            scratch / "new", mode="w", encoding=encoding, zarr_format=2, consolidated=False
         )
         if path.exists():
             os.replace(path, scratch / "old")
