@@ -20,7 +20,7 @@ def save(dataset: xr.Dataset, path: str | Path, compressed: bool = True) -> None
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     scratch = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
-    encoding = {} if compressed else {name: {"compressor": None} for name in dataset.variables}
+    encoding = {} if compressed else {name: {"compressors": None} for name in dataset.variables}
     try:
         # a dataset read from another store remembers that store's encoding; format 3 of zarr has no
         # text arrays yet
