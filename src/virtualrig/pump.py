@@ -186,8 +186,10 @@ def step_chambers(stations, history, lead, chambers, ports, outlet_lead, outlet_
                 matrix[k, i] -= stations[k, 0] * tangent
         _eliminate(matrix)
         largest = 0.0
+        # a square-root orifice near zero drop sends Newton's method to and fro: halve every other step
+        damping = 0.5 if iteration > 4 and iteration % 2 == 1 else 1.0
         for i in range(n + 1):
-            x[i] += matrix[i, n + 1]
+            x[i] += damping * matrix[i, n + 1]
             largest = max(largest, abs(matrix[i, n + 1]))
         if largest < 1.0:
             return iteration + 1

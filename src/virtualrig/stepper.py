@@ -73,7 +73,7 @@ class State(NamedTuple):
     flow_drive: np.ndarray  # (3, n, E)
     node_pressure: np.ndarray  # (nodes,)
     node: np.ndarray  # (3, NODE_STATES, nodes)
-    chamber: np.ndarray  # (3, pistons)
+    chamber: np.ndarray  # (3, 1, pistons)
 
 
 @njit(cache=True, fastmath=True)
@@ -168,6 +168,15 @@ def _advance(line, state, now, back, old, dt):
                     s = state.strain
                     bent = 3 * s[now, i, e] - 1.5 * s[back, i, e] + third * s[old, i, e]
                     s[old, i, e] = (bent + pull * state.pressure[old, i, e]) / (11 / 6 + pull)
+
+
+@njit(cache=True, fastmath=True)
+def _history(past, back, older, oldest, dt, out):
+    """What BDF3 takes from the last three of (3, rows, columns) states: lead x - out = dx/dt."""
+    for r in range(out.shape[0]):
+        for c in range(out.shape[1]):
+            total = 3 * past[back, r, c] - 1.5 * past[older, r, c] + past[oldest, r, c] / 3
+            out[r, c] = total / dt
 
 
 @njit(cache=True)
@@ -276,7 +285,7 @@ def run(line, nodes, chambers, ports, source, crank, state, phase, steps, every,
     flux_p, flux_q = np.zeros((2, elements)), np.zeros((2, elements))
     wave_in, wave_lead = np.zeros(n_nodes), np.zeros(n_nodes)
     history = np.zeros((NODE_STATES, n_nodes))
-    chamber_history = np.zeros(pistons)
+    chamber_history = np.zeros((1, pistons))
     x = np.zeros(pistons + 1)
     matrix = np.zeros((pistons + 1, pistons + 2))
     stations = np.zeros((pistons, 4))
@@ -288,24 +297,24 @@ def run(line, nodes, chambers, ports, source, crank, state, phase, steps, every,
         _meet(line, state, now, flux_p, flux_q, wave_in, wave_lead)
         turn = speed * (phase * dt)
         angle, rate = turn, 1.0
-        for order, amplitude, shift in ripple:
+        for term in range(len(ripple)):
+            order, amplitude, shift = ripple[term]
             angle += amplitude / order * np.sin(order * turn + shift)
             rate += amplitude * np.cos(order * turn + shift)
         place = turn / (2 * np.pi) % 1.0 * len(source)
         low = int(place) % len(source)
         share = place - int(place)
         given = source[low] * (1 - share) + source[(low + 1) % len(source)] * share
-        past = state.node
-        history[:] = (3 * past[back] - 1.5 * past[older] + past[now] / 3) / dt
+        _history(state.node, back, older, now, dt, history)
         if pistons > 0:
-            past = state.chamber
-            chamber_history[:] = (3 * past[back] - 1.5 * past[older] + past[now] / 3) / dt
-            x[:pistons] = 2 * past[back] - past[older]
+            _history(state.chamber, back, older, now, dt, chamber_history)
+            for i in range(pistons):
+                x[i] = 2 * state.chamber[back, 0, i] - state.chamber[older, 0, i]
             x[pistons] = state.node_pressure[0]
             stations_at(angle, speed * rate, chambers, ports, stations)
             used = step_chambers(
                 stations,
-                chamber_history,
+                chamber_history[0],
                 lead,
                 chambers,
                 ports,
@@ -315,7 +324,8 @@ def run(line, nodes, chambers, ports, source, crank, state, phase, steps, every,
                 matrix,
             )
             newton = max(newton, used)
-            state.chamber[now] = x[:pistons]
+            for i in range(pistons):
+                state.chamber[now, 0, i] = x[i]
             state.node_pressure[0] = x[pistons]
             state.node[now, STORED, 0] = nodes[0, VOLUME] * x[pistons]
         for node in range(1 if pistons > 0 else 0, n_nodes):
