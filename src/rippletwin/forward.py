@@ -76,6 +76,10 @@ class Forward:
                 for p, o, n in zip(points, self.observations, sizes)
             ]
         )
+        self.source_admittance = np.zeros(len(self.s), complex)
+        for point, part in zip(points, self.slices):
+            if point.ripple is not None:
+                self.source_admittance[part] = point.ripple.source_admittance(self.s[part])
         self.angle_index = [twin.index.get(f"angle[{o.label}]") for o in self.observations]
         self.back_pressure = rig.load.back_pressure
         self.load_impedance = None
@@ -132,6 +136,7 @@ class Forward:
             series=series,
             shunt=shunt,
             source_flow=source,
+            source_admittance=self.source_admittance,
             load=self._load(v.load),
             sensor_positions=v.positions,
         )

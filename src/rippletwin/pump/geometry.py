@@ -27,7 +27,7 @@ class Geometry:
     air_fraction: float = 5e-4  # undissolved air, volume at ATMOSPHERE over liquid volume
     port_area: float = 1.2e-4  # of a fully open port, m2
     port_opening_deg: float = 30.0  # from closed to fully open
-    port_overlap_deg: float = 5.0  # both ports closed for so long after each dead centre
+    port_overlap_deg: float = 5.0  # both ports closed for so long, half before each dead centre
     discharge_coefficient: float = 0.65
     case_leakage: float = 3e-13  # laminar, of a chamber, m3/s/Pa
     suction_pressure: float = 1e5  # absolute, also that of the case, Pa
@@ -69,7 +69,7 @@ class Geometry:
         return -0.5 * self.stroke_volume * np.sin(phi)
 
     def delivery_area(self, phi: np.ndarray) -> np.ndarray:
-        """Area of the delivery port at angle `phi` (rad), m2: open from overlap to 180 degrees."""
+        """Area of the delivery port at angle `phi` (rad), m2: open between the dead centres."""
         return self.port_area * self._opening(phi)
 
     def suction_area(self, phi: np.ndarray) -> np.ndarray:
@@ -82,8 +82,9 @@ class Geometry:
         (Edge & Darling 1989, J. Dyn. Sys. Meas. Control 111, 307, found such grooves best.)
         """
         phi = np.degrees(phi) % 360.0
-        rising = np.clip((phi - self.port_overlap_deg) / self.port_opening_deg, 0.0, 1.0)
-        falling = np.clip((180.0 - phi) / self.port_opening_deg, 0.0, 1.0)
+        shut = self.port_overlap_deg / 2
+        rising = np.clip((phi - shut) / self.port_opening_deg, 0.0, 1.0)
+        falling = np.clip((180.0 - shut - phi) / self.port_opening_deg, 0.0, 1.0)
         return _smooth(rising) * _smooth(falling)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from rippletwin.case.model import FlowRipple, Fluid, Segment
 from rippletwin.pump import chambers
 from rippletwin.pump.geometry import Geometry
+from rippletwin.pump.source import source_admittance
 
 MIN_STEPS = 12288  # a revolution: the ripple moves by far less than 1 % when they are doubled
 MAX_REVOLUTIONS = 80
@@ -68,7 +69,7 @@ class PumpRipple(FlowRipple):
     outlet_pressure (M,), chamber_pressure (pistons, M), sensor_pressure (S, M), all Pa.
     `converged` tells whether the solution is periodic: `change`, from the last revolution but
     one to the last relative to the ripple's rms, is within the tolerance after `revolutions`.
-    `orifice` is K_v of the pipe's load.
+    `orifice` is K_v of the pipe's load, None at a constant pressure.
     """
 
     outlet_pressure: np.ndarray | None = None
@@ -78,6 +79,19 @@ class PumpRipple(FlowRipple):
     change: float = np.nan
     revolutions: int = 0
     orifice: float | None = None
+    geometry: Geometry | None = None
+    density: float | None = None
+
+    def source_admittance(self, s: np.ndarray) -> np.ndarray:
+        """Admittance (F,), m3/s/Pa, that the chambers add beside the flow into a constant pressure.
+
+        Zero for a ripple coupled to a pipe, whose flow has already answered a line.
+        """
+        if self.orifice is not None:
+            return super().source_admittance(s)
+        return source_admittance(
+            self.geometry, self.density, self.pressure_mean, self.chamber_pressure, s
+        )
 
 
 def simulate(
@@ -144,6 +158,8 @@ def simulate(
         change=float(change),
         revolutions=revolutions,
         orifice=float(line[2]) if cells else None,
+        geometry=geometry,
+        density=fluid.density,
     )
 
 
