@@ -19,6 +19,7 @@ def propagate(
     healthy_flow: np.ndarray,
     speed_hz: float,
     load_pressure: float,
+    source_capacitance: float = 0.0,
     steps: int = 12288,
     tolerance: float = 1e-6,
 ) -> moc.Transient:
@@ -30,6 +31,7 @@ def propagate(
     flow, healthy_flow : (M,) m3/s at the pump outlet over one revolution, of the pump to simulate
         and of the healthy one, whose mean settles the orifice that a faulty pump also meets.
     speed_hz, load_pressure : rev/s, and Pa upstream of the load when the pump is healthy.
+    source_capacitance : m3/Pa of the chambers beside an ideal source, see `pump.source`.
     steps : at least so many a revolution.
 
     Returns the `Transient` with M samples a revolution. The load factor of the twin scales orifice
@@ -64,6 +66,7 @@ def propagate(
         viscosity=rig.fluid.kinematic_viscosity,
         friction=twin.friction,
         positions=[sensor.position for sensor in rig.sensors],
+        shunts=[moc.Shunt(0.0, capacitance=source_capacitance)] if source_capacitance else [],
         periods=PERIODS,
         tolerance=tolerance,
     )

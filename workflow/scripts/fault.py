@@ -3,12 +3,12 @@
 from pathlib import Path
 
 import xarray as xr
-from job import start
 
+from job import start
 from rippletwin import store
 from rippletwin.case import load_case
 from rippletwin.case.model import Segment
-from rippletwin.pump import Cylinder, Pipe, Slipper, simulate
+from rippletwin.pump import ConstantPressure, Cylinder, Pipe, Slipper, simulate
 
 tell = start(snakemake)
 params, state = snakemake.params, snakemake.wildcards.state
@@ -19,27 +19,26 @@ pipe = Segment(params.pipe_length, first.diameter, first.wave_speed)
 positions = tuple(sensor.position for sensor in rig.sensors)
 
 
-def ripple(load, fault=None):
-    return simulate(
-        rig.pump,
-        rig.fluid,
-        60 * recorded.speed_hz,
-        Pipe(pipe, positions, **load),
-        fault,
-        recorded.sizes["time"],
-    )
+def ripple(outlet, fault=None):
+    speed_rpm, samples = 60 * recorded.speed_hz, recorded.sizes["time"]
+    return simulate(rig.pump, rig.fluid, speed_rpm, outlet, fault, samples)
 
 
+fault = {"H": None, "S": Slipper}.get(state, Cylinder)
+fault = fault and fault(params.leak_area)
 # A faulty pump meets the orifice that the healthy one left.
-result = healthy = ripple({"load_pressure": recorded.load_pressure})
-if state != "H":
-    kind = Slipper if state == "S" else Cylinder
-    result = ripple({"orifice": healthy.orifice}, kind(params.leak_area))
+result = healthy = ripple(Pipe(pipe, positions, load_pressure=recorded.load_pressure))
+if fault:
+    result = ripple(Pipe(pipe, positions, orifice=healthy.orifice), fault)
+# What any line can be driven with: the flow into a constant pressure, and the chambers beside it.
+source = ripple(ConstantPressure(recorded.load_pressure), fault)
+pumping_hz = rig.pump["pistons"] * recorded.speed_hz
 tell(f"mean flow {result.flow.mean():.4g} m3/s, periodic to {result.change:.1g}")
 store.save(
     xr.Dataset(
         {
             "flow": (("channel_q", "time"), result.flow[None], {"units": "m3/s"}),
+            "source_flow": ("time", source.flow, {"units": "m3/s"}),
             "pressure": (("channel", "time"), result.sensor_pressure, {"units": "Pa"}),
         },
         coords={
@@ -51,7 +50,7 @@ store.save(
             "state": state,
             "speed_hz": recorded.speed_hz,
             "leak_area_m2": params.leak_area,
-            "pressure_mean": result.pressure_mean,
+            "source_capacitance_m3_pa": source.source_capacitance(pumping_hz),
             "source": f"lumped pump model and an uncalibrated pipe of {params.pipe_length} m",
         },
     ),

@@ -1,8 +1,8 @@
 """Pressure at the sensors of the calibrated line, driven by the pump in one state."""
 
 import xarray as xr
-from job import start
 
+from job import start
 from rippletwin import store
 from rippletwin.propagation import propagate
 from rippletwin.report import load_twin
@@ -13,10 +13,11 @@ recorded = store.load(snakemake.input.recordings)
 fault, healthy = store.load(snakemake.input.flow), store.load(snakemake.input.healthy)
 result = propagate(
     load_twin(snakemake.input.twin),
-    fault.flow[0].values,
-    healthy.flow[0].values,
+    fault.source_flow.values,
+    healthy.source_flow.values,
     recorded.speed_hz,
     recorded.load_pressure,
+    fault.source_capacitance_m3_pa,
     params.steps,
     params.tolerance,
 )

@@ -93,6 +93,14 @@ class PumpRipple(FlowRipple):
             self.geometry, self.density, self.pressure_mean, self.chamber_pressure, s
         )
 
+    def source_capacitance(self, frequency_hz: float) -> float:
+        """The same as a capacitance in m3/Pa, at the pumping frequency, say: Im Y/w.
+
+        Its real part, the ports' loss, is some per cent of it up to ten times that frequency.
+        """
+        s = np.array([2j * np.pi * frequency_hz])
+        return float(self.source_admittance(s)[0].imag / s[0].imag)
+
 
 def simulate(
     pump: dict,
