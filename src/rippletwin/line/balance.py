@@ -34,7 +34,7 @@ class Balance:
     pressure, flow   (F,) Pa and m3/s at the load
     mean_flow        m3/s, and `coefficient` m3/s/sqrt(Pa) of the orifice (1 for another law)
     residual         |a P + b Q - c| over |c|, both in units of pressure
-    passes           evaluations of the law
+    passes           evaluations of the law or its slope operator
     converged        whether `residual` fell below the tolerance
     """
 
@@ -73,8 +73,8 @@ def balance_orifice(
     Give the `mean_pressure` at the load (Pa) and either K (`coefficient`, m3/s/sqrt(Pa)) or the
     `mean_flow` (m3/s) that it lets through, ripple included. `orders` (F,) are the whole numbers
     that `network.s` is multiples of; by default 1..F. Orders that are not there carry no pressure.
-    With few `passes` it is the cheap variant: 1 leaves the error of the linearised orifice times
-    about the relative ripple, 2 that times the ripple again; see docs/line.md.
+    At most `passes` corrections are made; 0 is the linearised orifice, 2 enough inside a fit
+    (docs/line.md has the errors).
 
     Afterwards `network.load` is ("state", (p, q)), so that its answers hold at full amplitude.
     Raises ValueError where not exactly one of K and mean flow is given, the mean drop is not
@@ -116,28 +116,30 @@ def balance(
     _, slope = law(np.zeros(1))
     diagonal = a + b * slope[0]
     size = np.linalg.norm(c / diagonal)
-    p = c / diagonal
-    last, done = np.inf, 0
-    while True:
+    p = base = c / diagonal
+    step, last, inner = np.zeros_like(p), np.inf, 0
+    for done in range(passes + 1):
         flow, slope = law(grid.wave(p))
         q = grid.harmonics(flow)
-        done += 1
-        residual = a * p + b * q - c
-        step = residual / diagonal
-        error = float(np.linalg.norm(step) / size) if size else 0.0
-        if error < tolerance or done > passes:
+        residual = (a * p + b * q - c) / diagonal
+        error = float(np.linalg.norm(residual) / size) if size else 0.0
+        if error < tolerance or done == passes:
             break
-        if done > 2 and error > 0.3 * last:
-            step, inner = _newton_step(residual, a, b, slope, diagonal, grid)
-            done += inner
-        last = error
-        p = p - step
+        if error > last:  # too far: the law bends more than its slope said
+            step = 0.5 * step
+        else:
+            slow = done > 1 and error > 0.3 * last
+            base, last, step = p, error, residual
+            if slow:
+                step, count = _newton_step(residual, a, b, slope, diagonal, grid)
+                inner += count
+        p = base - step
     network.load = "state", (p, q)
-    return Balance(p, q, float(np.mean(flow)), 1.0, error, done, error < tolerance)
+    return Balance(p, q, float(np.mean(flow)), 1.0, error, done + 1 + inner, error < tolerance)
 
 
 def _newton_step(residual, a, b, slope, diagonal, grid):
-    """Solve (a + b G) step = residual, G the law's slope as an operator on harmonics.
+    """Solve (a + b G) step = diagonal residual, G the law's slope as an operator on harmonics.
 
     G maps a harmonic and its conjugate, so the unknowns are real and imaginary parts.
     """
@@ -152,7 +154,7 @@ def _newton_step(residual, a, b, slope, diagonal, grid):
 
     size = 2 * len(residual)
     operator = LinearOperator((size, size), matvec=apply, dtype=float)
-    step, _ = gmres(operator, (residual / diagonal).view(float), rtol=1e-3, maxiter=3, restart=30)
+    step, _ = gmres(operator, residual.view(float), rtol=1e-3, maxiter=3, restart=30)
     return step.view(complex), count
 
 
