@@ -32,6 +32,11 @@ class Architecture:
     padding: int  # on either side; circular on time windows (one revolution is a period)
     blocks: tuple[int, ...] = ()  # residual blocks in each stage; none: the plain network
 
+    @property
+    def silence(self) -> float:
+        """What an input without any ripple reads: 0 in time, exp(0) in an image."""
+        return 1.0 if self.domain == "image" else 0.0
+
 
 # 1D: 1536 is half a revolution on either side, the one padding that gives the table's (64, 59) for
 # kernel 341, stride 100 and 3072 points; 150@50 gives (64, 59) without any.
@@ -63,7 +68,8 @@ class Classifier(nn.Module):
     """Feature maps, global average pooling, one linear layer: logits (n, classes).
 
     ``scale`` is the only standardisation there is: one number for all samples, channels and times
-    (amplitude is the diagnosis). Training sets it to the root mean square of its inputs.
+    (amplitude is the diagnosis). Training sets it to the root mean square of its inputs' distance
+    from silence, which is taken off first: then zero padding is silence, in images too.
     """
 
     def __init__(self, architecture: Architecture, channels: int, classes: int):
@@ -79,7 +85,8 @@ class Classifier(nn.Module):
         """x (n, channels, M) or (n, channels, size, size) in the data's own unit -> (n, classes)"""
         if self.architecture.domain == "time":
             x = x.unsqueeze(-2)
-        x = (x / self.scale).contiguous(memory_format=torch.channels_last)
+        x = (x - self.architecture.silence) / self.scale
+        x = x.contiguous(memory_format=torch.channels_last)
         return self.head(self.pool(self.features(x)).flatten(1))
 
 

@@ -1,10 +1,11 @@
 """Training to a stated convergence rule, and prediction.
 
-A training has **converged** when the loss on its validation split (samples of the same simulation,
-never a recording) has either stayed below ``target_loss`` for ``patience`` epochs in a row, or
-not fallen by ``min_improvement`` (relative) for ``plateau`` epochs. The weights of the epoch with
-the lowest validation loss are kept. A training that reaches ``max_epochs`` first is reported as not
-converged.
+A training stops when the loss on its validation split (samples of the same simulation, never a
+recording) has either stayed below ``target_loss`` for ``patience`` epochs in a row ("target"), or
+not fallen by ``min_improvement`` (relative) for ``plateau`` epochs ("plateau"), or after
+``max_epochs``. It has **converged** in the first case, and in the second where it has learned
+something: its lowest loss is below half of what guessing costs. The weights of the epoch with the
+lowest validation loss are kept.
 """
 
 from __future__ import annotations
@@ -67,8 +68,8 @@ def train(
 
     x : (n, channels, M) or (n, channels, size, size); y : (n,) class indices.
     The network's weights are drawn anew from ``seed``; ``network.scale`` becomes the root mean
-    square of the training part of x. progress(epoch, history) is called after every epoch.
-    Sets torch's thread count to ``settings.threads``. Raises ValueError where a class has no
+    square of the training part of x about silence. progress(epoch, history) is called after every
+    epoch. Sets torch's thread count to ``settings.threads``. Raises ValueError where a class has no
     sample in one of the two parts.
     """
     torch.set_num_threads(settings.threads)
@@ -76,7 +77,8 @@ def train(
     fit, held = stratified_split(y, settings.validation_fraction, rng)
     images, labels = torch.as_tensor(x, dtype=torch.float32), torch.as_tensor(y)
     initialise(network, seed)
-    network.scale.fill_(float(images[fit].double().square().mean().sqrt()) or 1.0)
+    ripple = images[fit] - network.architecture.silence
+    network.scale.fill_(float(ripple.square().mean().sqrt()) or 1.0)
     optimiser = torch.optim.Adam(network.parameters(), lr=settings.learning_rate, fused=True)
     history, best = History(), None
 
@@ -106,7 +108,9 @@ def train(
             progress(epoch, history)
         reason = stopping_reason(history.validation_loss, settings)
         if reason:
-            history.converged, history.reason = True, reason
+            guessing = np.log(len(np.unique(y)))
+            learned = history.validation_loss[history.best_epoch] < guessing / 2
+            history.converged, history.reason = reason == "target" or learned, reason
             break
 
     network.load_state_dict(best)
