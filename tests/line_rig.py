@@ -39,10 +39,10 @@ def network(s, pipes=PIPES, friction="unsteady", viscosity=VISCOSITY, **options)
     return Network(s=s, lengths=lengths, series=series, shunt=shunt, **options)
 
 
-def ripple(orders, mean=MEAN_FLOW, depth=0.01, corner_hz=1000.0, base_hz=PUMPING_HZ):
+def ripple(orders, mean=MEAN_FLOW, depth=0.05, corner_hz=1000.0, base_hz=PUMPING_HZ):
     """A pump-like flow ripple: peak amplitudes (F,) at `orders`, falling as 1/f^2 above a corner.
 
-    depth 0.01 is about 0.26 MPa rms at the outlet of the paper's pipe.
+    depth 0.05 is about 0.26 MPa rms at the first sensor of the paper's pipe.
     """
     k = np.asarray(orders)
     return depth * mean * np.exp(1j * k) / (1 + 1j * k * base_hz / corner_hz) ** 2

@@ -20,7 +20,7 @@ ORDERS = np.arange(1, 35)
 S = 2j * np.pi * PUMPING_HZ * ORDERS
 
 
-def driven(depth=0.01, s=S, orders=ORDERS, **options):
+def driven(depth=0.05, s=S, orders=ORDERS, **options):
     return network(s, sensor_positions=SENSORS, source_flow=ripple(orders, depth=depth), **options)
 
 

@@ -94,7 +94,7 @@ def test_steady_flow_loses_hagen_poiseuille():
     assert np.allclose(moc.pressure[1], MEAN_PRESSURE, rtol=1e-12)
 
 
-def against_balance(friction, steps, orders=ORDERS, depth=0.01):
+def against_balance(friction, steps, orders=ORDERS, depth=0.05):
     """The paper's line, full-amplitude orifice, both ways: (S, F) of each."""
     s = 2j * np.pi * PUMPING_HZ * orders
     positions = [*SENSORS, sum(p.length for p in PIPES)]

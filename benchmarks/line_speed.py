@@ -1,0 +1,114 @@
+"""How fast the line is solved, in one run on one thread: exact periodic solution against MOC.
+
+    python benchmarks/line_speed.py
+
+Times are processor seconds, the best of several. Only ratios within one run mean anything on a
+shared machine.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from rippletwin.line.balance import balance_orifice
+from rippletwin.line.chain import Network
+from rippletwin.line.moc import End, Pipe, simulate
+from rippletwin.line.segment import series_impedance, shunt_admittance
+
+DENSITY, VISCOSITY = 870.0, 3.2e-5
+PIPES = (
+    Pipe(5.953, 19.71e-3, 1022.9),
+    Pipe(1.144, 23.07e-3, 982.7),
+    Pipe(1.675, 14.86e-3, 1308.4),
+)
+SENSORS = (0.4167, 2.5895, 8.0)
+MEAN_PRESSURE, MEAN_FLOW, SHAFT_HZ, PISTONS = 9.484e6, 0.7e-3, 1000 / 60, 9
+STEPS = 3072  # a revolution: 51.2 kHz
+
+
+def best(task, repeats: int) -> float:
+    """Least processor time of `repeats` calls, s, after one that compiles."""
+    task()
+    times = []
+    for _ in range(repeats):
+        start = time.process_time()
+        task()
+        times.append(time.process_time() - start)
+    return min(times)
+
+
+def network(orders: np.ndarray, friction: str = "unsteady") -> Network:
+    """The paper's line with a nine-piston ripple at shaft `orders`."""
+    s = 2j * np.pi * SHAFT_HZ * orders
+    diameter = np.array([p.diameter for p in PIPES])[:, None]
+    speed = np.array([p.wave_speed for p in PIPES])[:, None]
+    flow = 0.05 * MEAN_FLOW * np.exp(1j * orders) / (1 + s / 6000) ** 2 * (orders % PISTONS == 0)
+    return Network(
+        s=s,
+        lengths=np.array([p.length for p in PIPES]),
+        series=series_impedance(
+            s, density=DENSITY, viscosity=VISCOSITY, diameter=diameter, friction=friction
+        ),
+        shunt=shunt_admittance(s, density=DENSITY, wave_speed=speed, diameter=diameter),
+        source_flow=flow,
+        load=("admittance", MEAN_FLOW / (2 * MEAN_PRESSURE) + 0 * s),
+        sensor_positions=SENSORS,
+    )
+
+
+def solve(orders: np.ndarray) -> None:
+    """Friction, orifice and sensors from scratch."""
+    net = network(orders)
+    balance_orifice(net, mean_pressure=MEAN_PRESSURE, mean_flow=MEAN_FLOW, orders=orders)
+    net.readings()
+
+
+def revolution(friction: str, steps: int, periods: int = 1):
+    """`periods` revolutions of the method of characteristics, or until it is periodic."""
+    orders = np.arange(1, STEPS // 2)
+    spectrum = np.zeros(steps // 2 + 1, complex)
+    spectrum[orders] = network(orders).source_flow * steps / 2
+    spectrum[0] = MEAN_FLOW * steps
+    return simulate(
+        PIPES,
+        np.fft.irfft(spectrum, steps),
+        1 / SHAFT_HZ,
+        End("orifice", 0.0, MEAN_FLOW / np.sqrt(MEAN_PRESSURE)),
+        density=DENSITY,
+        viscosity=VISCOSITY,
+        friction=friction,
+        positions=SENSORS,
+        periods=periods,
+        tolerance=1e-4,
+    )
+
+
+def main() -> None:
+    piston, shaft = PISTONS * np.arange(1, 35), np.arange(1, STEPS // 2 + 1)
+    eighty = network(np.arange(1, 81) * PISTONS)
+    print("frequency domain, ms")
+    for name, task in (
+        ("sensors of a given network, 80 frequencies", eighty.readings),
+        ("network and sensors, 80 frequencies", lambda: network(piston[0] * shaft[:80]).readings()),
+        ("whole solution with orifice, 34 piston orders", lambda: solve(piston)),
+        ("whole solution with orifice, 1536 shaft orders", lambda: solve(shaft)),
+    ):
+        print(f"  {name:50s}{1e3 * best(task, 50):10.3f}")
+    exact = best(lambda: solve(shaft), 50)
+    print("method of characteristics: node-steps a second, and time over the 1536-order solution")
+    for friction in ("steady", "unsteady"):
+        for steps in (STEPS, 4 * STEPS):
+            nodes = sum(p.length / p.wave_speed for p in PIPES) * SHAFT_HZ * steps
+            one = best(lambda f=friction, n=steps: revolution(f, n), 3)
+            run = revolution(friction, steps, periods=60)
+            print(
+                f"  {friction:9s}{steps * SHAFT_HZ / 1e3:6.1f} kHz {nodes * steps / one:10.2e} 1/s"
+                f"   {run.periods:3d} revolutions to change {run.change:.0e}"
+                f"   {run.periods * one / exact:8.0f} times"
+            )
+
+
+if __name__ == "__main__":
+    main()
