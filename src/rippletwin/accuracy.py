@@ -110,7 +110,7 @@ def accuracy_table(rows: pd.DataFrame, paper: pd.DataFrame, column: str = "accur
     known = list(dict.fromkeys(paper["dataset"]))
     ran = list(dict.fromkeys(rows["dataset"]))
     extra = [d for d in ran if d not in known]
-    simulated = [d for d in known if d != "Experimental"]
+    simulated = [d for d in known if d != "experimental"]
     datasets = simulated + extra + [d for d in known if d not in simulated]
 
     lines = [
