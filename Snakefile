@@ -7,6 +7,10 @@ min_version("9.0")
 configfile: "config/config.yaml"
 
 
+# Used with --sdm apptainer only: apptainer build rippletwin.sif workflow/rippletwin.def
+container: "rippletwin.sif"
+
+
 validate(config, "workflow/schemas/config.schema.yaml")
 
 

@@ -6,20 +6,18 @@ rule augment:
         source=library("augment.py"),
     output:
         temp(directory(f"{RESULTS}/samples/{{dataset}}/{{seed}}x{{revolutions}}.zarr")),
+    log:
+        f"{RESULTS}/logs/augment/{{dataset}}/{{seed}}x{{revolutions}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/augment/{{dataset}}/{{seed}}x{{revolutions}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=2000,
     params:
         samples_per_class=lambda wildcards: config["samples_per_class"][
             "time" if wildcards.revolutions == "1" else "image"
         ],
         noise=config["noise"]["factor"],
-    log:
-        f"{RESULTS}/logs/augment/{{dataset}}/{{seed}}x{{revolutions}}.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/augment/{{dataset}}/{{seed}}x{{revolutions}}.tsv"
-    conda:
-        ENVIRONMENT
-    threads: 1
-    resources:
-        mem_mb=2000,
     script:
         "../scripts/augment.py"
 
@@ -34,8 +32,6 @@ rule pair:
         f"{RESULTS}/logs/pair/{{dataset}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/pair/{{dataset}}.tsv"
-    conda:
-        ENVIRONMENT
     threads: 1
     resources:
         mem_mb=1000,

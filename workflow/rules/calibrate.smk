@@ -8,19 +8,17 @@ rule calibrate:
         twin=f"{RESULTS}/calibration/twin.json",
         report=f"{RESULTS}/calibration/report.md",
         ripples=directory(f"{RESULTS}/calibration/ripples.zarr"),
-    params:
-        method=config["calibration"]["method"],
-        friction=config["calibration"]["friction"],
-        max_frequency_hz=config["calibration"]["max_frequency_hz"],
     log:
         f"{RESULTS}/logs/calibrate.log",
     benchmark:
         f"{RESULTS}/benchmarks/calibrate.tsv"
-    conda:
-        ENVIRONMENT
     threads: 1
     resources:
         mem_mb=2000,
+    params:
+        method=config["calibration"]["method"],
+        friction=config["calibration"]["friction"],
+        max_frequency_hz=config["calibration"]["max_frequency_hz"],
     script:
         "../scripts/calibrate.py"
 
@@ -40,8 +38,6 @@ rule plot_calibration:
         f"{RESULTS}/logs/plot_calibration.log",
     benchmark:
         f"{RESULTS}/benchmarks/plot_calibration.tsv"
-    conda:
-        ENVIRONMENT
     threads: 1
     resources:
         mem_mb=1000,

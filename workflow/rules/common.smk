@@ -9,7 +9,6 @@ ROOT = Path(workflow.basedir)
 SOURCE = ROOT / "src"
 SCRIPTS = ROOT / "workflow" / "scripts"
 RESULTS = config["results"]
-ENVIRONMENT = "rippletwin"  # a conda environment made from environment.txt; used with --sdm conda
 
 # numba does not follow `threads:`.
 os.environ.setdefault("NUMBA_NUM_THREADS", "1")
@@ -35,7 +34,11 @@ def recordings():
     named = [
         name
         for entry in entries
-        for name in (entry.get("file"), entry.get("flow_ripple"), *entry.get("repeats", ()))
+        for name in (
+            entry.get("file"),
+            entry.get("flow_ripple"),
+            *entry.get("repeats", ()),
+        )
         if name
     ]
     return sorted({f"{CASE}/{name}" for name in named})
@@ -60,7 +63,14 @@ STATES = ["H", "S", "C1", "C2"]
 EXPERIMENTAL = "experimental"  # the dataset that learns from recordings
 SEEDS = range(config["seeds"])
 # Longest first, as measured; see benchmarks/ of a run.
-SLOWEST = ["resnet34_2d", "resnet18_2d", "cnn2d_30_3", "cnn1d_3_1", "cnn2d_3_1", "resnet34_1d"]
+SLOWEST = [
+    "resnet34_2d",
+    "resnet18_2d",
+    "cnn2d_30_3",
+    "cnn1d_3_1",
+    "cnn2d_3_1",
+    "resnet34_1d",
+]
 
 
 wildcard_constraints:

@@ -6,17 +6,15 @@ rule evaluate:
         source=library("evaluate.py"),
     output:
         f"{RESULTS}/predictions/{{dataset}}/{{architecture}}.csv",
-    params:
-        share=config["experimental"]["training_share"],
     log:
         f"{RESULTS}/logs/evaluate/{{dataset}}/{{architecture}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/evaluate/{{dataset}}/{{architecture}}.tsv"
-    conda:
-        ENVIRONMENT
-    threads: 1
     priority: 30
+    threads: 1
     resources:
         mem_mb=2000,
+    params:
+        share=config["experimental"]["training_share"],
     script:
         "../scripts/evaluate.py"

@@ -2,22 +2,22 @@
 rule fault:
     input:
         rig=ancient(RIG),
-        recordings=rules.ingest.output,
+        recordings=rules.ingest.output.windows,
         source=library("fault.py"),
     output:
         directory(f"{RESULTS}/faults/{{state}}.zarr"),
-    params:
-        rig=rig("fluid", "pump", "line", "sensors"),
-        leak_area=lambda wildcards: config["faults"]["leak_area"].get(wildcards.state, 0.0),
-        pipe_length=config["faults"]["pipe_length"],
     log:
         f"{RESULTS}/logs/fault/{{state}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/fault/{{state}}.tsv"
-    conda:
-        ENVIRONMENT
     threads: 1
     resources:
         mem_mb=1000,
+    params:
+        rig=rig("fluid", "pump", "line", "sensors"),
+        leak_area=lambda wildcards: config["faults"]["leak_area"].get(
+            wildcards.state, 0.0
+        ),
+        pipe_length=config["faults"]["pipe_length"],
     script:
         "../scripts/fault.py"

@@ -7,20 +7,18 @@ rule image:
         source=library("image.py"),
     output:
         temp(directory(f"{RESULTS}/images/{{dataset}}/{{windows}}.zarr")),
+    log:
+        f"{RESULTS}/logs/image/{{dataset}}/{{windows}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/image/{{dataset}}/{{windows}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=4000,
     params:
         size=config["sst"]["size"],
         min_frequency_hz=config["sst"]["min_frequency_hz"],
         max_frequency_hz=config["sst"]["max_frequency_hz"],
         voices=config["sst"]["voices"],
         k=config["sst"]["k"],
-    log:
-        f"{RESULTS}/logs/image/{{dataset}}/{{windows}}.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/image/{{dataset}}/{{windows}}.tsv"
-    conda:
-        ENVIRONMENT
-    threads: 1
-    resources:
-        mem_mb=4000,
     script:
         "../scripts/image.py"

@@ -7,19 +7,17 @@ if RECORDED_HERE:
         output:
             rig=RIG,
             recordings=directory(f"{CASE}/recordings"),
-        params:
-            case=subpath(output.rig, parent=True),
-            points=config["virtualrig"]["points"],
-            seed=config["virtualrig"]["seed"],
         log:
             f"{RESULTS}/logs/record.log",
         benchmark:
             f"{RESULTS}/benchmarks/record.tsv"
-        conda:
-            ENVIRONMENT
         threads: 1
         resources:
             mem_mb=2000,
+        params:
+            case=subpath(output.rig, parent=True),
+            points=config["virtualrig"]["points"],
+            seed=config["virtualrig"]["seed"],
         shell:
             "virtualrig record --out {params.case} --points {params.points} --seed {params.seed}"
             " > {log} 2>&1"
@@ -31,19 +29,17 @@ rule ingest:
         recordings=recordings(),
         source=library("ingest.py"),
     output:
-        directory(f"{RESULTS}/recordings/pressure.zarr"),
-    params:
-        rig=rig("pump", "sensors", "recordings"),
-        windows=config["windows"]["per_recording"],
-        samples=config["windows"]["samples_per_revolution"],
+        windows=directory(f"{RESULTS}/recordings/pressure.zarr"),
     log:
         f"{RESULTS}/logs/ingest.log",
     benchmark:
         f"{RESULTS}/benchmarks/ingest.tsv"
-    conda:
-        ENVIRONMENT
     threads: 1
     resources:
         mem_mb=2000,
+    params:
+        rig=rig("pump", "sensors", "recordings"),
+        windows=config["windows"]["per_recording"],
+        samples=config["windows"]["samples_per_revolution"],
     script:
         "../scripts/ingest.py"

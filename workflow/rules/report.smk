@@ -20,6 +20,13 @@ rule report:
             caption="../report/accuracy.rst",
         ),
         page=f"{RESULTS}/accuracy.md",
+    log:
+        f"{RESULTS}/logs/report.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/report.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
     params:
         severity=config["scoring"],
         recordings="the virtual rig's" if RECORDED_HERE else f"those of {CASE}",
@@ -28,15 +35,6 @@ rule report:
             for dataset in config["datasets"]
             for architecture in config["architectures"]
         ],
-    log:
-        f"{RESULTS}/logs/report.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/report.tsv"
-    conda:
-        ENVIRONMENT
-    threads: 1
-    resources:
-        mem_mb=1000,
     script:
         "../scripts/report.py"
 
@@ -56,8 +54,6 @@ rule plot_confusion:
         f"{RESULTS}/logs/plot_confusion/{{dataset}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/plot_confusion/{{dataset}}.tsv"
-    conda:
-        ENVIRONMENT
     threads: 1
     resources:
         mem_mb=1000,
@@ -81,8 +77,6 @@ rule plot_accuracy:
         f"{RESULTS}/logs/plot_accuracy.log",
     benchmark:
         f"{RESULTS}/benchmarks/plot_accuracy.tsv"
-    conda:
-        ENVIRONMENT
     threads: 1
     resources:
         mem_mb=1000,

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import xarray as xr
-from job import start
 
+from job import start
 from rippletwin import report, store
 from rippletwin.calibrate import Settings, calibrate
 from rippletwin.case import load_case

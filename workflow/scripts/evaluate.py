@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 import torch
-from job import start
 
+from job import start
 from rippletwin import store
 from rippletwin.dataset import split_by_time
 from rippletwin.networks import CLASSES, build

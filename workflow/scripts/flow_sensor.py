@@ -1,9 +1,8 @@
 """Recorded pressure windows -> flow at the pump outlet, by the calibrated line."""
 
-import numpy as np
 import xarray as xr
-from job import start
 
+from job import start
 from rippletwin import store
 from rippletwin.flow_sensor.line import network_of
 from rippletwin.flow_sensor.spectral import estimate_flow
@@ -50,5 +49,5 @@ store.save(
     snakemake.output[0],
 )
 tell(
-    f"{len(estimate.flow)} windows, {estimate.orders[-1]} shaft orders, noise {np.max(noise):.2g} m3/s"
+    f"{len(estimate.flow)} windows, {len(estimate.orders)} shaft orders, noise {noise[0]:.2g} m3/s"
 )

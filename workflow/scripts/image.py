@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-from job import start
 
+from job import start
 from rippletwin import store
 from rippletwin.imaging import SstSettings, amplitude_scale, sst_images
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
-from job import start
 
+from job import start
 from rippletwin import store
 from rippletwin.case import load_case
 from rippletwin.dataset import remove_mean

@@ -1,4 +1,4 @@
-"""What every script does first: send its output to the job's log, and progress to the terminal too."""
+"""What every script does first: its output goes to the job's log, progress to the terminal too."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def start(snakemake):
     Bad input ends the job with its message alone, anything else with a traceback in the log.
     """
     terminal = sys.stderr
-    log = open(snakemake.log[0], "w", buffering=1)  # noqa: SIM115 (open as long as the process)
+    log = open(snakemake.log[0], "w", buffering=1)
     sys.stdout = sys.stderr = log
     name = " ".join([snakemake.rule, *map(str, snakemake.wildcards)])
 

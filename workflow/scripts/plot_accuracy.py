@@ -1,8 +1,8 @@
 """Accuracy of every network on every dataset, beside the paper's."""
 
 import pandas as pd
-from job import start
 
+from job import start
 from rippletwin.accuracy import summarise
 from rippletwin.figures import diagnosis, save
 from rippletwin.networks import ARCHITECTURES

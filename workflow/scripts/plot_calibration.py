@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from job import start
-
 from rippletwin import store
 from rippletwin.figures import ripple, save
 

@@ -1,8 +1,8 @@
 """Confusion matrices of one dataset, a panel a network, all seeds together."""
 
 import pandas as pd
-from job import start
 
+from job import start
 from rippletwin.accuracy import CLASSES, TRUE_STATES, confusion_of
 from rippletwin.figures import diagnosis, save
 from rippletwin.networks import ARCHITECTURES

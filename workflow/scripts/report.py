@@ -4,8 +4,8 @@ import json
 from pathlib import Path
 
 import pandas as pd
-from job import start
 
+from job import start
 from rippletwin.accuracy import accuracy_table, result_row, score
 from rippletwin.networks import CLASSES
 from rippletwin.training import History

@@ -2,8 +2,8 @@
 
 import numpy as np
 import xarray as xr
-from job import start
 
+from job import start
 from rippletwin import store
 from rippletwin.flow_sensor.spectral import band_limit
 

@@ -5,8 +5,8 @@ from dataclasses import asdict
 
 import numpy as np
 import torch
-from job import start
 
+from job import start
 from rippletwin import store
 from rippletwin.dataset import split_by_time
 from rippletwin.networks import CLASSES, build
