@@ -9,6 +9,71 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+# Views of one pipe, indexed from 0: so the compiler knows that no index wraps, and vectorises.
+
+
+@njit(cache=True, error_model="numpy")
+def _remember(half_u, decay, gain, bend, flow, change, last_change, memory, known):
+    """Friction's memory y_k over the last step; `known` = half_u (sum e y - G q - H dq)."""
+    total_gain, total_bend = gain.sum(), bend.sum()
+    for i in range(len(flow)):
+        known[i] = -total_gain * flow[i] - total_bend * change[i]
+    for m in range(len(decay)):
+        e, g, h, y = decay[m], gain[m], bend[m], memory[m]
+        for i in range(len(flow)):
+            new = e * y[i] + g * change[i] - h * last_change[i]
+            y[i] = new
+            known[i] += e * new
+    for i in range(len(flow)):
+        known[i] *= half_u
+        last_change[i] = change[i]
+
+
+@njit(cache=True, error_model="numpy")
+def _meet(b, pressure, flow, change, forward, backward, known):
+    """Interior nodes between two ordinary cells."""
+    over = 0.5 / b
+    for i in range(1, len(flow) - 2):
+        up, down = forward[i - 1] - known[i], backward[i + 1] + known[i]
+        pressure[i] = 0.5 * (up + down)
+        new = over * (up - down)
+        change[i] = new - flow[i]
+        flow[i] = new
+
+
+@njit(cache=True, error_model="numpy")
+def _meet_viscoelastic(
+    b, creep, keep, phi, rate, strain, pressure, flow, change, forward, backward, known
+):
+    """The same with a wall that creeps."""
+    half, over = 0.5 / (1.0 + creep * phi * rate), 0.5 / b
+    for i in range(1, len(flow) - 2):
+        bend = keep * strain[i] + (phi - keep) * pressure[i]
+        up = forward[i - 1] - known[i] + creep * rate * bend
+        down = backward[i + 1] + known[i] + creep * rate * bend
+        new = half * (up + down)
+        strain[i] = bend + (1.0 - phi) * new
+        pressure[i] = new
+        new = over * (up - down)
+        change[i] = new - flow[i]
+        flow[i] = new
+
+
+@njit(cache=True, error_model="numpy")
+def _leave(carried, give, pressure, flow, strain, known, forward, backward):
+    """Waves leaving every node, less half the losses of an ordinary cell."""
+    if give == 0.0:
+        for i in range(len(flow)):
+            wave = carried * flow[i] - known[i]
+            forward[i] = pressure[i] + wave
+            backward[i] = pressure[i] - wave
+    else:
+        for i in range(len(flow)):
+            wave = carried * flow[i] - known[i]
+            still = pressure[i] - give * (pressure[i] - strain[i])
+            forward[i] = still + wave
+            backward[i] = still - wave
+
 
 @njit(cache=True, error_model="numpy")
 def advance(
@@ -48,7 +113,6 @@ def advance(
     known = np.zeros(
         len(pressure)
     )  # (u/2)(sum e_k y_k - G q - H dq): friction of the past at the new point
-    next_forward, next_backward = np.empty_like(forward), np.empty_like(backward)
     supply, slope = np.empty(junctions), np.empty(junctions)
     joint, last_joint = np.empty(junctions), np.empty(junctions)
     for k in range(pipes):
@@ -72,19 +136,19 @@ def advance(
             b = zc + half_r + half_u * gain
             w = creep * phi * rate
 
+            here = slice(first, last + 1)
             if unsteady:
-                bend = bends[k].sum()
-                for i in range(first, last + 1):
-                    known[i] = -gain * flow[i] - bend * change[i]
-                for m in range(memory.shape[0]):
-                    e, g, h = decays[k, m], gains[k, m], bends[k, m]
-                    for i in range(first, last + 1):
-                        y = e * memory[m, i] + g * change[i] - h * last_change[i]
-                        memory[m, i] = y
-                        known[i] += e * y
-                for i in range(first, last + 1):
-                    known[i] *= half_u
-                    last_change[i] = change[i]
+                _remember(
+                    half_u,
+                    decays[k],
+                    gains[k],
+                    bends[k],
+                    flow[here],
+                    change[here],
+                    last_change[here],
+                    memory[:, here],
+                    known[here],
+                )
 
             # Waves through the last cell, theta steps old.
             to_end = to_near = 0.0
@@ -92,26 +156,12 @@ def advance(
                 to_end += taps[k, age] * history[k, 0, age]
                 to_near += taps[k, age] * history[k, 1, age]
 
+            state = pressure[here], flow[here], change[here]
+            waves = forward[here], backward[here], known[here]
             if creep == 0.0:
-                half, over = 0.5, 0.5 / b
-                for i in range(first + 1, near):
-                    up, down = forward[i - 1] - known[i], backward[i + 1] + known[i]
-                    pressure[i] = half * (up + down)
-                    new = over * (up - down)
-                    change[i] = new - flow[i]
-                    flow[i] = new
+                _meet(b, *state, *waves)
             else:
-                half, over = 0.5 / (1.0 + w), 0.5 / b
-                for i in range(first + 1, near):
-                    past = -creep * rate * (keep * strain[i] + (phi - keep) * pressure[i])
-                    up = forward[i - 1] - known[i] - past
-                    down = backward[i + 1] + known[i] - past
-                    new = half * (up + down)
-                    strain[i] = keep * strain[i] + (phi - keep) * pressure[i] + (1.0 - phi) * new
-                    pressure[i] = new
-                    new = over * (up - down)
-                    change[i] = new - flow[i]
-                    flow[i] = new
+                _meet_viscoelastic(b, creep, keep, phi, rate, strain[here], *state, *waves)
 
             # The node between an ordinary cell and the long one.
             b_long, w_long = zc + theta * (half_r + half_u * gain), theta * w
@@ -181,17 +231,17 @@ def advance(
 
             # Friction now: half_r q + half_u sum y_k, sum y_k from `known`.
             total = half_r + half_u * gain
-            if creep == 0.0:
-                for i in range(first, last + 1):
-                    wave, loss = zc * flow[i], known[i] + total * flow[i]
-                    next_forward[i] = pressure[i] + (wave - loss)
-                    next_backward[i] = pressure[i] - (wave - loss)
-            else:
-                for i in range(first, last + 1):
-                    wave, loss = zc * flow[i], known[i] + total * flow[i]
-                    give = creep * rate * (pressure[i] - strain[i])
-                    next_forward[i] = pressure[i] + (wave - loss) - give
-                    next_backward[i] = pressure[i] - (wave - loss) - give
+            here = slice(first, last + 1)
+            _leave(
+                zc - total,
+                creep * rate,
+                pressure[here],
+                flow[here],
+                strain[here],
+                known[here],
+                forward[here],
+                backward[here],
+            )
 
             for age in range(3, 0, -1):
                 history[k, 0, age] = history[k, 0, age - 1]
@@ -202,8 +252,6 @@ def advance(
                 sign = 1.0 if side == 0 else -1.0
                 history[k, side, 0] = pressure[i] + sign * (wave - loss) - give
 
-        forward[:] = next_forward
-        backward[:] = next_backward
         for j in range(len(nodes)):
             seen_p[j, n], seen_q[j, n] = pressure[nodes[j]], flow[nodes[j]]
     return seen_p, seen_q
