@@ -96,6 +96,7 @@ def test_a_recording_made_by_the_method_of_characteristics():
         friction="steady",
         positions=[s.position for s in rig.sensors],
         periods=120,
+        tolerance=1e-5,
     )
     values = transient.harmonics(o.orders // 9)
     data = [noisy(o, values, 8.0, np.random.default_rng(0))]
