@@ -73,8 +73,8 @@ def balance_orifice(
     Give the `mean_pressure` at the load (Pa) and either K (`coefficient`, m3/s/sqrt(Pa)) or the
     `mean_flow` (m3/s) that it lets through, ripple included. `orders` (F,) are the whole numbers
     that `network.s` is multiples of; by default 1..F. Orders that are not there carry no pressure.
-    At most `passes` corrections are made; 0 is the linearised orifice, 2 enough inside a fit
-    (docs/line.md has the errors).
+    At most `passes` corrections are made to the linearised orifice's pressure; 1 is enough inside
+    a fit (docs/line.md has the errors).
 
     Afterwards `network.load` is ("state", (p, q)), so that its answers hold at full amplitude.
     Raises ValueError where not exactly one of K and mean flow is given, the mean drop is not
