@@ -91,6 +91,10 @@ def domain_of(architecture):
     return "image" if "2d" in architecture else "time"
 
 
+def family_of(architecture):
+    return "residual" if architecture.startswith("resnet") else "plain"
+
+
 def recorded_of(wildcards):
     """What a network is tested on."""
     if domain_of(wildcards.architecture) == "image":
@@ -152,11 +156,12 @@ def library(script):
     """Every source file that a script of workflow/scripts runs: its jobs rerun when one changes."""
     pending, found = [SCRIPTS / script], set()
     while pending:
-        for name in imported(pending.pop()):
-            for file in files_of(name):
-                if file not in found:
-                    found.add(file)
-                    pending.append(file)
+        file = pending.pop()
+        reached = {found_file for name in imported(file) for found_file in files_of(name)}
+        if "pkgutil" in imported(file):  # a package that takes in whatever lies in its folder
+            reached |= set(file.parent.glob("*.py"))
+        pending += reached - found
+        found |= reached
     return sorted(str(file) for file in found)
 
 

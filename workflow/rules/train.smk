@@ -16,7 +16,7 @@ rule train:
         mem_mb=4000,
     params:
         seeds=config["seeds"],
-        settings=lambda wildcards: config["training"][domain_of(wildcards.architecture)],
+        settings=lambda wildcards: config["training"][family_of(wildcards.architecture)],
         share=config["experimental"]["training_share"],
         cylinder=config["scoring"]["pressure"],
     script:
