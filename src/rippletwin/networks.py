@@ -81,13 +81,17 @@ class Classifier(nn.Module):
         self.pool = nn.AdaptiveAvgPool2d(1)
         self.head = nn.Linear(width, classes)
 
-    def forward(self, x: torch.Tensor) -> torch.Tensor:
-        """x (n, channels, M) or (n, channels, size, size) in the data's own unit -> (n, classes)"""
+    def feature_maps(self, x: torch.Tensor) -> torch.Tensor:
+        """x (n, channels, M) or (n, channels, size, size) in the data's own unit -> the last maps
+        (n, width, rows, columns), one row for time windows."""
         if self.architecture.domain == "time":
             x = x.unsqueeze(-2)
         x = (x - self.architecture.silence) / self.scale
-        x = x.contiguous(memory_format=torch.channels_last)
-        return self.head(self.pool(self.features(x)).flatten(1))
+        return self.features(x.contiguous(memory_format=torch.channels_last))
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        """x as ``feature_maps`` takes it -> logits (n, classes)"""
+        return self.head(self.pool(self.feature_maps(x)).flatten(1))
 
 
 def _plain(a: Architecture, channels: int) -> tuple[nn.Sequential, int]:
