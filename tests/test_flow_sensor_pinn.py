@@ -78,7 +78,7 @@ def test_equations_hold_for_exact_waves():
     """
     orders = np.linspace(1.0, 40.0, 30)
     network = lumped(SPEED, orders)
-    trunk = pinn._trunk(network, SETTINGS)
+    trunk = pinn.Trunk(3, (network.s.imag[0], network.s.imag[-1]), SETTINGS)
     with torch.no_grad():
         rows = pinn.equations(trunk, network, np.array([0.1, 0.4, 0.9]))
         matrix = torch.cat([rows.equations, rows.joints, rows.waves], dim=1)
@@ -96,17 +96,18 @@ def test_equations_hold_for_exact_waves():
 def test_slopes_are_the_derivatives_of_the_values():
     """The trunk's slopes against central differences of its values, off its start."""
     network = lumped(SPEED, np.linspace(1.0, 40.0, 30))
-    trunk = pinn._trunk(network, SETTINGS)
+    trunk = pinn.Trunk(3, (network.s.imag[0], network.s.imag[-1]), SETTINGS)
     generator = torch.Generator().manual_seed(0)
     last = trunk.envelope[-1]
     with torch.no_grad():
         last.weight += 0.3 * torch.randn(last.weight.shape, generator=generator, dtype=torch.double)
-        piece, place = torch.tensor([0, 1, 2]), torch.tensor([0.2, 0.5, 0.8], dtype=torch.double)
+        piece, place = np.arange(3), np.array([0.2, 0.5, 0.8])
         omega = torch.as_tensor(network.s.imag)
-        _, slope = trunk(piece, place, omega)
+        phase = omega[:, None] * torch.tensor([1e-3, 2e-3, 3e-3])
+        _, slope = trunk(piece, place, omega, phase)
         step = 1e-5
-        above, _ = trunk(piece, place + step, omega)
-        below, _ = trunk(piece, place - step, omega)
+        above, _ = trunk(piece, place + step, omega, phase)
+        below, _ = trunk(piece, place - step, omega, phase)
     difference = (above - below) / (2 * step)
     assert (difference - slope).abs().max() < 1e-6 * slope.abs().max()
 
@@ -125,8 +126,8 @@ def test_trained_trunk_finds_the_flow(trained):
     trunk, _ = trained
     found = pinn.estimate_flow(windows, SPEED, line(), trunk, 1.0, BAND)
     assert relative(found.flow, flow) < 0.01
-    raw = pinn._trunk(line()(SPEED, np.linspace(0.98, 46.0, 24)), SETTINGS)
-    untrained = pinn.estimate_flow(windows, SPEED, line(), raw, 1.0, BAND)
+    raw = pinn.Trunk(3, tuple(trunk.omega.tolist()), SETTINGS)
+    untrained = pinn.estimate_flow(windows, SPEED, line(), raw, 1.0, BAND, equation_error=1e-3)
     assert relative(untrained.flow, flow) > 3 * relative(found.flow, flow)
 
 

@@ -18,9 +18,9 @@ The trunk is trained once, at the calibrated parameters, on the sum of these los
 at the pump (whose sensor readings the twin tells). In each training step the heads are solved
 exactly and only the trunk moves (variable projection; Golub & Pereyra 1973, SIAM J. Numer. Anal.
 10, 413). Each uniform piece of line has shape functions of its own (Jagtap & Karniadakis 2020,
-Commun. Comput. Phys. 28, 2002): slow envelopes on carriers of the lossless wave length, so that
-the network learns what friction, walls and dispersion do rather than the wave itself. Lengths are
-in units of the piece, flows in units of pressure over its characteristic impedance.
+Commun. Comput. Phys. 28, 2002): slow envelopes on carriers of the calibrated wave length, so that
+the network learns what losses do to a wave rather than the wave itself. Lengths are in units of the
+piece, flows in units of pressure over its characteristic impedance.
 """
 
 from __future__ import annotations
@@ -37,7 +37,6 @@ from rippletwin.flow_sensor.line import LineResponse, NetworkFactory, line_respo
 from rippletwin.flow_sensor.spectral import LOAD_ERROR, MODEL_ERROR
 from rippletwin.line.chain import Network
 
-EQUATION_ERROR = 1e-3  # of p or q over a piece, relative: trust in the equations on the trunk
 COLLOCATION = 48  # points a piece when a window is solved
 MARGIN = 0.02  # relative, of trained frequencies beyond the orders': the speed wanders
 
@@ -58,23 +57,19 @@ class Trunk(nn.Module):
 
     They are waves with learnt envelopes, the first towards the load, the second towards the pump:
 
-        p + r = (1 + n1) exp(-j th),  p - r = n2/(1 + th_l) exp(-j th),    r = q times impedance
+        (p + r)/2 = (1 + n1) exp(-j th),    (p - r)/2 = n2/(1 + th_l) exp(-j th),    r = q |Zc|
 
-    and the mirror image, th = omega x/speed being th_l at the piece's end; the n are the network's,
-    zero before training. lengths, speeds, impedances (D,): m, m/s, Pa s/m3, of the carriers and of
-    the scaling; `omega` (lowest, highest) is the range it is trained for, rad/s.
+    and the mirror image, th growing evenly along the piece to th_l, the phase that a wave turns
+    there; the n are the network's, zero before training. `omega` (lowest, highest) is the range it
+    is trained for, rad/s; `residual` what training attained, the root of its loss.
     """
 
-    def __init__(self, lengths, speeds, impedances, omega, settings: Settings):
+    def __init__(self, pieces: int, omega: tuple[float, float], settings: Settings):
         super().__init__()
-        for name, values in (
-            ("lengths", lengths),
-            ("speeds", speeds),
-            ("impedances", impedances),
-            ("omega", omega),
-        ):
-            self.register_buffer(name, torch.as_tensor(np.array(values, dtype=float)))
-        inputs, width = 3 + len(lengths), settings.width
+        self.pieces = pieces
+        self.register_buffer("omega", torch.tensor(omega, dtype=torch.double))
+        self.register_buffer("residual", torch.tensor(np.inf, dtype=torch.double))
+        inputs, width = 3 + pieces, settings.width
         with torch.random.fork_rng():
             torch.manual_seed(settings.seed)
             self.envelope = nn.Sequential(
@@ -87,15 +82,16 @@ class Trunk(nn.Module):
         nn.init.zeros_(self.envelope[-1].weight)
         nn.init.zeros_(self.envelope[-1].bias)
 
-    def forward(self, piece: torch.Tensor, place: torch.Tensor, omega: torch.Tensor):
+    def forward(self, piece: np.ndarray, place: np.ndarray, omega, phase):
         """Shape functions at P points and F frequencies.
 
-        piece (P,) index, place (P,) in 0..1 along it, omega (F,) rad/s. Returns values and slopes
-        (per piece length), each (2, F, P, 2 D) complex, p before r; those of a piece are zero on
-        the others.
+        piece (P,) index, place (P,) in 0..1 along it, omega (F,) rad/s, phase (F, D) rad that a
+        wave turns over each piece. Returns values and slopes (per piece length), each
+        (2, F, P, 2 D) complex, p before r; those of a piece are zero on the others.
         """
+        piece, place = torch.as_tensor(piece), torch.as_tensor(place)
         low, high = self.omega
-        where = nn.functional.one_hot(piece, len(self.lengths)).double()  # (P, D)
+        where = nn.functional.one_hot(piece, self.pieces).double()  # (P, D)
         shape = (len(omega), len(piece))
         scaled = torch.stack(
             [(omega - low) / (high - low), (omega / low).log() / (high / low).log()]
@@ -114,7 +110,7 @@ class Trunk(nn.Module):
             torch.view_as_complex(x.reshape(*shape, 2, 2, 2))
             for x in torch.func.jvp(self.envelope, (inputs,), (along,))
         )  # (F, P, function, own or other direction)
-        turns = omega[:, None] * (self.lengths / self.speeds)[piece]  # rad over the piece
+        turns = phase[:, piece]
         small = torch.stack([torch.ones_like(turns), 1 / (1 + turns)], dim=-1)[:, :, None]
         own = torch.tensor([1.0, 0.0])
         learnt, slope = own + small * learnt, small * slope
@@ -164,7 +160,8 @@ def train(
     line = network(speed_hz, orders)
     to_sensors = line_response(line).to_sensors
     places = 0.5 + 0.5 * np.polynomial.legendre.leggauss(settings.points)[0]
-    trunk = _trunk(line, settings)
+    omega = line.s.imag
+    trunk = Trunk(len(_pieces(line)[0]), (omega[0], omega[-1]), settings)
     optimiser = torch.optim.LBFGS(
         trunk.parameters(),
         max_iter=settings.steps,
@@ -189,6 +186,7 @@ def train(
         return value
 
     optimiser.step(loss)
+    trunk.residual.fill_(loss().sqrt().item())
     return trunk, np.array(history)
 
 
@@ -201,14 +199,15 @@ def estimate_flow(
     bandwidth_hz: float,
     model_error: float = MODEL_ERROR,
     load_error: float | None = LOAD_ERROR,
-    equation_error: float = EQUATION_ERROR,
+    equation_error: float | None = None,
     of: str = "source",
 ) -> FlowEstimate:
     """Outlet flow of each one-revolution window, by heads on a trained `trunk`.
 
     Everything else as for `spectral.estimate_flow`; `equation_error` is how far the equations may
-    be missed (relative, over a piece of line).
+    be missed (relative, over a piece of line); None is as far as the trunk does.
     """
+    missed = float(trunk.residual) if equation_error is None else equation_error
 
     def inversion(speed, orders, noise_power, power):
         line = network(speed, orders)
@@ -217,7 +216,7 @@ def estimate_flow(
             rows = equations(trunk, line, places)
         response = line_response(line, of)
         errors = np.sqrt(noise_power + (model_error**2 * power)[:, None])
-        return _head_operator(rows, response, errors, power, load_error, equation_error)
+        return _head_operator(rows, response, errors, power, load_error, missed)
 
     return estimate(windows, speed_hz, inversion, noise, bandwidth_hz)
 
@@ -225,52 +224,46 @@ def estimate_flow(
 def equations(trunk: Trunk, network: Network, places: np.ndarray) -> Equations:
     """The rows of `Equations` at the frequencies of `network`, `places` (C,) of 0..1 a piece."""
     starts, segments = _pieces(network)
-    lengths, count = trunk.lengths.numpy(), len(starts)
-    s = network.s
-    omega = torch.as_tensor(s.imag)
-    zc = trunk.impedances.numpy()
+    lengths, count = np.diff([*starts, network.length]), len(starts)
+    series, shunt = network.series[segments], network.shunt[segments]  # (D, F)
+    zc = np.abs(np.sqrt(series / shunt))
+    omega = torch.as_tensor(network.s.imag)
+    phase = torch.as_tensor((np.sqrt(series * shunt).imag * lengths[:, None]).T)
 
-    # inside: l dp/dx + (l Z'/zc) r and l dr/dx + (l Y' zc) p with r = zc q
+    def shapes(piece, place):
+        return trunk(piece, place, omega, phase)
+
+    # inside: l dp/dx + (l Z'/|Zc|) r and l dr/dx + (l Y' |Zc|) p
     piece = np.repeat(np.arange(count), len(places))
-    (p, r), (dp, dr) = trunk(torch.as_tensor(piece), torch.as_tensor(np.tile(places, count)), omega)
-    scale = lengths[piece][:, None]
-    series = scale * network.series[segments[piece]] / zc[piece][:, None]
-    shunt = scale * network.shunt[segments[piece]] * zc[piece][:, None]
-    inside = [dp + _column(series) * r, dr + _column(shunt) * p]
-    inside = torch.cat(inside, dim=1) / np.sqrt(len(piece))
+    (p, r), (dp, dr) = shapes(piece, np.tile(places, count))
+    series = _column((lengths[:, None] * series / zc)[piece])
+    shunt = _column((lengths[:, None] * shunt * zc)[piece])
+    inside = torch.cat([dp + series * r, dr + shunt * p], dim=1) / np.sqrt(len(piece))
 
-    # ends of all pieces, in Pa and m3/s
-    piece, place = np.tile(np.arange(count), 2), np.repeat([0.0, 1.0], count)
-    (p, r), _ = trunk(torch.as_tensor(piece), torch.as_tensor(place), omega)
-    q = r / torch.as_tensor(zc[piece])[:, None]
-    first = [torch.stack([p[:, k], q[:, k]], 1) for k in range(count)]
-    last = [torch.stack([p[:, count + k], q[:, count + k]], 1) for k in range(count)]
-    ends = [*starts[1:], network.length]
-    joints = [
-        (last[k] - _joint(network, ends[k]) @ first[k + 1]) * torch.tensor([1.0, zc[k]])[:, None]
-        for k in range(count - 1)
-    ]
-    size = first[0].shape
-    joints = torch.cat(joints, 1) if joints else torch.zeros(size[0], 0, size[2], dtype=p.dtype)
+    # [p, q] at the pieces' ends, each (F, 2, 2 D)
+    piece = np.arange(count)
+    first, last = (_pressure_and_flow(shapes(piece, np.full(count, end)), zc) for end in (0.0, 1.0))
+    joints = [torch.zeros(len(omega), 0, 2 * count, dtype=p.dtype)]
+    for k in range(count - 1):
+        gap = last[k] - _joint(network, starts[k + 1]) @ first[k + 1]
+        joints.append(torch.stack([gap[:, 0], _row(zc[k]) * gap[:, 1]], dim=1))
 
-    at_load = _joint(network, network.length) @ _state(network.load_state(), len(s))
-    row = torch.stack([zc[-1] * at_load[:, 1, 0], -zc[-1] * at_load[:, 0, 0]], dim=-1)
-    scale = (row[:, 0].abs().square() + (row[:, 1] / zc[-1]).abs().square()).sqrt()
-    load = (row / scale[:, None])[:, None] @ last[-1]
+    at_load = _joint(network, network.length) @ _state(network.load_state(), len(omega))
+    p_load, r_load = at_load[:, 0], _row(zc[-1]) * at_load[:, 1]  # (F, 1)
+    scale = (p_load.abs().square() + r_load.abs().square()).sqrt()
+    p, r = last[-1][:, 0], _row(zc[-1]) * last[-1][:, 1]
+    load = ((r_load * p - p_load * r) / scale)[:, None]
 
     # waves on the source's side of what stands at x = 0, as in LineResponse
     source = _joint(network, 0.0) @ first[0]
-    z0 = torch.as_tensor(np.abs(np.sqrt(network.series[0] / network.shunt[0])))[:, None]
-    waves = torch.stack([source[:, 0] + z0 * source[:, 1], source[:, 0] - z0 * source[:, 1]], 1) / 2
+    p, r = source[:, 0], _row(zc[0]) * source[:, 1]
+    waves = torch.stack([p + r, p - r], dim=1) / 2
 
     positions = np.asarray(network.sensor_positions)
-    piece = np.searchsorted(starts, positions, side="left") - 1  # on the pump's side of a joint
-    piece = np.maximum(piece, 0)
-    place = (positions - starts[piece]) / lengths[piece]
-    (p, _), _ = trunk(torch.as_tensor(piece), torch.as_tensor(place), omega)
-    factor = np.broadcast_to(network.sensor_factor, (len(positions), len(s)))
-    sensors = p * _column(factor)
-    return Equations(inside, joints, load, sensors, waves)
+    piece = np.maximum(np.searchsorted(starts, positions, side="left") - 1, 0)  # pump's side
+    (p, _), _ = shapes(piece, (positions - starts[piece]) / lengths[piece])
+    factor = np.broadcast_to(network.sensor_factor, (len(positions), len(omega)))
+    return Equations(inside, torch.cat(joints, dim=1), load, p * _column(factor), waves)
 
 
 def _known_states(rows: Equations, to_sensors: np.ndarray):
@@ -317,20 +310,6 @@ def _head_operator(
     return matrix, variance, prior
 
 
-def _trunk(network: Network, settings: Settings) -> Trunk:
-    """An untrained trunk whose carriers have the highest frequency's wave speeds."""
-    starts, segments = _pieces(network)
-    gamma = np.sqrt(network.series[segments, -1] * network.shunt[segments, -1])
-    omega = network.s.imag
-    return Trunk(
-        lengths=np.diff([*starts, network.length]),
-        speeds=omega[-1] / gamma.imag,
-        impedances=np.abs(np.sqrt(network.series[segments, -1] / network.shunt[segments, -1])),
-        omega=(omega[0], omega[-1]),
-        settings=settings,
-    )
-
-
 def _pieces(network: Network) -> tuple[np.ndarray, np.ndarray]:
     """Start (D,) in m and segment (D,) of the uniform pieces between segments and inserts."""
     edges = np.concatenate([[0.0], np.cumsum(network.lengths)])
@@ -357,6 +336,18 @@ def _state(state, size: int) -> torch.Tensor:
     """The load's (p, q) as (F, 2, 1)."""
     p, q = (np.broadcast_to(np.asarray(value, complex), (size,)) for value in state)
     return torch.as_tensor(np.stack([p, q], axis=1)[..., None])
+
+
+def _pressure_and_flow(shapes, impedance: np.ndarray) -> list[torch.Tensor]:
+    """[p, q] (F, 2, 2 D) at one point a piece, from the trunk's answer and |Zc| (D, F)."""
+    (p, r), _ = shapes
+    q = r / torch.as_tensor(impedance.T)[..., None]
+    return list(torch.stack([p, q], dim=2).unbind(1))
+
+
+def _row(values: np.ndarray) -> torch.Tensor:
+    """(F,) numpy to (F, 1), to multiply rows of one point."""
+    return torch.as_tensor(values)[:, None]
 
 
 def _column(values: np.ndarray) -> torch.Tensor:

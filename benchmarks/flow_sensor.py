@@ -1,0 +1,79 @@
+"""Both flow sensors on the paper's line, by band: prints the table of docs/flow_sensor.md.
+
+The truth is the lumped pump with a worn slipper, its pressure by the twin with the full-amplitude
+orifice; the sensors know the line with a linear one. `python benchmarks/flow_sensor.py`
+"""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import torch
+
+from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor
+from rippletwin.flow_sensor import band_limit, estimate_flow, network_of, pinn
+from rippletwin.pump import ConstantPressure, Slipper, simulate
+from rippletwin.twin import Twin
+
+SPEED, PRESSURE, BAND, SAMPLES, WINDOWS = 1000 / 60, 9.484e6, 1500.0, 3072, 40
+SENSORS = {
+    2: (Sensor("p1", 0.4167), Sensor("p2", 2.5895)),
+    3: (Sensor("p1", 0.4167), Sensor("p2", 2.5895), Sensor("p3", 4.6)),
+}
+
+
+def rig(sensors, wave_speed_factor=1.0):
+    line = (
+        Segment(5.953, 0.01971, 1022.9),
+        Segment(1.144, 0.02307, 982.7),
+        Segment(1.675, 0.01486, 1308.4),
+    )
+    line = tuple(replace(s, wave_speed=s.wave_speed * wave_speed_factor) for s in line)
+    return Rig(Fluid(870.0, 3.2e-5), {"pistons": 9}, line, SENSORS[sensors], Load("orifice"))
+
+
+def main():
+    torch.set_num_threads(1)
+    rng = np.random.default_rng(0)
+    fluid = Fluid(870.0, 3.2e-5)
+    healthy, worn = (
+        simulate({"pistons": 9}, fluid, 60 * SPEED, ConstantPressure(PRESSURE), fault)
+        for fault in (None, Slipper(4e-7))
+    )
+    truth = band_limit(worn.flow, SPEED, BAND)
+    orders = np.arange(1, SAMPLES // 2)
+    print("| sensors | noise, kPa | wave speed | method | 0-0.5 kHz | 0.5-1 | 1-1.5 | all |")
+    print("|---|---|---|---|---|---|---|---|")
+    for sensors in SENSORS:
+        spectrum = np.zeros((sensors, SAMPLES // 2 + 1), complex)
+        spectrum[:, orders] = Twin(rig(sensors)).respond(worn, SPEED, PRESSURE, orders)
+        clean = np.fft.irfft(spectrum * SAMPLES / 2)
+        for factor in (1.0, 1.01):
+            network = network_of(Twin(rig(sensors, factor)), PRESSURE, healthy)
+            started = time.perf_counter()
+            trunk, _ = pinn.train(network, SPEED, BAND)
+            trained = time.perf_counter() - started
+            for noise in (0.0, 500.0, 4000.0):
+                shape = (WINDOWS, sensors, SAMPLES)
+                windows = clean + noise * rng.standard_normal(shape)
+                for name, arguments in (("spectral", ()), ("PINN", (trunk,))):
+                    run = pinn.estimate_flow if arguments else estimate_flow
+                    started = time.perf_counter()
+                    found = run(windows, SPEED, network, *arguments, max(noise, 50.0), BAND)
+                    spent = (time.perf_counter() - started) / WINDOWS
+                    print(row(sensors, noise, factor, name, found.flow, truth), end="")
+                    print(f" <!-- {1e3 * spent:.1f} ms, trunk {trained:.0f} s -->")
+
+
+def row(sensors, noise, factor, name, flow, truth):
+    wrong, right = np.fft.rfft(flow - truth), np.fft.rfft(truth)
+    cells = []
+    for low, high in ((1, 31), (31, 61), (61, 91), (1, 91)):
+        error = np.sqrt(np.mean(np.sum(np.abs(wrong[:, low:high]) ** 2, axis=1)))
+        cells.append(f"{100 * error / np.linalg.norm(right[low:high]):.1f} %")
+    speed = "right" if factor == 1.0 else "1 % high"
+    return f"| {sensors} | {noise / 1e3:g} | {speed} | {name} | " + " | ".join(cells) + " |"
+
+
+if __name__ == "__main__":
+    main()
