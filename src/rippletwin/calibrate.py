@@ -29,6 +29,10 @@ SCALINGS = (0.0, -0.8, 0.8, -1.6, 1.6, -2.4, 2.4)  # in prior standard deviation
 TRIED = 8  # starts that are fitted below the first limit, the likeliest after alignment
 KEPT = (4, 2, 1)  # starts carried on after the first, second and every later limit
 
+EVENNESS = 0.5
+"""Of the error floor (see `likelihood`). Where physics is missing, the weak upper harmonics are
+wholly wrong; a floor relative to each would let them weigh as much as the strong lower ones."""
+
 UNDETERMINED = 0.7  # posterior over prior standard deviation above which data say little
 IMPLAUSIBLE = 3.0  # prior standard deviations
 BAD_FIT = 0.1  # relative misfit after calibration
@@ -93,9 +97,11 @@ def calibrate(
     if not observations:
         raise ValueError("calibration needs at least one observation")
     limits = limits_of(observations, settings)
-    states = _starts(Likelihood(twin, observations, limits[0]), settings.scalings)
+    states = _starts(
+        Likelihood(twin, observations, limits[0], evenness=EVENNESS), settings.scalings
+    )
     for stage, limit in enumerate(limits):
-        likelihood = Likelihood(twin, observations, limit)
+        likelihood = Likelihood(twin, observations, limit, evenness=EVENNESS)
         fits = []
         for _, theta in states:
             theta, value = fit(likelihood, theta)

@@ -2,9 +2,11 @@
 
 At each frequency the S sensors' values v and the prediction h make the residual e = v - h with
 
-    E[e e^H] = C + delta^2 m I + sigma^2 h h^H,     m = mean over sensors of |v|^2.
+    E[e e^H] = C + delta^2 m I + sigma^2 h h^H,     m = (1 - g) |v|^2 + g mean_f |v|^2,
 
-C is the observation's own covariance. delta is the relative error floor of the model, estimated.
+with |v|^2 the mean over sensors and mean_f that over frequencies too. C is the observation's own
+covariance. delta is the relative error floor of the model, estimated; the evenness g says whether
+it is relative to each harmonic (0) or to the whole ripple (1).
 sigma is the relative error of the source, common to all sensors: zero for a known source,
 estimated up to `twin.source_sd` for a nominal flow ripple, infinite for a free one, whose
 amplitude is then projected out. Its term is built from the prediction, not from the data, so a
@@ -36,6 +38,7 @@ class Likelihood:
     twin, observations : see rippletwin.twin and rippletwin.spectra.
     max_frequency_hz : use nothing above it; None for all.
     floor : relative model error to begin with.
+    evenness : g above.
 
     Columns are the frequencies of all observations side by side. With `piston_orders` the shaft
     orders that no healthy nominal pump makes are left out of periodic recordings.
@@ -51,6 +54,7 @@ class Likelihood:
         max_frequency_hz: float | None = None,
         floor: float = 0.1,
         piston_orders: bool = True,
+        evenness: float = 0.0,
     ):
         self.twin = twin
         pistons = twin.rig.pump.get("pistons", 1) if piston_orders else 1
@@ -58,7 +62,7 @@ class Likelihood:
         self.forward = Forward(twin, self.observations)
         self.floor, self.source_sd = floor, 0.0
         self.prior = np.array([not p.flat for p in twin.parameters])
-        self._groups = [_Group(comparable(o, twin.rig)) for o in self.observations]
+        self._groups = [_Group(comparable(o, twin.rig), evenness) for o in self.observations]
         free = sum(g.values.shape[1] for g in self._groups if g.source == "free")
         self.count = 2 * (sum(g.values.size for g in self._groups) - free)
 
@@ -110,13 +114,14 @@ class Likelihood:
 class _Group:
     """One observation in the eigenbasis of its covariance."""
 
-    def __init__(self, o):
+    def __init__(self, o, evenness: float = 0.0):
         variances, basis = np.linalg.eigh(o.covariance)  # (F, S), (F, S, S)
         self.source = o.source
         self.variances = np.maximum(variances, 0.0).T  # (S, F)
         self.rotation = np.conj(basis)
         self.values = self.rotate(o.values)
-        self.power = np.mean(np.abs(o.values) ** 2, axis=0)  # (F,)
+        power = np.mean(np.abs(o.values) ** 2, axis=0)  # (F,)
+        self.power = (1.0 - evenness) * power + evenness * np.mean(power)
 
     def rotate(self, x: np.ndarray) -> np.ndarray:
         return np.einsum("fsk,sf->kf", self.rotation, x)

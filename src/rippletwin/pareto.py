@@ -16,7 +16,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rippletwin.calibrate import DEFAULTS, Calibration, Settings, align, conclude, limits_of
+from rippletwin.calibrate import (
+    DEFAULTS,
+    EVENNESS,
+    Calibration,
+    Settings,
+    align,
+    conclude,
+    limits_of,
+)
 from rippletwin.likelihood import Likelihood, comparable
 from rippletwin.twin import Twin
 
@@ -75,7 +83,7 @@ def calibrate_pareto(
     members = np.clip(rng.standard_normal((population, searched.sum())), -BOX, BOX)
     members[0] = twin.theta[searched]
     for stage, limit in enumerate(limits):
-        problem = Ripple(Likelihood(twin, observations, limit))
+        problem = Ripple(Likelihood(twin, observations, limit, evenness=EVENNESS))
         result = minimize(
             problem,
             NSGA2(pop_size=population, sampling=members),
