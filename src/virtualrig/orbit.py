@@ -15,7 +15,7 @@ from virtualrig.network import largest_step, line, node_table, sensor_rows, stil
 from virtualrig.rig import Rig
 
 RECORDS = 4608
-"""Records a revolution; a multiple of three, the depth of the stepper's ring of states."""
+"""Records a revolution; a multiple of four, the depth of the stepper's ring of states."""
 
 _REVOLUTIONS_OF_ADJUSTING = 8
 
@@ -39,15 +39,28 @@ class Orbit:
 
 
 class Bench:
-    """A rig ready to run: compiled tables and a state that is kept from one run to the next."""
+    """A rig ready to run: its tables, and a state that is kept from one run to the next.
 
-    def __init__(self, rig: Rig, faults: tuple[str, ...] = (), refine: int = 1):
+    `flow` (M,), m3/s over one revolution, takes the pump's place where it is given; `refine` divides
+    the time step.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        faults: tuple[str, ...] = (),
+        flow: np.ndarray | None = None,
+        refine: int = 1,
+    ):
         self.rig, self.refine = rig, refine
+        self.flow = np.zeros(1) if flow is None else np.asarray(flow, dtype=float)
         self.largest_step = largest_step(rig.network)
         self.nodes = node_table(rig.network)
         self.sensors = sensor_rows(rig.network)
         chosen = tuple(rig.faults[kind] for kind in faults)
         self.chambers, self.ports = pump.tables(rig.pump, rig.network.density, chosen)
+        if flow is not None:
+            self.chambers = self.chambers[:0]
         self.state = None
 
     def settle(
@@ -69,17 +82,19 @@ class Bench:
         steps = every * RECORDS
         cut = line(self.rig.network, period / steps)
         flow = 0.97 * self.rig.pump.displacement * speed_rpm / 60
+        if not len(self.chambers):
+            flow = self.flow.mean()
         if self.state is None:
             pistons = len(self.chambers)
             self.state = still(self.rig.network, cut, load_pressure, flow, pistons)
         load = self.nodes[self.rig.load_node]
         load[stepper.VALVE_SET] = load_pressure
-        load[stepper.ORIFICE] = valve or self._valve(flow, load_pressure)
+        load[stepper.ORIFICE] = valve if valve is not None else self._valve(flow, load_pressure)
         crank = (speed, np.array(self.rig.ripple, dtype=float).reshape(-1, 3))
         before = np.inf
         for revolution in range(1, most + 1):
             pressure, outlet, nodal, newton = stepper.run(
-                cut, self.nodes, self.chambers, self.ports, np.zeros(1), crank, self.state,
+                cut, self.nodes, self.chambers, self.ports, self.flow, crank, self.state,
                 0, steps, every, period / steps, self.sensors,
             )  # fmt: skip
             if newton > pump.MOST_NEWTON_STEPS:

@@ -99,7 +99,7 @@ def build(known: dict, true: dict) -> Rig:
     for effect in true.get("effects", []):
         arguments = {key: value for key, value in effect.items() if key != "name"}
         apply(draft, effect["name"], arguments)
-    network, load_node = lay_out(draft, sensors, fluid)
+    network, load_node = lay_out(draft, sensors, fluid, true.get("numerics", {}))
     speed = true.get("speed", {})
     return Rig(
         pump=draft.pump,
@@ -129,7 +129,7 @@ def apply(draft: Draft, name: str, arguments: dict) -> None:
     EFFECTS[name](draft, **arguments)
 
 
-def lay_out(draft: Draft, sensors: list[float], fluid: dict) -> tuple[Network, int]:
+def lay_out(draft: Draft, sensors: list[float], fluid: dict, numerics: dict) -> tuple[Network, int]:
     """Cut the draft's line at its fittings into pipes and nodes; returns it and the load's node."""
     ends = np.cumsum([segment["length"] for segment in draft.segments])
     places = sorted({0.0, *map(float, ends), *(float(at) for at, _ in draft.fittings)})
@@ -167,7 +167,12 @@ def lay_out(draft: Draft, sensors: list[float], fluid: dict) -> tuple[Network, i
         pipe = min(int(np.searchsorted(places, position, side="right")) - 1, len(places) - 2)
         taps.append((pipe, float(position - places[pipe])))
     network = Network(
-        tuple(pipes), tuple(nodes), tuple(taps), fluid["density"], fluid["kinematic_viscosity"]
+        tuple(pipes),
+        tuple(nodes),
+        tuple(taps),
+        fluid["density"],
+        fluid["kinematic_viscosity"],
+        **numerics,
     )
     return network, len(places) - 1
 

@@ -3,7 +3,7 @@
 Pipes: p_t = -(rho a^2/A) q_x, q = sum of velocity modes q_k with q_k' = -(A/rho) w_k p_x - lambda_k q_k
 (virtualrig.profile), discretised in space by the discontinuous Galerkin method on Lobatto nodes with
 upwind (characteristic) fluxes between elements (Hesthaven, Warburton, Nodal Discontinuous Galerkin
-Methods, 2008). Time: SBDF3 (Ascher, Ruuth, Wetton, SIAM J. Numer. Anal. 32, 1995): waves explicit;
+Methods, 2008). Time: SBDF4 (Ascher, Ruuth, Wetton, SIAM J. Numer. Anal. 32, 1995): waves explicit;
 friction, chambers and everything at the nodes implicit. Where pipes meet, the outgoing characteristics of
 the new step and the node's elements settle the node's pressure together, so that no volume is lost.
 """
@@ -39,6 +39,9 @@ STORED, ARM_FLOW, ARM_VOLUME, VALVE, VALVE_SPEED, NODE_STATES = range(6)
 
 
 ATMOSPHERE = 1.01325e5
+DEPTH = 4
+LEAD = 25 / 12
+"""First coefficient of BDF4."""
 
 
 class Line(NamedTuple):
@@ -49,7 +52,7 @@ class Line(NamedTuple):
     inflow: np.ndarray  # (E,) -2/width rho a^2/A: pressure rate of a flow's derivative
     push: np.ndarray  # (E,) -2/width A/rho: flow rate of a pressure's derivative
     impedance: np.ndarray  # (E,) rho a/A
-    gains: np.ndarray  # (K, n, E) 1/(11/6 + dt rate) of the velocity modes
+    gains: np.ndarray  # (K, n, E) 1/(LEAD + dt rate) of the velocity modes
     pushes: np.ndarray  # (K, n, E) dt weight gain
     special: bool  # any wall, air, growing modulus or drag
     wall: np.ndarray  # (2, E) relative compliance and retardation time of the wall
@@ -63,17 +66,17 @@ class Line(NamedTuple):
 
 
 class State(NamedTuple):
-    """Everything that evolves, three steps deep: leading axis is the step, rotated in place."""
+    """Everything that evolves, four steps deep: a ring of steps."""
 
-    pressure: np.ndarray  # (3, n, E)
-    modes: np.ndarray  # (3, K, n, E) flow of each velocity mode
+    pressure: np.ndarray  # (4, n, E)
+    modes: np.ndarray  # (K, 4, n, E) flow of each velocity mode
     flow: np.ndarray  # (n, E) their sum
-    strain: np.ndarray  # (3, n, E) retarded wall strain, as a pressure
-    pressure_rate: np.ndarray  # (3, n, E)
-    flow_drive: np.ndarray  # (3, n, E)
+    strain: np.ndarray  # (4, n, E) retarded wall strain, as a pressure
+    pressure_rate: np.ndarray  # (4, n, E)
+    flow_drive: np.ndarray  # (4, n, E)
     node_pressure: np.ndarray  # (nodes,)
-    node: np.ndarray  # (3, NODE_STATES, nodes)
-    chamber: np.ndarray  # (3, 1, pistons)
+    node: np.ndarray  # (4, NODE_STATES, nodes)
+    chamber: np.ndarray  # (4, pistons)
 
 
 @njit(cache=True, fastmath=True)
@@ -124,59 +127,51 @@ def _special_rates(line, p, q, strain, dp, dq):
 
 
 @njit(cache=True, fastmath=True)
-def _extrapolate(rates, now, back, old):
-    """The oldest of three (.., n, E) rates becomes their extrapolation to the next step."""
-    r0, r1, r2 = rates[now].reshape(-1), rates[back].reshape(-1), rates[old].reshape(-1)
-    for i in range(len(r2)):
-        r2[i] += 3 * (r0[i] - r1[i])
+def _extrapolate(rates, ring):
+    """The oldest of four (.., n, E) rates becomes their extrapolation to the next step."""
+    r0, r1 = rates[ring[0]].reshape(-1), rates[ring[1]].reshape(-1)
+    r2, r3 = rates[ring[2]].reshape(-1), rates[ring[3]].reshape(-1)
+    for i in range(len(r3)):
+        r3[i] = 4 * (r0[i] + r2[i]) - 6 * r1[i] - r3[i]
 
 
 @njit(cache=True, fastmath=True)
-def _advance(line, state, now, back, old, dt):
-    """Fields of the next step, written over the oldest one (index `old`)."""
+def _remember(past, ring):
+    """The oldest of four becomes what BDF4 takes from them all: LEAD x - out = dt dx/dt."""
+    x0, x1 = past[ring[0]].reshape(-1), past[ring[1]].reshape(-1)
+    x2, x3 = past[ring[2]].reshape(-1), past[ring[3]].reshape(-1)
+    third = 1 / 3
+    for i in range(len(x3)):
+        x3[i] = 4 * (x0[i] + third * x2[i]) - 3 * x1[i] - 0.25 * x3[i]
+
+
+@njit(cache=True, fastmath=True)
+def _advance(line, state, ring, dt):
+    """Fields of the next step, written over the oldest one (index ring[3])."""
     n, elements = state.flow.shape
-    third, share = 1 / 3, 6 / 11
-    _extrapolate(state.pressure_rate, now, back, old)
-    _extrapolate(state.flow_drive, now, back, old)
-    p0, p1, p2 = (
-        state.pressure[now].reshape(-1),
-        state.pressure[back].reshape(-1),
-        state.pressure[old].reshape(-1),
-    )
-    rate = state.pressure_rate[old].reshape(-1)
-    for i in range(len(p2)):
-        p2[i] = share * (3 * p0[i] - 1.5 * p1[i] + third * p2[i] + dt * rate[i])
-    drive, total = state.flow_drive[old].reshape(-1), state.flow.reshape(-1)
+    _extrapolate(state.pressure_rate, ring)
+    _extrapolate(state.flow_drive, ring)
+    _remember(state.pressure, ring)
+    p = state.pressure[ring[3]].reshape(-1)
+    rate = state.pressure_rate[ring[3]].reshape(-1)
+    for i in range(len(p)):
+        p[i] = (p[i] + dt * rate[i]) / LEAD
+    drive, total = state.flow_drive[ring[3]].reshape(-1), state.flow.reshape(-1)
     total[:] = 0.0
     for k in range(line.gains.shape[0]):
         gain, push = line.gains[k].reshape(-1), line.pushes[k].reshape(-1)
-        m0, m1, m2 = (
-            state.modes[now, k].reshape(-1),
-            state.modes[back, k].reshape(-1),
-            state.modes[old, k].reshape(-1),
-        )
+        _remember(state.modes[k], ring)
+        mode = state.modes[k, ring[3]].reshape(-1)
         for i in range(len(total)):
-            m2[i] = gain[i] * (3 * m0[i] - 1.5 * m1[i] + third * m2[i])
-        for i in range(len(total)):
-            m2[i] += push[i] * drive[i]
-            total[i] += m2[i]
+            mode[i] = gain[i] * mode[i] + push[i] * drive[i]
+            total[i] += mode[i]
     if line.special:
+        _remember(state.strain, ring)
         for e in range(elements):
-            if line.wall[0, e] > 0:
-                pull = dt / line.wall[1, e]
-                for i in range(n):
-                    s = state.strain
-                    bent = 3 * s[now, i, e] - 1.5 * s[back, i, e] + third * s[old, i, e]
-                    s[old, i, e] = (bent + pull * state.pressure[old, i, e]) / (11 / 6 + pull)
-
-
-@njit(cache=True, fastmath=True)
-def _history(past, back, older, oldest, dt, out):
-    """What BDF3 takes from the last three of (3, rows, columns) states: lead x - out = dx/dt."""
-    for r in range(out.shape[0]):
-        for c in range(out.shape[1]):
-            total = 3 * past[back, r, c] - 1.5 * past[older, r, c] + past[oldest, r, c] / 3
-            out[r, c] = total / dt
+            pull = dt / line.wall[1, e]
+            for i in range(n):
+                bent = state.strain[ring[3], i, e] + pull * state.pressure[ring[3], i, e]
+                state.strain[ring[3], i, e] = bent / (LEAD + pull)
 
 
 @njit(cache=True)
@@ -278,21 +273,22 @@ def run(line, nodes, chambers, ports, source, crank, state, phase, steps, every,
     count, n = rows.shape
     elements = state.flow.shape[1]
     n_nodes, pistons = nodes.shape[0], chambers.shape[0]
-    lead = 11 / (6 * dt)
+    lead = LEAD / dt
     recorded = np.zeros((count, steps // every))
     outlet = np.zeros(steps // every)
     nodal = np.zeros((n_nodes, steps // every))
     flux_p, flux_q = np.zeros((2, elements)), np.zeros((2, elements))
     wave_in, wave_lead = np.zeros(n_nodes), np.zeros(n_nodes)
     history = np.zeros((NODE_STATES, n_nodes))
-    chamber_history = np.zeros((1, pistons))
+    chamber_history = np.zeros(pistons)
     x = np.zeros(pistons + 1)
     matrix = np.zeros((pistons + 1, pistons + 2))
     stations = np.zeros((pistons, 4))
     newton = 0
     for step in range(1, steps + 1):
-        back, older, now = phase % 3, (phase + 2) % 3, (phase + 1) % 3
-        _advance(line, state, back, older, now, dt)
+        ring = (phase % DEPTH, (phase - 1) % DEPTH, (phase - 2) % DEPTH, (phase - 3) % DEPTH)
+        last, before, now = ring[0], ring[1], ring[3]
+        _advance(line, state, ring, dt)
         phase += 1
         _meet(line, state, now, flux_p, flux_q, wave_in, wave_lead)
         turn = speed * (phase * dt)
@@ -305,16 +301,21 @@ def run(line, nodes, chambers, ports, source, crank, state, phase, steps, every,
         low = int(place) % len(source)
         share = place - int(place)
         given = source[low] * (1 - share) + source[(low + 1) % len(source)] * share
-        _history(state.node, back, older, now, dt, history)
+        _remember(state.node, ring)
+        for s in range(NODE_STATES):
+            for node in range(n_nodes):
+                history[s, node] = state.node[now, s, node] / dt
         if pistons > 0:
-            _history(state.chamber, back, older, now, dt, chamber_history)
             for i in range(pistons):
-                x[i] = 2 * state.chamber[back, 0, i] - state.chamber[older, 0, i]
+                x[i] = 2 * state.chamber[last, i] - state.chamber[before, i]
+            _remember(state.chamber, ring)
+            for i in range(pistons):
+                chamber_history[i] = state.chamber[now, i] / dt
             x[pistons] = state.node_pressure[0]
             stations_at(angle, speed * rate, chambers, ports, stations)
             used = step_chambers(
                 stations,
-                chamber_history[0],
+                chamber_history,
                 lead,
                 chambers,
                 ports,
@@ -325,7 +326,7 @@ def run(line, nodes, chambers, ports, source, crank, state, phase, steps, every,
             )
             newton = max(newton, used)
             for i in range(pistons):
-                state.chamber[now, 0, i] = x[i]
+                state.chamber[now, i] = x[i]
             state.node_pressure[0] = x[pistons]
             state.node[now, STORED, 0] = nodes[0, VOLUME] * x[pistons]
         for node in range(1 if pistons > 0 else 0, n_nodes):
