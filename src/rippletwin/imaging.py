@@ -104,6 +104,7 @@ def synchrosqueeze(
     collected = (
         np.exp(BETA / GAMMA) * peak_frequency**-BETA * gamma_function(BETA / GAMMA) / GAMMA / step
     )
+    edges = (frequency[0] * np.exp(step * (np.arange(len(frequency) + 1) - 0.5))).astype(np.float32)
     weights = (response[:, :used] / collected).astype(np.float32)
     out = np.zeros((len(signals), len(frequency), COLUMNS), dtype=np.complex64)
     folded = np.empty((2, len(centre), COLUMNS), dtype=np.complex64)
@@ -111,7 +112,7 @@ def synchrosqueeze(
         _fold(signal, weights, first, last, lines[:used].astype(np.float32), folded)
         # torch's inverse FFT (MKL) is three times as fast as scipy's at this length
         coefficients = torch.fft.ifft(torch.from_numpy(folded), norm="forward").numpy()
-        _reassign(coefficients[0], coefficients[1], np.log(frequency[0]), step, image)
+        _reassign(coefficients[0], coefficients[1], edges, image)
     return out
 
 
@@ -164,8 +165,8 @@ def _fold(spectrum, weights, first, last, frequency, folded):
 
 
 @numba.njit(cache=True, fastmath=True)
-def _reassign(coefficient, derivative, log_low, log_step, out):
-    """Add each coefficient to the row of its instantaneous frequency Re(W' / W)."""
+def _reassign(coefficient, derivative, edges, out):
+    """Add each coefficient to the row whose edges enclose its frequency Re(W' conj W) / |W|^2."""
     rows = out.shape[0]
     largest = 0.0
     for a in range(coefficient.shape[0]):
@@ -174,14 +175,17 @@ def _reassign(coefficient, derivative, log_low, log_step, out):
             largest = max(largest, w.real * w.real + w.imag * w.imag)
     silent = largest * SILENT**2
     for a in range(coefficient.shape[0]):
+        row = rows // 2  # walk from the last instant's row: cheaper than a logarithm
         for t in range(coefficient.shape[1]):
             w, d = coefficient[a, t], derivative[a, t]
             power = w.real * w.real + w.imag * w.imag
             if power <= silent:
                 continue
-            frequency = (d.real * w.real + d.imag * w.imag) / power
-            if frequency <= 0:
-                continue
-            row = int(np.floor((np.log(frequency) - log_low) / log_step + 0.5))
+            frequency = d.real * w.real + d.imag * w.imag  # times power
+            while row < rows and frequency >= edges[row + 1] * power:
+                row += 1
+            while row >= 0 and frequency < edges[row] * power:
+                row -= 1
             if 0 <= row < rows:
                 out[row, t] += w
+            row = min(max(row, 0), rows - 1)
