@@ -16,6 +16,7 @@ smoke: .venv/ready
 
 test: .venv/ready lint
 	$(BIN)/python -m pytest -n $(CORES) -m "not long"
+	$(MAKE) smoke
 
 test-long: .venv/ready
 	$(BIN)/python -m pytest -n $(CORES)

@@ -8,6 +8,7 @@ import yaml
 ROOT = Path(workflow.basedir)
 SOURCE = ROOT / "src"
 SCRIPTS = ROOT / "workflow" / "scripts"
+PAPER = os.path.relpath(ROOT / "resources" / "paper_accuracy.csv")
 RESULTS = config["results"]
 
 # numba does not follow `threads:`.
@@ -162,10 +163,10 @@ def library(script):
             reached |= set(file.parent.glob("*.py"))
         pending += reached - found
         found |= reached
-    return sorted(str(file) for file in found)
+    return sorted(os.path.relpath(file) for file in found)
 
 
 def virtualrig():
     """Every file of the virtual rig, another program: its code, its sheet and what it conceals."""
     files = (SOURCE / "virtualrig").rglob("*")
-    return sorted(str(file) for file in files if file.suffix in (".py", ".yaml"))
+    return sorted(os.path.relpath(file) for file in files if file.suffix in (".py", ".yaml"))

@@ -11,7 +11,7 @@ rule report:
             dataset=config["datasets"],
             architecture=config["architectures"],
         ),
-        paper=str(ROOT / "resources" / "paper_accuracy.csv"),
+        paper=PAPER,
         source=library("report.py"),
     output:
         table=report(
@@ -64,7 +64,7 @@ rule plot_confusion:
 rule plot_accuracy:
     input:
         table=rules.report.output.table,
-        paper=str(ROOT / "resources" / "paper_accuracy.csv"),
+        paper=PAPER,
         source=library("plot_accuracy.py"),
     output:
         png=report(

@@ -1,0 +1,99 @@
+"""What runs again after an edit: dry runs over Snakemake's real records of a finished run."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from workflow_copy import make, planned, snakemake
+
+TESTED_AGAIN = {"evaluate", "report", "plot_accuracy", "plot_confusion"}
+# Samples and images are temporary: who needs them again makes them again.
+TIME_AGAIN = {"augment", "train"} | TESTED_AGAIN
+IMAGES_AGAIN = {"augment", "pair", "image", "train"} | TESTED_AGAIN
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("finished") / "workflow"
+    make(folder)
+    result = snakemake(folder)
+    assert result.returncode == 0, result.stderr
+    return folder
+
+
+@pytest.fixture
+def workflow(finished, tmp_path) -> Path:
+    """A copy of the finished run to edit."""
+    folder = tmp_path / "workflow"
+    subprocess.run(["cp", "-a", finished, folder], check=True)
+    yield folder
+    shutil.rmtree(folder)
+
+
+def edit(path: Path, old: str, new: str) -> None:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+def test_nothing_runs_after_a_finished_run(workflow):
+    """A second run has nothing to do: no rule depends on something that changes by itself."""
+    assert planned(workflow)[0] == set()
+
+
+def test_training_key_reruns_training_only(workflow):
+    """learning_rate reaches no rule before `train`, but that needs its temporary inputs again."""
+    edit(workflow / "config/config.yaml", "learning_rate: 0.003", "learning_rate: 0.002")
+    assert planned(workflow)[0] == TIME_AGAIN | IMAGES_AGAIN
+
+
+def test_sst_key_reruns_image_networks_only(workflow):
+    """An SST key leaves networks on time windows alone."""
+    edit(workflow / "config/config.yaml", "voices: 32", "voices: 24")
+    rules, text = planned(workflow)
+    assert rules == IMAGES_AGAIN
+    assert "cnn2d_7_2.pt" in text and "cnn1d_341_100.pt" not in text
+
+
+def test_noise_key_reruns_augmentation_and_after(workflow):
+    """The noise factor changes samples, not the signals they come from."""
+    edit(workflow / "config/config.yaml", "factor: 0.15", "factor: 0.2")
+    assert planned(workflow)[0] == TIME_AGAIN | IMAGES_AGAIN
+
+
+def test_prior_in_rig_yaml_reruns_calibration_and_what_needs_the_twin(workflow):
+    """A prior concerns calibration alone: neither the windows nor the pump are made again."""
+    edit(workflow / "case/rig.yaml", "diameter: 0.03", "diameter: 0.05")
+    rules, text = planned(workflow)
+    assert {"calibrate", "plot_calibration", "propagate", "flow_sensor"} <= rules
+    assert not {"ingest", "fault"} & rules
+    assert "models/CFD-MOC-P/" in text and "models/CFD-P/" not in text
+
+
+def test_pump_in_rig_yaml_reruns_faults(workflow):
+    """The counterpart: what the pump model reads of rig.yaml does rerun it."""
+    edit(workflow / "case/rig.yaml", "pistons: 9", "pistons: 11")
+    assert {"ingest", "fault"} <= planned(workflow)[0]
+
+
+def test_library_file_reruns_what_imports_it(workflow):
+    """imaging.py is imported by the image script alone."""
+    edit(workflow / "src/rippletwin/imaging.py", "COLUMNS = 256", "COLUMNS = 128")
+    assert planned(workflow)[0] == IMAGES_AGAIN
+
+
+def test_effect_file_reruns_calibration(workflow):
+    """The registry imports effects by itself; their files count as sources all the same."""
+    effect = workflow / "src/rippletwin/effects/leak.py"
+    effect.write_text(effect.read_text() + "\n# edited\n")
+    assert "calibrate" in planned(workflow)[0]
+
+
+def test_unknown_key_is_named(workflow):
+    """A misspelt key stops the run with a message that contains it."""
+    edit(workflow / "overlay.yaml", "seeds: 2", "seeeds: 2")
+    result = snakemake(workflow, "--dry-run")
+    assert result.returncode != 0
+    assert "seeeds" in result.stdout + result.stderr
