@@ -4,6 +4,7 @@ The truth is the lumped pump with a worn slipper, its pressure by the twin with 
 orifice; the sensors know the line with a linear one. `python benchmarks/flow_sensor.py`
 """
 
+import sys
 import time
 from dataclasses import replace
 
@@ -42,8 +43,8 @@ def main():
     )
     truth = band_limit(worn.flow, SPEED, BAND)
     orders = np.arange(1, SAMPLES // 2)
-    print("| sensors | noise, kPa | wave speed | method | 0-0.5 kHz | 0.5-1 | 1-1.5 | all |")
-    print("|---|---|---|---|---|---|---|---|")
+    print("| sensors | noise, kPa | wave speed | method | 0-0.5 kHz | 0.5-1 | 1-1.5 | all | ms |")
+    print("|---|---|---|---|---|---|---|---|---|")
     for sensors in SENSORS:
         spectrum = np.zeros((sensors, SAMPLES // 2 + 1), complex)
         spectrum[:, orders] = Twin(rig(sensors)).respond(worn, SPEED, PRESSURE, orders)
@@ -61,8 +62,9 @@ def main():
                     started = time.perf_counter()
                     found = run(windows, SPEED, network, *arguments, max(noise, 50.0), BAND)
                     spent = (time.perf_counter() - started) / WINDOWS
-                    print(row(sensors, noise, factor, name, found.flow, truth), end="")
-                    print(f" <!-- {1e3 * spent:.1f} ms, trunk {trained:.0f} s -->")
+                    cells = row(sensors, noise, factor, name, found.flow, truth)
+                    print(f"{cells} {1e3 * spent:.1f} |")
+            print(f"trunk trained in {trained:.0f} s", file=sys.stderr)
 
 
 def row(sensors, noise, factor, name, flow, truth):

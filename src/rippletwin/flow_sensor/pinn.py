@@ -46,7 +46,7 @@ class Settings:
     """Hidden `width` of a trunk; L-BFGS `steps` on `frequencies` x `points` a piece."""
 
     width: int = 32
-    steps: int = 200
+    steps: int = 300
     frequencies: int = 40
     points: int = 12
     seed: int = 0
