@@ -8,6 +8,7 @@ from rippletwin.flow_sensor import pinn
 from rippletwin.flow_sensor.estimate import band_limit
 from rippletwin.flow_sensor.line import line_response
 from rippletwin.flow_sensor.spectral import estimate_flow
+from rippletwin.flow_sensor.trunk import Trunk, equations
 from rippletwin.line.chain import Network
 from rippletwin.line.segment import series_impedance, shunt_admittance
 from test_flow_sensor import SPEED, TWO, line, record, ripples
@@ -78,9 +79,9 @@ def test_equations_hold_for_exact_waves():
     """
     orders = np.linspace(1.0, 40.0, 30)
     network = lumped(SPEED, orders)
-    trunk = pinn.Trunk(3, (network.s.imag[0], network.s.imag[-1]), SETTINGS)
+    trunk = Trunk(3, (network.s.imag[0], network.s.imag[-1]), width=16, seed=0)
     with torch.no_grad():
-        rows = pinn.equations(trunk, network, np.array([0.1, 0.4, 0.9]))
+        rows = equations(trunk, network, np.array([0.1, 0.4, 0.9]))
         matrix = torch.cat([rows.equations, rows.joints, rows.waves], dim=1)
         target = torch.zeros(*matrix.shape[:2], 2, dtype=matrix.dtype)
         target[:, -2:] = torch.eye(2, dtype=matrix.dtype)
@@ -96,7 +97,7 @@ def test_equations_hold_for_exact_waves():
 def test_slopes_are_the_derivatives_of_the_values():
     """The trunk's slopes against central differences of its values, off its start."""
     network = lumped(SPEED, np.linspace(1.0, 40.0, 30))
-    trunk = pinn.Trunk(3, (network.s.imag[0], network.s.imag[-1]), SETTINGS)
+    trunk = Trunk(3, (network.s.imag[0], network.s.imag[-1]), width=16, seed=0)
     generator = torch.Generator().manual_seed(0)
     last = trunk.envelope[-1]
     with torch.no_grad():
@@ -126,7 +127,7 @@ def test_trained_trunk_finds_the_flow(trained):
     trunk, _ = trained
     found = pinn.estimate_flow(windows, SPEED, line(), trunk, 1.0, BAND)
     assert relative(found.flow, flow) < 0.01
-    raw = pinn.Trunk(3, tuple(trunk.omega.tolist()), SETTINGS)
+    raw = Trunk(3, tuple(trunk.omega.tolist()), width=16, seed=0)
     untrained = pinn.estimate_flow(windows, SPEED, line(), raw, 1.0, BAND, equation_error=1e-3)
     assert relative(untrained.flow, flow) > 3 * relative(found.flow, flow)
 
