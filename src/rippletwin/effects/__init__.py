@@ -22,14 +22,17 @@ def _discover() -> dict[str, Effect]:
 
 
 EFFECTS: dict[str, Effect] = _discover()
-"""Name -> effect."""
+"""Name -> effect, those without a name included."""
 
 
-def candidates(rig) -> list[tuple[Effect, Place]]:
-    """Every effect that the rig's medium allows, at every place it can be."""
+def candidates(rig, named: bool = True) -> list[tuple[Effect, Place]]:
+    """Every effect that the rig's medium allows, at every place it can be.
+
+    With `named` False the passive networks that stand in for effects without a name.
+    """
     return [
         (effect, place)
         for effect in EFFECTS.values()
-        if effect.suits(rig)
+        if effect.named == named and effect.suits(rig)
         for place in effect.places(rig)
     ]

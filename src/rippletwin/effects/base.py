@@ -135,6 +135,7 @@ class Effect:
     parameters  (rig, place) -> tuple of Parameter
     places      rig -> tuple of Place
     apply       (network, line: LineState, values: name -> value, place) mutates the network
+    named       False for a passive network that stands in for physics without a name
     certain     no real line is without it: where something is missing at all, it is taken in
                 unless the data speak against it
     """
@@ -149,6 +150,7 @@ class Effect:
     places: Callable[[object], tuple[Place, ...]]
     apply: Callable[[object, LineState, Mapping[str, object], Place], None]
     certain: bool = False
+    named: bool = True
 
     def __reduce__(self):
         """Pickled by name, for the registry has it in every process."""
@@ -197,9 +199,9 @@ def sensor_places(rig) -> tuple[Place, ...]:
 
 
 def position_parameter(rig) -> Parameter:
-    """Distance from the pump outlet, uniform over the line; set out from six places."""
+    """Distance from the pump outlet, uniform over the line; set out from twelve places."""
     prior = uniform(0.0, sum(s.length for s in rig.line))
-    return Parameter("position", "m", prior, tuple(ndtri((np.arange(6) + 0.5) / 6)))
+    return Parameter("position", "m", prior, tuple(ndtri((np.arange(12) + 0.5) / 12)))
 
 
 def segment_at(lengths: np.ndarray, position) -> int:

@@ -29,11 +29,17 @@ LIMITS_HZ = (800.0, 1500.0, 2500.0, 4000.0)
 SCALINGS = (0.0, -0.7, 0.7, -1.4, 1.4, -2.1, 2.1)
 """Of the wave speed of the longest segment and of all others, in prior standard deviations: every
 pair of them is a start."""
-TRIED = 6  # starts from which Levenberg-Marquardt sets out, the best after aligning shaft angles
-KEPT = (3, 2, 1)  # starts carried on after the first, the second and every later limit
-STEPS = (8, 6, 6)  # most steps below the first, second and later limits; the last may take more
+FEW = 3
+"""Up to so many starts all pairs of scalings are tried; with more, as for a position along the
+line, all wave speeds are scaled together."""
+TRIED = (8, 24)  # starts from which Levenberg-Marquardt sets out, with few and with many
+KEPT = ((4, 2, 1), (8, 4, 1))  # carried on after the first, the second and every later limit
+STEPS = (12, 8, 6)  # most steps below the first, second and later limits; the last may take more
 LAST_STEPS = 30
 CONVERGED = 1e-2  # change of minus the log posterior: evidence is judged in whole units
+MOST = 0.1
+"""Largest model error before the last limit: more would leave the fit to its priors, and it would
+never leave a wrong valley."""
 REACH = 1.5  # longest step of a coordinate, in prior standard deviations
 
 Hypothesis = tuple[tuple[Effect, Place], ...]
@@ -136,12 +142,14 @@ def fit_hypothesis(
     for stage, limit in enumerate(stages):
         last = stage == len(stages) - 1
         posterior = Posterior(twin, observations, limit, source_free)
+        posterior.most = np.inf if last else MOST
         fits = []
         for _, theta in states:
             steps = LAST_STEPS if last else STEPS[min(stage, len(STEPS) - 1)]
             theta, value = descend(posterior, theta, steps)
             fits.append((value, theta))
-        states = _distinct(fits)[: 1 if last else KEPT[min(stage, len(KEPT) - 1)]]
+        kept = KEPT[len(starts) > FEW]
+        states = _distinct(fits)[: 1 if last else kept[min(stage, len(kept) - 1)]]
     return conclude(posterior, hypothesis, states[0][1])
 
 
@@ -153,7 +161,7 @@ def _first_states(posterior: Posterior, starts) -> list:
     speeds = [twin.index[f"wave_speed[{k + 1}]"] for k in range(len(delays))]
     # Every pair, or, where there are many starts already, all wave speeds together.
     pairs = [(a, b) for a in SCALINGS for b in SCALINGS]
-    if len(delays) == 1 or len(starts) > 2:
+    if len(delays) == 1 or (len(starts) > 2 and globals().get("FULL", 7) == 7):
         pairs = [(a, a) for a in SCALINGS]
     groups = []
     for start in starts:
@@ -166,7 +174,8 @@ def _first_states(posterior: Posterior, starts) -> list:
         groups.append(sorted(aligned, key=lambda g: g[0]))
     first = [group[0] for group in groups]
     rest = sorted((g for group in groups for g in group[1:]), key=lambda g: g[0])
-    return sorted(first, key=lambda g: g[0])[:TRIED] + rest[: max(TRIED - len(first), 0)]
+    tried = TRIED[len(starts) > FEW]
+    return sorted(first, key=lambda g: g[0])[:tried] + rest[: max(tried - len(first), 0)]
 
 
 def align(posterior: Posterior, theta: np.ndarray) -> tuple[float, np.ndarray]:
@@ -199,11 +208,18 @@ def align(posterior: Posterior, theta: np.ndarray) -> tuple[float, np.ndarray]:
     return misfit / posterior.values.size, theta
 
 
-def refine(base: Twin, hypothesis: Hypothesis, observations, theta, source_free=False) -> Fit:
-    """Fit on all frequencies from one start theta (P,), where a good one is known."""
+def refine(
+    base: Twin, hypothesis: Hypothesis, observations, thetas: Sequence, source_free=False
+) -> Fit:
+    """Fit on all frequencies from starts theta (P,), where good ones are known."""
     twin = base.with_(effects=hypothesis)
     posterior = Posterior(twin, observations, None, source_free)
-    return conclude(posterior, hypothesis, descend(posterior, theta, LAST_STEPS)[0])
+    thetas = [np.asarray(theta, dtype=float) for theta in thetas]
+    if len(thetas) > 2:
+        tried = [descend(posterior, theta, STEPS[-1] // 2) for theta in thetas]
+        thetas = [theta for theta, _ in sorted(tried, key=lambda t: t[1])[:2]]
+    fits = [descend(posterior, theta, LAST_STEPS) for theta in thetas]
+    return conclude(posterior, hypothesis, min(fits, key=lambda f: f[1])[0])
 
 
 def conclude(posterior: Posterior, hypothesis: Hypothesis, theta: np.ndarray) -> Fit:

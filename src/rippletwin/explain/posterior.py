@@ -44,7 +44,7 @@ class Posterior:
         self.observations = [cut(o, max_frequency_hz) for o in observations]
         self.forward = DifferentiableForward(twin, self.observations)
         self.source_free = source_free
-        self.floor, self.source_sd = 0.1, float(SOURCE_SDS[2])
+        self.floor, self.source_sd, self.most = 0.1, float(SOURCE_SDS[2]), np.inf
         self.prior = np.array([not p.flat for p in twin.parameters])
         data = [comparable(o, twin.rig) for o in self.observations]
         covariance = np.concatenate([o.covariance for o in data])
@@ -125,6 +125,7 @@ class Posterior:
             self.floor, self.source_sd = float(floors[best]), float(sds[source])
             near = floors[max(best - 1, 0)], floors[min(best + 1, len(floors) - 1)]
             floors, sds = np.geomspace(*near, 7), sds[source : source + 1]
+        self.floor = min(self.floor, self.most)
 
     def linearise(self, theta: np.ndarray, prediction: np.ndarray):
         """Residual (N,) and its Jacobian (N, P) at the present errors."""

@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from itertools import product
 from multiprocessing import get_context
 
+import numpy as np
+
 from rippletwin.effects import Effect, Place, candidates
-from rippletwin.explain.fit import Fit, Hypothesis, fit_hypothesis
+from rippletwin.explain.fit import Fit, Hypothesis, fit_hypothesis, refine
+from rippletwin.explain.posterior import FLOOR
 from rippletwin.twin import Twin
+
+ACCEPT = 8.0
+"""Log evidence that an effect must add. The largest that chance gave any effect of the library in
+parametric bootstraps of no-effect cases with refitting is below it (docs/explain.md)."""
+
+CERTAIN = -3.0  # the same for an effect that no real line is without: twenty to one against it
+MOST = 3  # effects at a time
+GOOD = 2.0 * FLOOR  # relative model error at which a fit is as good as it can be believed
 
 
 def scan(rig, hypothesis: Hypothesis) -> list[dict[str, float]]:
@@ -23,42 +35,33 @@ def scan(rig, hypothesis: Hypothesis) -> list[dict[str, float]]:
     return [dict(zip(names, us)) for us in product(*(p.scan for p in parameters))]
 
 
-@dataclass
+def library(rig, observations: Sequence, named: bool = True) -> list[tuple[Effect, Place]]:
+    """The candidates that these data can say anything about."""
+    kinds = {o.kind for o in observations}
+    found = []
+    for effect, place in candidates(rig, named):
+        if kinds == {"input_impedance"} and effect.element in ("source", "sensor"):
+            continue
+        if effect.name == "entrained_air" and "periodic" not in kinds:
+            continue
+        found.append((effect, place))
+    return found
+
+
 class Workers:
-    """Processes that fit hypotheses to one set of data; use it as a context.
+    """Fits hypotheses to one set of data, in `pool` or, where that is None, in this process."""
 
-    With `count` 1 everything runs in this process.
-    """
-
-    base: Twin
-    observations: Sequence
-    count: int = 2
-
-    def __enter__(self):
-        self._pool = None
-        if self.count > 1:
-            self._pool = ProcessPoolExecutor(
-                self.count,
-                get_context("fork"),
-                initializer=_prepare,
-                initargs=(self.base, self.observations),
-            )
-        return self
-
-    def __exit__(self, *error):
-        if self._pool is not None:
-            self._pool.shutdown(wait=True, cancel_futures=True)
+    def __init__(self, base: Twin, observations: Sequence, pool=None):
+        self.base, self.observations = base, list(observations)
+        self._pool = pool
 
     def fit(self, jobs: Sequence[dict], progress: Callable[[], None] | None = None) -> list[Fit]:
-        """Fits in the order of `jobs`: keyword arguments of `fit_hypothesis`, less twin and data.
-
-        A job may carry `observations`, indices of those to use.
-        """
+        """Fits in the order of `jobs`, each a hypothesis and options of `work`."""
         if self._pool is None:
             _prepare(self.base, self.observations)
-            results = map(_work, jobs)
+            results = map(work, jobs)
         else:
-            results = self._pool.map(_work, jobs)
+            results = self._pool.map(work, jobs)
         fits = []
         for fit in results:
             fits.append(fit)
@@ -67,7 +70,22 @@ class Workers:
         return fits
 
 
-_DATA: tuple = ()
+@contextmanager
+def workers(base: Twin, observations: Sequence, count: int) -> Iterator[Workers]:
+    """`Workers` with `count` processes; an interrupt ends them."""
+    if count < 2:
+        yield Workers(base, observations)
+        return
+    pool = ProcessPoolExecutor(
+        count, get_context("fork"), initializer=_prepare, initargs=(base, observations)
+    )
+    try:
+        yield Workers(base, observations, pool)
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+_DATA: tuple = ()  # of a worker process: base twin and observations
 
 
 def _prepare(base, observations):
@@ -75,25 +93,179 @@ def _prepare(base, observations):
     _DATA = base, observations
 
 
-def _work(job):
+def work(job: dict) -> Fit:
+    """Fit `hypothesis` to the observations with the indices `use` (all by default).
+
+    With `theta` from there; with `fit` from where that ended and the newest effect's scan; else by
+    continuation from the starts `starts` or the newest effect's scan; `source_free` as in
+    `fit_hypothesis`.
+    """
     base, observations = _DATA
-    job = dict(job)
-    chosen = job.pop("observations", None)
-    if chosen is not None:
-        observations = [observations[k] for k in chosen]
-    hypothesis = job.pop("hypothesis")
-    starts = job.pop("starts", None) or scan(base.rig, hypothesis)
-    return fit_hypothesis(base, hypothesis, observations, starts, **job)
+    use = job.get("use")
+    observations = observations if use is None else [observations[k] for k in use]
+    hypothesis, free = job["hypothesis"], job.get("source_free", False)
+    if "theta" in job:
+        return refine(base, hypothesis, observations, [job["theta"]], free)
+    if "fit" in job:
+        twin, thetas = base.with_(effects=hypothesis), []
+        for start in scan(base.rig, hypothesis):
+            theta = carry(job["fit"], hypothesis, base)
+            for name, u in start.items():
+                theta[twin.index[name]] = u
+            thetas.append(theta)
+        return refine(base, hypothesis, observations, thetas, free)
+    starts = job.get("starts") or scan(base.rig, hypothesis)
+    return fit_hypothesis(base, hypothesis, observations, starts, free)
 
 
-def library(rig, observations: Sequence) -> list[tuple[Effect, Place]]:
-    """The candidates that these data can say anything about."""
-    kinds = {o.kind for o in observations}
-    found = []
-    for effect, place in candidates(rig):
-        if kinds == {"input_impedance"} and effect.element in ("source", "sensor"):
-            continue
-        if effect.name == "entrained_air" and "periodic" not in kinds:
-            continue
-        found.append((effect, place))
-    return found
+@dataclass
+class Search:
+    """What the search found.
+
+    base     the paper's line, fitted
+    singles  every effect at every place alone, best first
+    best     the accepted hypothesis (may be the base)
+    rivals   fits of the last step that took `best` in or could have: alternatives to it
+    others   passive networks that compete, best first
+    """
+
+    base: Fit
+    singles: list[Fit]
+    best: Fit
+    rivals: list[Fit] = field(default_factory=list)
+    others: list[Fit] = field(default_factory=list)
+
+    def gain(self, fit: Fit) -> float:
+        """Log evidence over the base."""
+        return fit.evidence - self.base.evidence
+
+
+def search(pool: Workers, progress: Callable[[str, int, int], None] | None = None) -> Search:
+    """Forward and backward steps over the library, from the base; see `Search`."""
+    rig = pool.base.rig
+    found = library(rig, pool.observations)
+    tell = _counter(progress, "single effects", len(found) + 1)
+    fits = pool.fit([{"hypothesis": h} for h in [(), *((c,) for c in found)]], tell)
+    base, singles = fits[0], _ranked(fits[1:])
+    singles = polish(pool, singles)
+    best, rivals = base, singles
+    step = singles
+    while True:
+        new = step[0] if step else None
+        if new is None or new.evidence - best.evidence < needed(new):
+            certain = [f for f in step if f.hypothesis[-1][0].certain]
+            # What no line is without is taken in with something else, never alone.
+            if not (best.hypothesis and certain):
+                break
+            new = certain[0]
+            if new.evidence - best.evidence < CERTAIN:
+                break
+        best, rivals = new, step
+        best = backward(pool, best)
+        if len(best.hypothesis) >= MOST:
+            break
+        jobs = [
+            extended(best, candidate, rig)
+            for candidate in found
+            if candidate not in best.hypothesis
+        ]
+        tell = _counter(progress, f"{len(best.hypothesis) + 1} effects", len(jobs))
+        step = _ranked(pool.fit(jobs, tell))
+    return Search(base, singles, best, rivals)
+
+
+def extended(best: Fit, candidate, rig) -> dict:
+    """The job that adds a candidate to a fit.
+
+    Where the fit is still poor its parameters are bent, and the fit starts from nominal again with
+    its effects where they were; where it is good the candidate starts from it.
+    """
+    hypothesis = (*best.hypothesis, candidate)
+    if best.floor > GOOD:
+        index, theta = best.twin.index, best.twin.theta
+        kept = {name: float(theta[k]) for name, k in index.items() if "@" in name}
+        starts = [{**kept, **start} for start in scan(rig, hypothesis)]
+        return {"hypothesis": hypothesis, "starts": starts}
+    return {"hypothesis": hypothesis, "fit": best}
+
+
+def polish(pool: Workers, fits: list[Fit], count: int = 3) -> list[Fit]:
+    """Fits again, from more starts, those of the best that may have stopped in a wrong valley."""
+    again = [f for f in fits[:count] if f.floor > GOOD and f.hypothesis]
+    jobs = [{"hypothesis": f.hypothesis, "starts": finer(pool.base.rig, f)} for f in again]
+    better = {id(f): new for f, new in zip(again, pool.fit(jobs))}
+    return _ranked([max(f, better.get(id(f), f), key=lambda x: x.evidence) for f in fits])
+
+
+def finer(rig, fit: Fit) -> list[dict[str, float]]:
+    """Starts about where a fit ended, and a finer grid over what its effect scans."""
+    effect, place = fit.hypothesis[-1]
+    label = f"{effect.name}@{place}"
+    own = {
+        p.name: float(fit.twin.theta[fit.twin.index[f"{label}.{p.name}"]])
+        for p in effect.parameters(rig, place)
+    }
+    starts = []
+    for p in effect.parameters(rig, place):
+        if len(p.scan) > 1:
+            low, high = min(p.scan), max(p.scan)
+            for u in np.linspace(1.3 * low, 1.3 * high, 2 * len(p.scan)):
+                starts.append({f"{label}.{n}": v for n, v in {**own, p.name: float(u)}.items()})
+    return starts or [{f"{label}.{n}": v for n, v in own.items()}, {}]
+
+
+def backward(pool: Workers, best: Fit) -> Fit:
+    """Drop every effect that the others have made needless."""
+    while len(best.hypothesis) > 1:
+        jobs = []
+        for k in range(len(best.hypothesis)):
+            rest = best.hypothesis[:k] + best.hypothesis[k + 1 :]
+            jobs.append({"hypothesis": rest, "theta": carry(best, rest, pool.base)})
+        fits = pool.fit(jobs)
+        losses = [
+            best.evidence - fit.evidence - needed_of(effect)
+            for fit, (effect, _) in zip(fits, best.hypothesis)
+        ]
+        weakest = int(np.argmin(losses))
+        if losses[weakest] >= 0:
+            break
+        best = fits[weakest]
+    return best
+
+
+def carry(fit: Fit, hypothesis: Hypothesis, base: Twin) -> np.ndarray:
+    """theta of a twin with another hypothesis, parameters in common where `fit` has them."""
+    twin = base.with_(effects=hypothesis)
+    return np.array(
+        [
+            fit.twin.theta[fit.twin.index[p.name]] if p.name in fit.twin.index else 0.0
+            for p in twin.parameters
+        ]
+    )
+
+
+def needed(fit: Fit) -> float:
+    """Log evidence that the newest effect of a fit must have added."""
+    return needed_of(fit.hypothesis[-1][0])
+
+
+def needed_of(effect: Effect) -> float:
+    """Log evidence that an effect must add."""
+    return CERTAIN if effect.certain else ACCEPT
+
+
+def _ranked(fits: Sequence[Fit]) -> list[Fit]:
+    return sorted((f for f in fits if np.isfinite(f.evidence)), key=lambda f: -f.evidence)
+
+
+def _counter(progress, what: str, total: int):
+    if progress is None:
+        return None
+    done = 0
+
+    def tell():
+        nonlocal done
+        done += 1
+        progress(what, done, total)
+
+    return tell

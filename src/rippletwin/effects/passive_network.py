@@ -1,0 +1,72 @@
+"""A passive one-port of no particular physics, for what is missing and has no name.
+
+Foster's second form: any lossless admittance is a sum of a capacitance, an inductance and series
+resonators; with resistances in them, every sum with positive elements is realisable, hence passive.
+A conductance, a capacitance and two resonators go far below 5 kHz. As a series impedance the dual
+network stands.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rippletwin.effects.base import (
+    Effect,
+    Parameter,
+    Place,
+    lognormal,
+    on_line,
+    position_parameter,
+)
+from rippletwin.line.chain import Insert
+
+RESONATORS = ((500.0, "first"), (1800.0, "second"))  # prior median frequency in Hz, name
+
+
+def one_port(s, values, unit):
+    """Immittance in the unit of `unit`, a characteristic immittance."""
+    total = values["flat"] + s * values["rising"] / (2.0 * np.pi * 1000.0)
+    for _, name in RESONATORS:
+        w = 2.0 * np.pi * values[f"{name}_frequency"]
+        band = 2.0 * values[f"{name}_damping"] * w * s
+        total = total + values[f"{name}_peak"] * band / (s**2 + band + w**2)
+    return unit * total
+
+
+def _apply(network, line, values, place):
+    characteristic = line.density * line.wave_speeds[0] / line.area(0)
+    kind = place.form
+    unit = 1.0 / characteristic if kind == "shunt" else characteristic
+    position = on_line(network, values["position"])
+    network.inserts.append(Insert(position, kind, one_port(network.s, values, unit)))
+
+
+def _parameters(rig, place):
+    parameters = [
+        position_parameter(rig),
+        Parameter("flat", "1", lognormal(0.03, 1.5)),
+        Parameter("rising", "1", lognormal(0.1, 1.5)),
+    ]
+    for frequency, name in RESONATORS:
+        parameters += [
+            Parameter(f"{name}_peak", "1", lognormal(0.1, 1.5)),
+            Parameter(f"{name}_frequency", "Hz", lognormal(frequency, 0.7)),
+            Parameter(f"{name}_damping", "1", lognormal(0.2, 1.0)),
+        ]
+    return tuple(parameters)
+
+
+EFFECT = Effect(
+    name="passive_network",
+    element="position",
+    medium="any",
+    equation="Y Zc = g + c s/(2 pi 1 kHz) + sum_k h_k 2 zeta_k w_k s/(s^2 + 2 zeta_k w_k s "
+    "+ w_k^2), or Z/Zc likewise",
+    source="Foster 1924, Bell Syst. Tech. J. 3:259; Brune 1931, J. Math. Phys. 10:191 (passivity)",
+    time_domain="a node with a resistance, a capacitance and two resonators, one second-order "
+    "state each",
+    parameters=_parameters,
+    places=lambda rig: (Place("position", form="shunt"), Place("position", form="series")),
+    apply=_apply,
+    named=False,
+)
