@@ -161,7 +161,7 @@ def _first_states(posterior: Posterior, starts) -> list:
     speeds = [twin.index[f"wave_speed[{k + 1}]"] for k in range(len(delays))]
     # Every pair, or, where there are many starts already, all wave speeds together.
     pairs = [(a, b) for a in SCALINGS for b in SCALINGS]
-    if len(delays) == 1 or (len(starts) > 2 and globals().get("FULL", 7) == 7):
+    if len(delays) == 1 or len(starts) > FEW:
         pairs = [(a, a) for a in SCALINGS]
     groups = []
     for start in starts:

@@ -1,0 +1,210 @@
+"""Is anything missing at all? Three alarms, and drift within a recording.
+
+Refitting hides what is missing, so a good fit proves nothing. The alarms are the misfit left after
+refitting, the pull of the parameters on their priors (where an absorbed effect shows), and the
+disagreement of parameters fitted to each operating point alone. What decides is the evidence that
+the best effect of the whole library adds (`rippletwin.explain.search.ACCEPT`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from rippletwin.explain.fit import Fit
+from rippletwin.explain.posterior import FLOOR, Posterior
+
+MISFIT = 3.0 * FLOOR  # relative model error above which a fit is bad
+PULL = 4.0  # prior standard deviations
+DISAGREEMENT = 4.0  # standard deviations between two operating points
+SIGNIFICANCE = 1e-3
+
+
+@dataclass(frozen=True)
+class Alarms:
+    """What each alarm reads, and whether it rings.
+
+    misfit         relative model error left in the base fit
+    pull           largest |coordinate| of a parameter with a prior, and whose
+    disagreement   largest difference between operating points, in standard deviations, and whose
+    drift          p-value that early and late windows are one state, and of which recording
+    """
+
+    misfit: float
+    pull: tuple[float, str]
+    disagreement: tuple[float, str]
+    drift: tuple[float, str]
+
+    @property
+    def ringing(self) -> tuple[str, ...]:
+        """Names of the alarms that ring."""
+        rings = {
+            "misfit": self.misfit > MISFIT,
+            "pull": self.pull[0] > PULL,
+            "disagreement": self.disagreement[0] > DISAGREEMENT,
+            "drift": self.drift[0] < SIGNIFICANCE,
+        }
+        return tuple(name for name, rung in rings.items() if rung)
+
+
+def pull(fit: Fit) -> tuple[float, str]:
+    """Largest pull of a line parameter on its prior, and the parameter's name."""
+    pulls = [
+        (abs(float(u)), p.name)
+        for p, u in zip(fit.twin.parameters, fit.twin.theta)
+        if not p.flat and "@" not in p.name
+    ]
+    return max(pulls, default=(0.0, ""))
+
+
+def disagreement(fits: Sequence[Fit]) -> tuple[float, str]:
+    """Largest difference of a line parameter between fits to single operating points.
+
+    Two posteriors of one parameter share its prior: the variance of their difference is that of
+    both less what the prior gave both, which is held positive.
+    """
+    worst = (0.0, "")
+    for i, a in enumerate(fits):
+        for b in fits[i + 1 :]:
+            for p in a.twin.parameters:
+                if p.flat or "@" in p.name or p.name not in b.twin.index:
+                    continue
+                k, m = a.twin.index[p.name], b.twin.index[p.name]
+                va, vb = a.covariance[k, k], b.covariance[m, m]
+                variance = va * max(1.0 - va, 0.0) + vb * max(1.0 - vb, 0.0) + 1e-4
+                z = abs(a.twin.theta[k] - b.twin.theta[m]) / np.sqrt(variance)
+                worst = max(worst, (float(z), p.name))
+    return worst
+
+
+def drift(early: Sequence, late: Sequence) -> tuple[float, str]:
+    """Smallest p-value, over recordings, that two parts of it agree, and the recording's label.
+
+    The shaft angle between the parts is free, the covariances are the parts' own, and a relative
+    error of a tenth of the model's floor is allowed. Corrected for the number of recordings.
+    """
+    worst = (1.0, "")
+    for a, b in zip(early, late):
+        if a.orders is None:
+            continue
+        orders = np.asarray(a.orders, float)
+        power = np.mean(np.abs(a.values) ** 2, axis=0)
+        variance = np.einsum("fss->sf", a.covariance + b.covariance).real
+        variance = variance + (0.1 * FLOOR) ** 2 * power
+        match = np.sum(np.conj(a.values) * b.values / variance, axis=0)
+        # The angle: first coarsely, from the strongest order, then refined by the phase slope.
+        grid = np.linspace(-np.pi, np.pi, 4001) / np.gcd.reduce(np.asarray(a.orders, int))
+        angle = grid[np.argmax((np.exp(-1j * np.outer(grid, orders)) @ match).real)]
+        for _ in range(3):
+            turned = match * np.exp(-1j * angle * orders)
+            angle += np.sum(orders * turned.imag) / max(np.sum(orders**2 * np.abs(turned)), 1e-300)
+        difference = b.values * np.exp(-1j * angle * orders) - a.values
+        statistic = 2.0 * np.sum(np.abs(difference) ** 2 / variance)
+        p = chi2.sf(statistic, 2 * a.values.size - 1)
+        worst = min(worst, (min(1.0, float(p) * len(early)), a.label))
+    return worst
+
+
+def p_value(gain: float, tried: int) -> float:
+    """Bound on the chance of so much evidence from `tried` effects without any: Markov's inequality
+    on the Bayes factor, whose mean is 1 under the base, summed over the library."""
+    return float(min(1.0, tried * np.exp(-min(gain, 700.0))))
+
+
+def bands(fit: Fit, observations: Sequence) -> list[list[float]]:
+    """Frequency bands (Hz) in which the fit's whitened residual stands out, joined where close."""
+    posterior, r = _whitened(fit, observations)
+    frequency = np.concatenate([o.frequency_hz for o in posterior.observations])
+    size = np.mean(np.abs(r) ** 2, axis=0)
+    order = np.argsort(frequency)
+    frequency, size = frequency[order], size[order]
+    found = []
+    for f, s in zip(frequency, size):
+        if s < 9.0:
+            continue
+        if found and f < 1.25 * found[-1][1]:
+            found[-1][1] = float(f)
+        else:
+            found.append([float(f), float(f)])
+    return found
+
+
+def conditions(fit: Fit, observations: Sequence) -> list[int]:
+    """Indices of the operating points at which the fit's residual stands out."""
+    posterior, r = _whitened(fit, observations)
+    sizes = [float(np.mean(np.abs(r[:, part]) ** 2)) for part in posterior.forward.slices]
+    return [k for k, size in enumerate(sizes) if size > 4.0]
+
+
+def crank_angles(fit: Fit, observations: Sequence, samples: int = 360) -> list[list[float]]:
+    """Shaft angles (deg, within a piston's pitch) where the residual's ripple is concentrated.
+
+    Those that hold half of its energy, of periodic recordings on the common shaft angle.
+    """
+    posterior = _posterior(fit, observations)
+    prediction = posterior.predict(fit.twin.theta)
+    energy, pitch = np.zeros(samples), None
+    for o, part in zip(posterior.observations, posterior.forward.slices):
+        if o.orders is None:
+            continue
+        index = fit.twin.index.get(f"angle[{o.label}]")
+        turn = 0.0 if index is None else fit.twin.parameters[index].value(fit.twin.theta[index])
+        orders = np.asarray(o.orders, float)
+        pitch = 2 * np.pi / np.gcd.reduce(np.asarray(o.orders, int))
+        angle = pitch * np.arange(samples) / samples
+        residual = (o.values - prediction[:, part]) * np.exp(-1j * turn * orders)
+        wave = (residual @ np.exp(1j * np.outer(orders, angle))).real
+        energy += np.sum(wave**2, axis=0) / np.sum(np.abs(o.values) ** 2)
+    if pitch is None or not np.any(energy):
+        return []
+    strong = np.argsort(-energy)
+    count = int(np.searchsorted(np.cumsum(energy[strong]), 0.5 * energy.sum())) + 1
+    inside = np.zeros(samples, bool)
+    inside[strong[:count]] = True
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(int)))
+    step = np.rad2deg(pitch) / samples
+    return [[float(a * step), float(b * step)] for a, b in edges.reshape(-1, 2)]
+
+
+def residual_map(fit: Fit, observations: Sequence) -> list[np.ndarray]:
+    """|whitened residual| (S, F) of each observation, unit where the fit is as good as believed."""
+    posterior, r = _whitened(fit, observations)
+    return [np.abs(r[:, part]) for part in posterior.forward.slices]
+
+
+def interior_test(observations: Sequence, fit: Fit) -> list[np.ndarray]:
+    """Relative misfit (F,) of p2 from p1 and p3 alone in each observation of three sensors.
+
+    p2 = [sinh g(L - x) p1 + sinh g x p3]/sinh g L holds whatever source and load are (between two
+    sensors of one segment; through several, the same relation of their transfer matrices):
+
+        p2 = A p1 + B p3,  A = T23_12/T13_12,  B = T12_12/T13_12,
+
+    T_ij being the matrix from sensor i to j. Empty where there are fewer sensors.
+    """
+    if len(fit.twin.rig.sensors) < 3:
+        return []
+    posterior = _posterior(fit, observations)
+    network = posterior.forward.network(fit.twin.theta)
+    first, middle, last = np.sort(network.sensor_positions)[[0, 1, -1]]
+    rows = np.argsort(network.sensor_positions)[[0, 1, -1]]
+    whole = network.transfer(first, last)[:, 0, 1]
+    near, far = network.transfer(first, middle)[:, 0, 1], network.transfer(middle, last)[:, 0, 1]
+    factor = np.broadcast_to(network.sensor_factor, posterior.values.shape)
+    p1, p2, p3 = (posterior.values / factor)[rows]
+    error = np.abs(p2 - (far * p1 + near * p3) / whole) / np.sqrt(posterior.power)
+    return [error[part] for part in posterior.forward.slices]
+
+
+def _posterior(fit: Fit, observations: Sequence) -> Posterior:
+    posterior = Posterior(fit.twin, observations, None, fit.source_free)
+    posterior.floor, posterior.source_sd = FLOOR, fit.source_sd
+    return posterior
+
+
+def _whitened(fit: Fit, observations: Sequence):
+    posterior = _posterior(fit, observations)
+    return posterior, posterior.whitened(posterior.predict(fit.twin.theta))[0]

@@ -1,0 +1,158 @@
+"""From fits to a verdict: what is named, what cannot be told apart, what has no name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rippletwin.explain.detect import Alarms
+from rippletwin.explain.fit import Fit
+from rippletwin.explain.search import ACCEPT, GOOD, Search
+from rippletwin.explain.validate import Validation
+
+VERDICTS = ("consistent", "named", "ambiguous", "unexplained", "calibration_only", "bad_data")
+
+EQUIVALENT = 3.0
+"""Log evidence within which two explanations cannot be told apart: twenty to one."""
+
+ADEQUATE = 5.0 * GOOD
+"""Relative model error above which no name is given: an effect that leaves more than this is at
+most a part of what is missing."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The verdict and what it rests on.
+
+    verdict      one of VERDICTS
+    accepted     the fit whose twin later stages use
+    equivalents  names that cannot be told apart, each list one class
+    reason       for bad data: what contradicts what
+    """
+
+    verdict: str
+    accepted: Fit
+    equivalents: tuple[tuple[str, ...], ...] = field(default=())
+    reason: str = ""
+
+
+def judge(
+    search: Search, alarms: Alarms, validation: Validation | None, contradiction: str = ""
+) -> Judgement:
+    """Weigh the search's best explanation against the base, its rivals and the nameless networks.
+
+    `contradiction` says why the data contradict themselves, if they do.
+    """
+    best, other = search.best, search.others[0] if search.others else None
+    if contradiction:
+        return Judgement("bad_data", search.base, reason=contradiction)
+    nameless = other is not None and other.evidence > best.evidence + needed_over(best, search)
+    if nameless:
+        return Judgement("unexplained", other)
+    if not best.hypothesis:
+        if "misfit" in alarms.ringing or "drift" in alarms.ringing:
+            return Judgement("unexplained", best)
+        calibrated = {"pull", "disagreement"} & set(alarms.ringing)
+        return Judgement("calibration_only" if calibrated else "consistent", best)
+    if best.floor > ADEQUATE or (validation is not None and not validation.holds):
+        return Judgement("unexplained", best)
+    classes = equivalents(search)
+    return Judgement("ambiguous" if classes else "named", best, classes)
+
+
+def needed_over(best: Fit, search: Search) -> float:
+    """Log evidence by which a nameless network must beat the best named explanation.
+
+    Where the named one is as good as can be believed the nameless has nothing to add.
+    """
+    if not best.hypothesis:
+        return ACCEPT
+    return np.inf if best.floor <= GOOD else EQUIVALENT
+
+
+def equivalents(search: Search) -> tuple[tuple[str, ...], ...]:
+    """Classes of effect names whose evidence is too close to the best explanation's."""
+    best = search.best
+    own = set(best.names)
+    rest = own - {best.names[-1]} if len(own) > 1 else set()
+    close = {best.names[-1]}
+    for fit in search.rivals:
+        if best.evidence - fit.evidence < EQUIVALENT and len(fit.names) == len(best.names):
+            different = set(fit.names) - rest
+            if len(different) == 1:
+                close |= different
+    return (tuple(sorted(close)),) if len(close) > 1 else ()
+
+
+def probabilities(search: Search, accepted: Fit) -> dict[str, float]:
+    """Posterior probability of each accepted effect, all hypotheses tried being equally likely
+    beforehand but for the number of places of an effect."""
+    fits: list[Fit] = [search.base, *search.singles, *search.rivals, *search.others, accepted]
+    unique = {tuple((e.name, str(p)) for e, p in f.hypothesis): f for f in fits}
+    evidence = np.array([f.evidence for f in unique.values()])
+    weight = np.exp(evidence - evidence.max())
+    weight /= weight.sum()
+    return {
+        name: float(sum(w for w, f in zip(weight, unique.values()) if name in f.names))
+        for name in accepted.names
+    }
+
+
+def intervals(fit: Fit) -> list[dict]:
+    """Each effect with its place and its parameters' values and 95 % intervals.
+
+    An effect without parameters of its own works through the fluid's viscosity, which stands in.
+    """
+    twin, sd, found = fit.twin, fit.sd, []
+    for effect, place in fit.hypothesis:
+        label = f"{effect.name}@{place}"
+        own = [k for k, p in enumerate(twin.parameters) if p.place == label]
+        own = own or [twin.index["viscosity"]]
+        parameters = {}
+        for k in own:
+            p, u = twin.parameters[k], twin.theta[k]
+            ends = sorted(float(p.value(u + side * 1.96 * sd[k])) for side in (-1, 1))
+            name = p.name.split(".")[-1]
+            name = "kinematic_viscosity" if name == "viscosity" else name
+            parameters[name] = {"value": float(p.value(u)), "ci95": ends, "unit": p.unit}
+        found.append({"effect": effect, "place": place, "parameters": parameters})
+    return found
+
+
+def span(rig, effect, place, parameters: dict) -> tuple[str, list[float]]:
+    """Element and interval along the line (m) at which an effect acts."""
+    ends = np.cumsum([s.length for s in rig.line])
+    starts = ends - [s.length for s in rig.line]
+    if "position" in parameters:
+        low, high = parameters["position"]["ci95"]
+        middle = parameters["position"]["value"]
+        k = int(min(np.searchsorted(ends, middle), len(ends) - 1))
+        if low >= starts[k] and high <= ends[k]:
+            return f"segment {k + 1}", [low, high]
+        return between(rig, low, high), [low, high]
+    if place.element.startswith("segment"):
+        return place.element, [float(starts[place.index]), float(ends[place.index])]
+    if place.element.startswith("sensor"):
+        x = rig.sensors[place.index].position
+        return place.element, [x, x]
+    total = float(ends[-1])
+    return place.element, {"source": [0.0, 0.0], "load": [total, total]}.get(
+        place.element, [0.0, total]
+    )
+
+
+def between(rig, low: float, high: float) -> str:
+    """The stretch between sensors, pump and load that holds an interval."""
+    marks = [("pump", 0.0), *((s.name, s.position) for s in rig.sensors), ("load", rig.length)]
+    marks.sort(key=lambda m: m[1])
+    left = [name for name, x in marks if x <= low] or ["pump"]
+    right = [name for name, x in marks if x >= high] or ["load"]
+    return f"between {left[-1]} and {right[0]}"
+
+
+def join(words: Sequence[str]) -> str:
+    """Words in a row as in a sentence."""
+    words = list(words)
+    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]

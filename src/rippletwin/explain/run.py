@@ -1,0 +1,143 @@
+"""`explain`: from a case to what its twin lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rippletwin.case import Case
+from rippletwin.effects import candidates
+from rippletwin.errors import InputError
+from rippletwin.explain import detect
+from rippletwin.explain.fit import Fit, prepare
+from rippletwin.explain.judge import ADEQUATE, Judgement, judge
+from rippletwin.explain.search import GOOD, Search, Workers, extended, search, workers
+from rippletwin.explain.validate import Validation, validate
+from rippletwin.spectra import observe, revolutions_of
+from rippletwin.twin import Twin
+
+HIGHEST_HZ = 4000.0
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """All that was found; `rippletwin.explain.verdict` writes it down.
+
+    observations are as fitted; single holds the base fitted to each of them alone.
+    """
+
+    rig: object
+    observations: tuple
+    alarms: detect.Alarms
+    search: Search
+    judgement: Judgement
+    validation: Validation
+    single: tuple[Fit, ...]
+
+    @property
+    def twin(self) -> Twin:
+        """The corrected twin, which later stages use."""
+        return self.judgement.accepted.twin
+
+
+def explain(
+    case: Case, processes: int = 2, progress: Callable[[str, int, int], None] | None = None
+) -> Explanation:
+    """Explain a case's healthy recordings.
+
+    `progress` is told what is being fitted, how many fits are done, and of how many.
+    Raises InputError where no recording is healthy.
+    """
+    if not case.healthy:
+        raise InputError(
+            case.folder / "rig.yaml",
+            "recordings",
+            "none has state: healthy",
+            "explaining needs at least one healthy recording",
+        )
+    observations, early, late = [], [], []
+    for recording in case.healthy:
+        if recording.kind == "periodic":
+            whole, first, second = _periodic(recording, case.rig)
+            observations.append(whole)
+            early.append(first)
+            late.append(second)
+        else:
+            observations.append(observe(recording, case.rig, HIGHEST_HZ))
+    return explain_observations(case.rig, observations, early, late, processes, progress)
+
+
+def explain_observations(
+    rig,
+    observations: Sequence,
+    early: Sequence = (),
+    late: Sequence = (),
+    processes: int = 2,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Explanation:
+    """Explain observations; `early` and `late` are those of the two halves of periodic ones."""
+    data = prepare(observations, rig, HIGHEST_HZ if observations[0].orders is not None else None)
+    early, late = prepare(early, rig, HIGHEST_HZ), prepare(late, rig, HIGHEST_HZ)
+    base = Twin(rig, data)
+    with workers(base, data, processes) as pool:
+        found = search(pool, progress)
+        found.others = _others(pool, found)
+        single = _alone(pool, found.base)
+        alarms = detect.Alarms(
+            found.base.floor,
+            detect.pull(found.base),
+            detect.disagreement(single),
+            detect.drift(early, late),
+        )
+        explanation = found.others[0] if _prefers_other(found) else found.best
+        held = late if len(data) == 1 and late else None
+        validation = validate(pool, found.base, explanation, held)
+    judgement = judge(found, alarms, validation if explanation.hypothesis else None)
+    return Explanation(rig, tuple(data), alarms, found, judgement, validation, tuple(single))
+
+
+def _others(pool: Workers, found: Search) -> list[Fit]:
+    """Passive networks without a name, alone and beside the best, where there is room for them."""
+    best = found.best
+    if best.floor <= GOOD:
+        return []
+    networks = [c for c in candidates(pool.base.rig, named=False)]
+    jobs = [{"hypothesis": (network,)} for network in networks]
+    if best.hypothesis:
+        jobs += [extended(best, network, pool.base.rig) for network in networks]
+    fits = [f for f in pool.fit(jobs) if np.isfinite(f.evidence)]
+    return sorted(fits, key=lambda f: -f.evidence)
+
+
+def _prefers_other(found: Search) -> bool:
+    best = found.best
+    if not found.others:
+        return False
+    return found.others[0].evidence > best.evidence and best.floor > min(GOOD, ADEQUATE)
+
+
+def _alone(pool: Workers, base: Fit) -> list[Fit]:
+    """The base fitted to each observation alone; none where there is only one."""
+    count = len(pool.observations)
+    if count < 2:
+        return []
+    return pool.fit(
+        [{"hypothesis": (), "theta": base.twin.theta, "use": [k]} for k in range(count)]
+    )
+
+
+def _periodic(recording, rig):
+    """Observations of a periodic recording: whole, first half, second half of its revolutions."""
+    revolutions = revolutions_of(recording, rig)
+    count = len(revolutions.windows)
+    cuts = [slice(None), slice(0, count // 2), slice(count // 2, None)]
+    parts = [
+        replace(revolutions, windows=revolutions.windows[cut], speed_hz=revolutions.speed_hz[cut])
+        for cut in cuts
+    ]
+    return [observe(recording, rig, HIGHEST_HZ, revolutions=part) for part in parts]
+
+
+__all__ = ["Explanation", "explain", "explain_observations"]

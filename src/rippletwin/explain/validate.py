@@ -1,0 +1,156 @@
+"""Does the explanation hold on data it has not seen, and do its parameters agree between folds?
+
+Real physics transfers to another operating point; an absorber does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rippletwin.explain.fit import Fit, align, select
+from rippletwin.explain.posterior import Posterior
+from rippletwin.explain.search import Workers
+from rippletwin.misfit import relative_misfit, theil
+
+AGREE = 3.5  # standard deviations between a fold's parameter of an effect and the whole fit's
+
+
+@dataclass(frozen=True)
+class Score:
+    """Relative complex misfit and Theil's coefficient."""
+
+    misfit: float
+    theil: float
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Base ("before") and explanation ("after") in sample and held out.
+
+    left_out     what each fold left out, in words
+    disagreement largest difference of an effect's parameter between a fold and the whole, in
+                 standard deviations
+    """
+
+    before: dict[str, Score]
+    after: dict[str, Score]
+    left_out: tuple[str, ...]
+    disagreement: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether the held-out misfit improves and the parameters agree."""
+        better = self.after["held_out"].misfit < self.before["held_out"].misfit
+        return better and self.disagreement < AGREE
+
+
+def score(fit: Fit, observations: Sequence, turn: bool = False) -> Score:
+    """Misfits of a fit's predictions; free sources get their most likely amplitude.
+
+    With `turn` the shaft angles, which every recording has anew, are fitted first, alone.
+    """
+    twin = fit.twin
+    posterior = Posterior(twin, observations, None, fit.source_free)
+    posterior.floor, posterior.source_sd = fit.floor, fit.source_sd
+    theta = twin.theta
+    if turn:
+        theta = _turned(posterior, theta)
+    h = posterior.best_source(posterior.predict(theta))
+    return Score(relative_misfit(posterior.values, h), theil(posterior.values, h))
+
+
+def validate(pool: Workers, base: Fit, best: Fit, late: Sequence | None = None) -> Validation:
+    """Folds over operating points; with one only, over its late windows `late`, else frequencies.
+
+    Every fold's fits start from the whole fits: they are close, and the folds differ in data only.
+    """
+    observations = pool.observations
+    count = len(observations)
+    fits = [base, best]
+    if count > 1:
+        folds = [[k for k in range(count) if k != left] for left in range(count)]
+        held = [[observations[left]] for left in range(count)]
+        words = tuple(f"recording {o.label}" for o in observations)
+        refitted = _refit(pool, fits, folds)
+    elif late is not None:
+        folds, held, words = [[0]], [list(late)], ("the second half of the recording",)
+        refitted = _refit(pool, fits, folds)
+    else:
+        folds, held, words, refitted = _frequency_folds(pool, fits)
+    in_sample = [score(fit, observations) for fit in fits]
+    outside = []
+    for which in range(2):
+        scores = [score(fold[which], h, turn=True) for fold, h in zip(refitted, held)]
+        outside.append(Score(_rms([s.misfit for s in scores]), _rms([s.theil for s in scores])))
+    return Validation(
+        {"in_sample": in_sample[0], "held_out": outside[0]},
+        {"in_sample": in_sample[1], "held_out": outside[1]},
+        words,
+        max((_difference(best, fold[1]) for fold in refitted), default=0.0),
+    )
+
+
+def _refit(pool: Workers, fits: list[Fit], folds: list[list[int]]) -> list[list[Fit]]:
+    jobs = [
+        {"hypothesis": f.hypothesis, "theta": f.twin.theta, "use": use}
+        for use in folds
+        for f in fits
+    ]
+    flat = pool.fit(jobs)
+    return [flat[2 * k : 2 * k + 2] for k in range(len(folds))]
+
+
+def _frequency_folds(pool: Workers, fits: list[Fit]):
+    """Every second stretch of an eighth of the band left out of a single spectrum."""
+    observation = pool.observations[0]
+    part = np.floor(8 * np.arange(len(observation.frequency_hz)) / len(observation.frequency_hz))
+    held, refitted = [], []
+    for parity in (0, 1):
+        inside = part % 2 == parity
+        kept = [select(observation, inside)]
+        rest = Workers(pool.base, kept)
+        held.append([select(observation, ~inside)])
+        refitted.append(
+            rest.fit([{"hypothesis": f.hypothesis, "theta": f.twin.theta} for f in fits])
+        )
+    words = ("odd eighths of the band", "even eighths of the band")
+    return [[0], [0]], held, words, refitted
+
+
+def _difference(whole: Fit, fold: Fit) -> float:
+    """Largest difference of an effect's parameter in the fold's standard deviations.
+
+    The fold's data are part of the whole's, so that the variance of the difference is the fold's
+    less the whole's; it is held above a quarter of the fold's.
+    """
+    worst = 0.0
+    for p in whole.twin.parameters:
+        if "@" in p.name:
+            k, m = whole.twin.index[p.name], fold.twin.index[p.name]
+            own = fold.covariance[m, m]
+            variance = max(own - whole.covariance[k, k], 0.25 * own) + 1e-4
+            z = abs(whole.twin.theta[k] - fold.twin.theta[m]) / np.sqrt(variance)
+            worst = max(worst, float(z))
+    return worst
+
+
+def _turned(posterior: Posterior, theta: np.ndarray) -> np.ndarray:
+    """theta with the shaft angles fitted and all else held."""
+    angles = np.flatnonzero(~posterior.prior)
+    used = [k for k in angles if k in posterior.forward.angle_index]
+    if not used:
+        return theta
+    theta = align(posterior, theta)[1]
+    for _ in range(6):
+        r, jacobian = posterior.linearise(theta, posterior.predict(theta))
+        step = np.linalg.lstsq(jacobian[:, used], -r, rcond=None)[0]
+        theta = theta.copy()
+        theta[used] += np.clip(step, -5.0, 5.0)
+    return theta
+
+
+def _rms(values: Sequence[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))

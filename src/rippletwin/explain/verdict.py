@@ -1,0 +1,172 @@
+"""verdict.json: the explanation in the words of the contract, written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+
+from rippletwin.explain import detect
+from rippletwin.explain.judge import intervals, join, probabilities, span
+from rippletwin.explain.run import Explanation
+
+CHANCE = {
+    "consistent": "The recordings are what the twin predicts within the data sheet's tolerances.",
+    "calibration_only": "The line's nominal values are off by more than their stated tolerances, "
+    "but no physics is missing: use the calibrated values and look at the data sheet.",
+}
+
+
+def verdict(explanation: Explanation) -> dict:
+    """The verdict as plain data, with the keys of verdict.json."""
+    e = explanation
+    judgement, base = e.judgement, e.search.base
+    accepted = judgement.accepted
+    found = (
+        intervals(accepted) if judgement.verdict in ("named", "ambiguous", "unexplained") else []
+    )
+    chances = probabilities(e.search, accepted)
+    present = judgement.verdict not in ("consistent", "calibration_only")
+    tried = len(e.search.singles) + 1
+    gain = max([0.0, *(e.search.gain(f) for f in e.search.singles), e.search.gain(accepted)])
+    named = [entry for entry in found if entry["effect"].named]
+    effects = [
+        {
+            "name": entry["effect"].name,
+            "element": entry["place"].element,
+            "parameters": entry["parameters"],
+            "probability": chances[entry["effect"].name],
+        }
+        for entry in named
+        if judgement.verdict != "unexplained"
+    ]
+    result = {
+        "verdict": judgement.verdict,
+        "mismatch": {
+            "present": present,
+            "p_value": detect.p_value(gain, tried),
+            "where": _where(e, found) if present else None,
+        },
+        "effects": effects,
+        "equivalents": [list(names) for names in judgement.equivalents],
+        "next_recording": None,
+        "fit": _fit(e),
+        "sentence": "",
+    }
+    result["sentence"] = sentence(e, result, found, base)
+    return result
+
+
+def _where(e: Explanation, found: list[dict]) -> dict:
+    base = e.search.base
+    element, position = "line", [0.0, float(e.rig.length)]
+    if found:
+        spans = [span(e.rig, f["effect"], f["place"], f["parameters"]) for f in found]
+        element, position = spans[0]
+    return {
+        "element": element,
+        "position_m": position,
+        "bands_hz": detect.bands(base, e.observations),
+        "crank_angle_deg": detect.crank_angles(base, e.observations),
+        "conditions": detect.conditions(base, e.observations),
+    }
+
+
+def _fit(e: Explanation) -> dict:
+    def scores(which):
+        return {k: float(v.misfit) for k, v in which.items()} | {
+            f"theil_{k}": float(v.theil) for k, v in which.items()
+        }
+
+    return {
+        "before": scores(e.validation.before),
+        "after": scores(e.validation.after),
+        "left_out": list(e.validation.left_out),
+        "parameters_agree_within_sd": float(e.validation.disagreement),
+    }
+
+
+def sentence(e: Explanation, result: dict, found: list[dict], base) -> str:
+    """One paragraph an engineer can act on."""
+    kind, fit = result["verdict"], result["fit"]
+    before, after = fit["before"]["held_out"], fit["after"]["held_out"]
+    words = [CHANCE.get(kind, "")]
+    if kind in ("named", "ambiguous"):
+        names = [f"{f['effect'].name.replace('_', ' ')} at the {_place(e, f)}" for f in found]
+        words = [
+            f"The twin lacks {join(names)}: with it the misfit on data it has not seen goes from "
+            f"{before:.1%} to {after:.1%} of the measured ripple."
+        ]
+        for f in found:
+            for name, p in f["parameters"].items():
+                low, high = p["ci95"]
+                unit = "" if p["unit"] == "1" else f" {p['unit']}"
+                words.append(
+                    f"{name.replace('_', ' ').capitalize()} {p['value']:.3g}{unit} "
+                    f"({low:.3g} to {high:.3g})."
+                )
+        if kind == "ambiguous":
+            classes = "; ".join(join(names) for names in result["equivalents"])
+            words.append(f"These recordings cannot tell apart {classes}.")
+    elif kind == "unexplained":
+        words = [
+            "Something is missing that no effect of the library explains"
+            + (f"; it is seen at the {_place(e, found[0])}" if found else "")
+            + "."
+        ]
+        if found and not found[0]["effect"].named:
+            words.append(
+                f"A passive network there stands in for it: misfit on unseen data {before:.1%} to "
+                f"{after:.1%}."
+            )
+    elif kind == "bad_data":
+        words = [f"The data contradict themselves: {e.judgement.reason}."]
+    if "drift" in e.alarms.ringing:
+        words.append(f"Early and late windows of {e.alarms.drift[1]} differ: the state drifted.")
+    if "pull" in e.alarms.ringing and not e.judgement.accepted.hypothesis:
+        size, name = e.alarms.pull
+        words.append(f"{name} is {size:.1f} standard deviations from the data sheet.")
+    pulled = detect.pull(e.judgement.accepted)
+    if e.judgement.accepted.hypothesis and pulled[0] > detect.PULL:
+        words.append(f"Check {pulled[1]}: {pulled[0]:.1f} standard deviations from the data sheet.")
+    return " ".join(word for word in words if word)
+
+
+def _place(e: Explanation, entry: dict) -> str:
+    element, (low, high) = span(e.rig, entry["effect"], entry["place"], entry["parameters"])
+    if "position" in entry["parameters"]:
+        return f"line, {low:.2f} to {high:.2f} m from the pump ({element})"
+    return element
+
+
+def write(explanation: Explanation, folder: str | Path) -> dict:
+    """Write verdict.json and twin.json into `folder` (made if needed); returns the verdict.
+
+    Each file appears whole or not at all.
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    result = verdict(explanation)
+    _write(folder / "twin.json", explanation.twin.to_dict())
+    _write(folder / "verdict.json", result)
+    return result
+
+
+def _write(path: Path, data: dict) -> None:
+    text = json.dumps(data, indent=1, default=_plain, allow_nan=False)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        temporary.write_text(text + "\n")
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _plain(value):
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    raise TypeError(f"{type(value)} is no plain data")
