@@ -9,11 +9,12 @@ from matplotlib.figure import Figure
 
 from rippletwin.figures import style
 
+# In the order of drawing: what is compared lies over what it is compared with.
 _LOOK = {
-    "measured": dict(color=style.MEASURED, lw=1.6),
-    "nominal": dict(color=style.NOMINAL, ls="--"),
-    "calibrated": dict(color=style.CALIBRATED),
-    "corrected": dict(color=style.CORRECTED, ls="-."),
+    "nominal": dict(color=style.NOMINAL, ls="--", lw=0.8),
+    "measured": dict(color=style.MEASURED, lw=1.8),
+    "calibrated": dict(color=style.CALIBRATED, lw=1.0),
+    "corrected": dict(color=style.CORRECTED, ls="-.", lw=1.0),
 }
 
 
@@ -26,8 +27,8 @@ def overlay(
     """
     fig, axes = style.figure(len(sensors), 1, height=1.9, sharex=True)
     for k, (ax, sensor) in enumerate(zip(axes[:, 0], sensors)):
-        for name, values in curves.items():
-            ax.plot(angle_deg, values[k] / 1e6, label=name, **_LOOK.get(name, {}))
+        for name, values in sorted(curves.items(), key=lambda item: list(_LOOK).index(item[0])):
+            ax.plot(angle_deg, values[k] / 1e6, label=name, **_LOOK[name])
         ax.set_ylabel(f"{sensor}: ripple / MPa")
     _legend(fig, axes)
     axes[0, 0].set_title(title, loc="left")
