@@ -11,20 +11,16 @@ from virtualrig.folder import listed, prepare, write_recording, write_sheet, wri
 from virtualrig.recorder import Point, record
 from virtualrig.rig import SEAL, SHEET, RigError, read_rig, read_yaml
 
-_BAR = 1e5
-POINTS = {
-    "full": (
-        *(Point(f"{s}_1000_95", 1000.0, 95 * _BAR, 9.6, s) for s in ("healthy", "slipper", "cylinder")),
-        *(
-            Point(f"healthy_{n}_{p}", float(n), p * _BAR, 4.8)
-            for n, p in ((800, 95), (1200, 95), (1000, 60), (1000, 120), (800, 60), (1200, 120))
-        ),
-    ),
-    "smoke": (
-        *(Point(f"{s}_1000_95", 1000.0, 95 * _BAR, 9.6, s) for s in ("healthy", "slipper", "cylinder")),
-        Point("healthy_1200_60", 1200.0, 60 * _BAR, 4.8),
-    ),
-}  # fmt: skip
+_STATES = tuple(
+    Point(f"{state}_1000_95", 1000.0, 9.5e6, 9.6, state)
+    for state in ("healthy", "slipper", "cylinder")
+)
+_HEALTHY = tuple(
+    Point(f"healthy_{speed}_{bar}", float(speed), bar * 1e5, 4.8)
+    for speed, bar in ((1200, 60), (800, 95), (1200, 95), (1000, 60), (1000, 120), (800, 60))
+)
+POINTS = {"full": _STATES + _HEALTHY, "smoke": _STATES + _HEALTHY[:1]}
+"""Operating points: each state at 1000 r/min and 9.5 MPa, the healthy pump at others."""
 
 
 def main(arguments: list[str] | None = None) -> int:

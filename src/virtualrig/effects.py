@@ -84,7 +84,9 @@ def load_dynamics(
     frequency_hz: float | None = None,
     damping: float = 0.0,
 ) -> None:
-    """The valve opens with pressure: opening 1 + y, y''/w^2 + (2 damping/w + lag) y' + y = gain dp/p."""
+    """The valve opens with pressure: opening 1 + y, y''/w^2 + (2 damping/w + lag) y' + y = gain
+    dp/p.
+    """
     inertia = 0.0
     if frequency_hz is not None:
         omega = 2 * np.pi * frequency_hz
@@ -133,7 +135,9 @@ def accumulator(
 
 
 def stiffening_liquid(draft: Draft, per_pascal: float, reference: float) -> None:
-    """rho a^2 grows by `per_pascal` of itself a Pa above `reference` Pa: wave speed with pressure."""
+    """rho a^2 grows by `per_pascal` of itself a Pa above `reference` Pa: wave speed with
+    pressure.
+    """
     for segment in draft.segments:
         segment.update(stiffening=per_pascal, reference=reference)
 
@@ -148,7 +152,9 @@ def turbulent_friction(draft: Draft, factor: float) -> None:
 def moving_bend(
     draft: Draft, position: float, frequency_hz: float, damping: float, compliance: float
 ) -> None:
-    """A bend on a spring: pressure moves it, and its motion makes room, `compliance` m3/Pa when slow."""
+    """A bend on a spring: pressure moves it, and its motion makes room, `compliance` m3/Pa when
+    slow.
+    """
     resonator(draft, position, frequency_hz, damping, compliance)
 
 

@@ -1,4 +1,6 @@
-"""Writing a case folder: rig.yaml with the sheet's values and HDF5 recordings. Nothing of the truth."""
+"""Writing a case folder: rig.yaml with the sheet's values and HDF5 recordings. Nothing of the
+truth.
+"""
 
 from pathlib import Path
 

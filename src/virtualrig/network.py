@@ -13,11 +13,11 @@ from virtualrig.spectral_element import derivative, interpolation, lobatto
 class Pipe:
     """A uniform pipe from node `start` to node `end` (SI units).
 
-    `wave_speed` holds with the wall's fast elasticity and without air. `wall` is (relative compliance,
-    retardation time) of a Kelvin-Voigt element: the shunt admittance is that of an elastic pipe times
-    1 + compliance/(1 + s time). `air` is (volume fraction at one atmosphere, polytropic exponent).
-    `stiffening` is the relative growth of rho a^2 per Pa above `reference` Pa. `drag` adds
-    drag * q |q| to -q_t (rough turbulent flow: f/(2 D A)).
+    `wave_speed` holds with the wall's fast elasticity and without air. `wall` is (relative
+    compliance, retardation time) of a Kelvin-Voigt element: the shunt admittance is that of an
+    elastic pipe times 1 + compliance/(1 + s time). `air` is (volume fraction at one atmosphere,
+    polytropic exponent). `stiffening` is the relative growth of rho a^2 per Pa above
+    `reference` Pa. `drag` adds drag * q |q| to -q_t (rough turbulent flow: f/(2 D A)).
     """
 
     length: float
@@ -57,8 +57,9 @@ class Node:
 class Network:
     """Pipes between nodes, filled with one liquid. Node 0 is the pump's outlet.
 
-    `sensors` are (pipe, distance from its start). `frequency` is the highest at which waves are to be
-    resolved with `points` nodes a wavelength; `modes` the number of velocity modes of unsteady friction.
+    `sensors` are (pipe, distance from its start). `frequency` is the highest at which waves are
+    to be resolved with `points` nodes a wavelength; `modes` the number of velocity modes of
+    unsteady friction.
     """
 
     pipes: tuple[Pipe, ...]
@@ -135,7 +136,9 @@ def line(network: Network, dt: float) -> stepper.Line:
 
 
 def _modes(network: Network, pipe: Pipe) -> tuple[np.ndarray, np.ndarray]:
-    """Decay rates, 1/s, and weights (modes,) of a pipe's velocity modes; unused ones weigh nothing."""
+    """Decay rates, 1/s, and weights (modes,) of a pipe's velocity modes; unused ones weigh
+    nothing.
+    """
     if pipe.friction == "unsteady":
         rates, weights = velocity_modes(network.modes)
     else:
@@ -178,7 +181,8 @@ def sensor_rows(network: Network) -> tuple[np.ndarray, np.ndarray]:
 
 
 def still(network: Network, cut: stepper.Line, pressure: float, flow: float, pistons: int):
-    """A state at rest in time: `pressure` everywhere, `flow` through the pipes that lead to the load.
+    """A state at rest in time: `pressure` everywhere, `flow` through the pipes that lead to the
+    load.
 
     Chambers start at `pressure`; dead-end pipes (whose end node has no way out) carry no flow.
     """

@@ -1,9 +1,10 @@
 """Periodic orbits of a rig at one operating point, and recordings made of them.
 
 At constant speed the bench settles into a motion that repeats every revolution. A recording with a
-slowly wandering speed is composed of such orbits: at each instant that of the speed at that instant,
-at the crank angle reached by then. The line forgets within some 0.1 s while the speed wanders over
-seconds, and `march` run with a varying speed shows what the shortcut costs (docs/virtualrig.md).
+slowly wandering speed is composed of such orbits: at each instant that of the speed at that
+instant, at the crank angle reached by then. The line forgets within some 0.1 s while the speed
+wanders over seconds, and `march` run with a varying speed shows what the shortcut costs
+(docs/virtualrig.md).
 """
 
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from virtualrig.rig import Rig
 RECORDS = 4608
 """Records a revolution; a multiple of four, the depth of the stepper's ring of states."""
 
-_REVOLUTIONS_OF_ADJUSTING = 8
+_REVOLUTIONS_OF_ADJUSTING = 6
 
 
 @dataclass(frozen=True)
@@ -25,14 +26,16 @@ class Orbit:
     """One revolution, at crank turns k/RECORDS, k = 0, 1, ...: what is there, before any sensor.
 
     `pressure` (sensors, RECORDS) Pa; `outlet_flow` (RECORDS,) m3/s into the line at x = 0;
-    `outlet_pressure` (RECORDS,); `valve` the load's orifice coefficient, m3/s/Pa^0.5; `residual` the
-    greatest change of any pressure over the last revolution, Pa.
+    `outlet_pressure` (RECORDS,); `load_pressure` the mean at the load; `valve` the load's orifice
+    coefficient, m3/s/Pa^0.5; `residual` the greatest change of any sensor's pressure over the last
+    revolution, Pa.
     """
 
     speed_rpm: float
     pressure: np.ndarray
     outlet_flow: np.ndarray
     outlet_pressure: np.ndarray
+    load_pressure: float
     valve: float
     residual: float
     revolutions: int
@@ -41,8 +44,8 @@ class Orbit:
 class Bench:
     """A rig ready to run: its tables, and a state that is kept from one run to the next.
 
-    `flow` (M,), m3/s over one revolution, takes the pump's place where it is given; `refine` divides
-    the time step.
+    `flow` (M,), m3/s over one revolution, takes the pump's place where it is given; `refine`
+    divides the time step.
     """
 
     def __init__(
@@ -71,7 +74,8 @@ class Bench:
         tolerance: float = 20.0,
         most: int = 80,
     ) -> Orbit:
-        """Run until no pressure changes by more than `tolerance` Pa from one revolution to the next.
+        """Run until no pressure changes by more than `tolerance` Pa from one revolution to the
+        next.
 
         `load_pressure` is the mean pressure at the load that the operator sets, unless the `valve`
         (orifice coefficient) is given. Raises RuntimeError where it does not settle.
@@ -106,9 +110,15 @@ class Bench:
                 load[stepper.ORIFICE] = self._valve(outlet.mean(), load_pressure)
             elif residual < tolerance:
                 return Orbit(
-                    speed_rpm, *(np.roll(x, 1, axis=-1) for x in (pressure, outlet, nodal[0])),
-                    float(load[stepper.ORIFICE]), float(residual), revolution,
-                )  # fmt: skip
+                    speed_rpm=speed_rpm,
+                    pressure=np.roll(pressure, 1, axis=1),
+                    outlet_flow=np.roll(outlet, 1),
+                    outlet_pressure=np.roll(nodal[0], 1),
+                    load_pressure=float(nodal[self.rig.load_node].mean()),
+                    valve=float(load[stepper.ORIFICE]),
+                    residual=float(residual),
+                    revolutions=revolution,
+                )
         raise RuntimeError(f"not periodic after {most} revolutions: still moving {residual:.0f} Pa")
 
     def _valve(self, pump_flow: float, load_pressure: float) -> float:

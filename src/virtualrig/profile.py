@@ -1,14 +1,16 @@
 """Laminar pipe friction from the velocity profile: the momentum equation resolved over the radius.
 
-In an axisymmetric laminar flow the axial velocity u(r, t) diffuses, u_t = -p_x/rho + nu (r u_r)_r/r,
-u(R, t) = 0. Expanded in its own modes J0(j_n r/R), the flow of the pipe is a sum of first-order lags,
+In an axisymmetric laminar flow the axial velocity u(r, t) diffuses, u_t = -p_x/rho + nu (r
+u_r)_r/r, u(R, t) = 0. Expanded in its own modes J0(j_n r/R), the flow of the pipe is a sum of
+first-order lags,
 
-    q = A sum_n w_n v_n,   v_n' = -p_x/rho - lambda_n v_n,   w_n = 4/j_n^2,   lambda_n = j_n^2 nu/R^2
+    q = A sum_n w_n v_n,  v_n' = -p_x/rho - lambda_n v_n,  w_n = 4/j_n^2,  lambda_n = j_n^2 nu/R^2
 
-(Szymanski, J. Math. Pures Appl. 11, 1932). The series converges like 1/n; a rational Krylov projection
-of it (real shifts spread over the band of interest, one of them zero) needs less than ten lags. Being a
-Galerkin projection of a symmetric dissipative operator, it has positive weights and real decay rates:
-the pipe stays passive, and a zero shift keeps the Hagen-Poiseuille resistance exact.
+(Szymanski, J. Math. Pures Appl. 11, 1932). The series converges like 1/n; a rational Krylov
+projection of it (real shifts spread over the band of interest, one of them zero) needs about
+ten lags. Being a Galerkin projection of a symmetric dissipative operator, it has positive
+weights and real decay rates: the pipe stays passive, and a zero shift keeps the
+Hagen-Poiseuille resistance exact.
 """
 
 from functools import lru_cache
@@ -21,7 +23,7 @@ _SERIES_TERMS = 6000
 
 
 def _bessel_zeros(count: int) -> np.ndarray:
-    """First `count` zeros of J0: scipy's for the first, McMahon's expansion beyond (error < 1e-13)."""
+    """First `count` zeros of J0: scipy's, then McMahon's expansion (error < 1e-13)."""
     exact = jn_zeros(0, min(count, 100))
     beta = (np.arange(len(exact) + 1, count + 1) - 0.25) * np.pi
     e = 1 / (8 * beta)
@@ -34,8 +36,8 @@ def velocity_modes(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Decay rates and weights of `count` lags that stand for the whole velocity profile.
 
-    Rates are in units of nu/R^2, and so are `slowest` and `fastest`, the angular frequencies between
-    which the lags are to hold. The admittance of a metre of pipe is then
+    Rates are in units of nu/R^2, and so are `slowest` and `fastest`, the angular frequencies
+    between which the lags are to hold. The admittance of a metre of pipe is then
     (A/rho) sum_n weight_n/(s + rate_n nu/R^2). Returns (rates, weights), each (count,).
     """
     j = _bessel_zeros(_SERIES_TERMS)

@@ -96,7 +96,9 @@ def tables(pump: Pump, density: float, faults: tuple[Fault, ...] = ()):
 
 @njit(cache=True, fastmath=True)
 def orifice_flow(drop, laminar):
-    """Square-root orifice, linear below about `laminar` Pa: drop/(drop^2 + laminar^2)^(1/4), slope."""
+    """Square-root orifice, linear below about `laminar` Pa: drop/(drop^2 + laminar^2)^(1/4),
+    slope.
+    """
     square = drop * drop
     shifted = square + laminar * laminar
     root = np.sqrt(np.sqrt(shifted))
@@ -141,9 +143,10 @@ def step_chambers(stations, history, lead, chambers, ports, outlet_lead, outlet_
     """One implicit step of all chambers and of the outlet that they share; returns Newton steps.
 
     Solves lead p_i - history_i = dp_i/dt for the chambers and
-    outlet_lead p - outlet_rest = sum of delivered flows for the outlet pressure, by Newton's method.
-    `x` (pistons + 1,) holds the chamber pressures and the outlet pressure: start values in, solution
-    out. `stations` are those of `crank`; `matrix` (pistons + 1, pistons + 2) is workspace.
+    outlet_lead p - outlet_rest = sum of delivered flows for the outlet pressure, by Newton's
+    method. `x` (pistons + 1,) holds the chamber pressures and the outlet pressure: start values
+    in, solution out. `stations` are those of `crank`; `matrix` (pistons + 1, pistons + 2) is
+    workspace.
     """
     n = len(chambers)
     laminar = ports[LAMINAR]
@@ -186,7 +189,8 @@ def step_chambers(stations, history, lead, chambers, ports, outlet_lead, outlet_
                 matrix[k, i] -= stations[k, 0] * tangent
         _eliminate(matrix)
         largest = 0.0
-        # a square-root orifice near zero drop sends Newton's method to and fro: halve every other step
+        # a square-root orifice near zero drop sends Newton's method to and fro: halve every
+        # other step
         damping = 0.5 if iteration > 4 and iteration % 2 == 1 else 1.0
         for i in range(n + 1):
             x[i] += damping * matrix[i, n + 1]
@@ -198,7 +202,9 @@ def step_chambers(stations, history, lead, chambers, ports, outlet_lead, outlet_
 
 @njit(cache=True, fastmath=True)
 def _eliminate(matrix):
-    """Solve in place, right-hand side in the last column; diagonally dominant, so without pivots."""
+    """Solve in place, right-hand side in the last column; diagonally dominant, so without
+    pivots.
+    """
     n = matrix.shape[0]
     for k in range(n):
         pivot = 1.0 / matrix[k, k]

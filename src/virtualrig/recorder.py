@@ -29,7 +29,9 @@ class Point:
 
 @dataclass(frozen=True)
 class Take:
-    """A recording: `pressure` (sensors, samples) Pa; `turns` (samples,) true crank turns; `orbit`."""
+    """A recording: `pressure` (sensors, samples) Pa; `turns` (samples,) true crank turns;
+    `orbit`.
+    """
 
     pressure: np.ndarray
     turns: np.ndarray
@@ -52,7 +54,9 @@ def record(rig: Rig, point: Point, rng: np.random.Generator) -> Take:
 def wander(
     count: int, deviation: float, correlation_s: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """Slow relative deviation of speed (count,): Gaussian, smooth, zero mean, as correlated as told."""
+    """Slow relative deviation of speed (count,): Gaussian, smooth, zero mean, as correlated as
+    told.
+    """
     step = 0.02
     grid = np.arange(int(np.ceil(count / SAMPLING_RATE_HZ / step)) + 2)
     width = correlation_s / 2 / step
@@ -65,7 +69,9 @@ def wander(
 
 
 def family(bench: Bench, speed: np.ndarray, load_pressure: float) -> list[Orbit]:
-    """Orbits at the mean of `speed` (r/min) and, where it wanders, at its extremes; one valve setting."""
+    """Orbits at the mean of `speed` (r/min) and, where it wanders, at its extremes; one valve
+    setting.
+    """
     middle = bench.settle(speed.mean(), load_pressure)
     reach = np.abs(speed - speed.mean()).max()
     if reach < 1e-6 * speed.mean():

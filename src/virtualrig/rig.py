@@ -3,6 +3,7 @@
 import inspect
 import re
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -148,7 +149,7 @@ def lay_out(draft: Draft, sensors: list[float], fluid: dict, numerics: dict) -> 
     if any(v for k, v in vars(nodes[0]).items() if k != "volume" and v != getattr(Node(), k)):
         raise ValueError("only a volume can sit right at the pump outlet (position 0)")
     pipes = []
-    for k, (a, b) in enumerate(zip(places[:-1], places[1:], strict=True)):
+    for k, (a, b) in enumerate(pairwise(places)):
         segment = draft.segments[int(np.searchsorted(ends, 0.5 * (a + b)))]
         pipes.append(
             Pipe(**segment | {"length": b - a}, start=k, end=k + 1, friction=draft.friction)
@@ -178,7 +179,9 @@ def lay_out(draft: Draft, sensors: list[float], fluid: dict, numerics: dict) -> 
 
 
 def _join(node: Node, elements: dict) -> Node:
-    """`node` with more elements; those that add up (volumes, leaks) do, others may be there once."""
+    """`node` with more elements; those that add up (volumes, leaks) do, others may be there
+    once.
+    """
     values = {}
     for name, value in elements.items():
         present, empty = getattr(node, name), getattr(Node(), name)

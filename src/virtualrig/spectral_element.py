@@ -1,6 +1,7 @@
 """Legendre-Gauss-Lobatto nodes, and the derivative and interpolation of polynomials on them.
 
-Canuto, Hussaini, Quarteroni, Zang, Spectral Methods: Fundamentals in Single Domains, 2006, section 2.3.
+Canuto, Hussaini, Quarteroni, Zang, Spectral Methods: Fundamentals in Single Domains, 2006,
+section 2.3.
 """
 
 import numpy as np

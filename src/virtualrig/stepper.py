@@ -1,11 +1,12 @@
 """Time stepping of pump, pipes and nodes: a semi-implicit multistep method over spectral elements.
 
-Pipes: p_t = -(rho a^2/A) q_x, q = sum of velocity modes q_k with q_k' = -(A/rho) w_k p_x - lambda_k q_k
-(virtualrig.profile), discretised in space by the discontinuous Galerkin method on Lobatto nodes with
-upwind (characteristic) fluxes between elements (Hesthaven, Warburton, Nodal Discontinuous Galerkin
-Methods, 2008). Time: SBDF4 (Ascher, Ruuth, Wetton, SIAM J. Numer. Anal. 32, 1995): waves explicit;
-friction, chambers and everything at the nodes implicit. Where pipes meet, the outgoing characteristics of
-the new step and the node's elements settle the node's pressure together, so that no volume is lost.
+Pipes: p_t = -(rho a^2/A) q_x, q = sum of velocity modes q_k with q_k' = -(A/rho) w_k p_x -
+lambda_k q_k (virtualrig.profile), discretised in space by the discontinuous Galerkin method on
+Lobatto nodes with upwind (characteristic) fluxes between elements (Hesthaven, Warburton, Nodal
+Discontinuous Galerkin Methods, 2008). Time: SBDF4 (Ascher, Ruuth, Wetton, SIAM J. Numer. Anal.
+32, 1995): waves explicit; friction, chambers and everything at the nodes implicit. Where pipes
+meet, the outgoing characteristics of the new step and the node's elements settle the node's
+pressure together, so that no volume is lost.
 """
 
 from typing import NamedTuple
@@ -260,13 +261,14 @@ def _close(line, state, now, flux_p, flux_q):
 def run(line, nodes, chambers, ports, source, crank, state, phase, steps, every, dt, sensors):
     """March `steps` steps of `dt` from `state`, whose newest step is number `phase`.
 
-    The crank stands at `speed * phase * dt` plus its ripple; `crank` is (speed in rad/s, ripple), the
-    ripple (terms, 3) being order, relative amplitude of speed and phase. `source` (M,) is a flow into
-    node 0 over one revolution, added to that of the pump; `chambers` may be empty. `sensors` is
-    (element, (count, n) interpolation rows). Every `every` steps a record is kept.
+    The crank stands at `speed * phase * dt` plus its ripple; `crank` is (speed in rad/s,
+    ripple), the ripple (terms, 3) being order, relative amplitude of speed and phase. `source`
+    (M,) is a flow into node 0 over one revolution, added to that of the pump; `chambers` may be
+    empty. `sensors` is (element, (count, n) interpolation rows). Every `every` steps a record
+    is kept.
 
-    Returns sensor pressures (count, records), flow into the line at x = 0 (records,), pressures of the
-    nodes (nodes, records), and the greatest number of Newton steps that the chambers took.
+    Returns sensor pressures (count, records), flow into the line at x = 0 (records,), pressures
+    of the nodes (nodes, records), and the greatest number of Newton steps that the chambers took.
     """
     speed, ripple = crank
     element, rows = sensors

@@ -1,0 +1,198 @@
+"""What the virtual rig writes: sensing, noise, wander, the case folder, and what must not be in
+it.
+"""
+
+import ast
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import yaml
+
+from virtualrig.cli import main
+from virtualrig.orbit import Orbit
+from virtualrig.recorder import SAMPLING_RATE_HZ, Point, follow, record, sense, wander
+from virtualrig.rig import SEAL, SHEET, RigError, Sensing, build, read_rig, read_yaml
+
+QUICK = {
+    "line": {"segments": [{"length": 1.2, "diameter": 0.0197, "wave_speed": 1023.0}]},
+    "sensors": [0.41],
+    "numerics": {"frequency": 3000.0},
+}
+
+
+def orbit(harmonic, speed_rpm=1000.0, sensors=1, delay=0.0):
+    """An orbit that is one cosine of 1 Pa on 5 Pa."""
+    turn = np.arange(4608) / 4608
+    pressure = 5 + np.cos(2 * np.pi * harmonic * (turn - delay * speed_rpm / 60))
+    pressure = np.tile(pressure, (sensors, 1))
+    return Orbit(speed_rpm, pressure, turn, turn, 0.0, 0.0, 0.0, 1)
+
+
+def test_sensor_gain_delay_and_resonance_are_those_of_the_formulae():
+    """A cosine at 450 Hz comes out with the second-order response at 450 Hz, gain and delay."""
+    sensing = (Sensing(gain=1.1, delay=2e-4, resonance=(900.0, 0.2)),)
+    out = sense(orbit(27), sensing)[0]
+    got = 2 * np.fft.rfft(out)[27] / 4608
+    response = 1 / (1 - 0.25 + 2j * 0.2 * 0.5)
+    assert got == pytest.approx(1.1 * response * np.exp(-2j * np.pi * 450 * 2e-4), rel=1e-9)
+    assert out.mean() == pytest.approx(1.1 * 5)
+
+
+def test_wander_is_slow_and_as_strong_as_told():
+    """Over many seconds: the stated deviation, and next to nothing within one revolution."""
+    rng = np.random.default_rng(0)
+    runs = np.array([wander(256000, 1e-3, 0.8, rng) for _ in range(20)])
+    assert runs.std() == pytest.approx(1e-3, rel=0.15)
+    assert (runs[:, 3072:] - runs[:, :-3072]).std() < 0.2e-3
+
+
+def test_recording_follows_the_crank_and_the_line_between_orbits():
+    """A delay of 2 ms in the line is 2 ms at every speed between the orbits, at 300 Hz to 1e-4."""
+    speeds = np.linspace(998.0, 1002.0, 20000)
+    turns = 0.3 + np.cumsum(speeds) / 60 / SAMPLING_RATE_HZ
+    orbits = [orbit(18, s, delay=2e-3) for s in (998.0, 1000.0, 1002.0)]
+    got = follow(orbits, (Sensing(),), speeds, turns)[0]
+    truth = 5 + np.cos(2 * np.pi * 18 * (turns - 2e-3 * speeds / 60))
+    assert np.abs(got - truth).max() < 1e-4
+    one = follow(orbits[1:2], (Sensing(),), speeds, turns)[0]
+    assert np.abs(one - truth).max() > 5e-3
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory):
+    """A short recording of a small rig with a seal of its own, and the true flow beside it."""
+    folder = tmp_path_factory.mktemp("rig")
+    seal = QUICK | {"noise": 777.0, "effects": [{"name": "source_impedance", "volume": 1.23e-5}]}
+    (folder / "seal.yaml").write_text(yaml.safe_dump(seal))
+    point = {"label": "a", "speed_rpm": 3000.0, "load_pressure": 8.0e6, "seconds": 0.5}
+    (folder / "points.yaml").write_text(yaml.safe_dump({"points": [point]}))
+    arguments = ["record", "--out", str(folder / "case"), "--true-flow", str(folder / "truth")]
+    arguments += ["--sealed", str(folder / "seal.yaml"), "--points", str(folder / "points.yaml")]
+    assert main(arguments) == 0
+    return folder
+
+
+def test_case_folder_is_complete_and_says_nothing_of_the_truth(case):
+    """rig.yaml carries the sheet and the recordings; no sealed name or number is in it."""
+    sheet, written = read_yaml(SHEET), read_yaml(case / "case" / "rig.yaml")
+    assert {key: written[key] for key in sheet} == sheet
+    (entry,) = written["recordings"]
+    assert entry == {
+        "file": "recordings/a.h5", "speed_rpm": 3000.0, "load_pressure": 8e6, "state": "healthy"
+    }  # fmt: skip
+    files = {p.relative_to(case / "case").as_posix() for p in (case / "case").rglob("*.*")}
+    assert files == {"rig.yaml", "recordings/a.h5"}
+    text = (case / "case" / "rig.yaml").read_text()
+    assert not any(word in text for word in ("source_impedance", "1.23e-05", "777", "noise"))
+    with h5py.File(case / "case" / entry["file"]) as file:
+        assert file.attrs["sampling_rate_hz"] == 51200
+        assert file["pressure"].shape == (1, 25600)
+        assert list(file) == ["pressure"]
+        assert file["pressure"][:].mean() == pytest.approx(8e6, rel=0.01)
+
+
+def test_noise_is_what_the_seal_says(case):
+    """What remains above 15 kHz, where the ripple is gone, is white noise of 777 Pa."""
+    with h5py.File(case / "case" / "recordings" / "a.h5") as file:
+        pressure = file["pressure"][0]
+    power = np.abs(np.fft.rfft(pressure - pressure.mean())) ** 2 / len(pressure)
+    top = power[int(len(power) * 0.8) :]
+    assert np.sqrt(top.mean()) == pytest.approx(777, rel=0.05)
+
+
+def test_truth_is_the_outlet_flow_of_the_recording(case):
+    """The sealed flow has the mean that the valve passes, and lies outside the case folder."""
+    with h5py.File(case / "truth" / "a.h5") as file:
+        flow, pressure = file["outlet_flow"][:], file["outlet_pressure"][:]
+        assert len(file["turns"]) == 25600
+        turned = file["turns"][-1] - file["turns"][0]
+    assert turned == pytest.approx(0.5 * 50, rel=0.01)
+    _, rig = read_rig()
+    assert flow.mean() == pytest.approx(rig.pump.displacement * 50, rel=0.03)
+    assert 0.01 < flow.std() / flow.mean() < 0.3 and pressure.std() > 1e4
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--sealed", "nowhere.yaml"], "nowhere.yaml"),
+        (["--points", "nowhere.yaml"], "nowhere.yaml"),
+        (["--seconds", "-1"], "--seconds"),
+        (["--true-flow", "OUT/truth"], "--true-flow"),
+        (["--sealed", "BAD"], "magic"),
+        (["--sealed", "FAULTLESS"], "faults"),
+    ],
+)
+def test_wrong_input_is_named(arguments, words, tmp_path, capsys):
+    """Exit status 2 and one line that names file, field or option; nothing is recorded."""
+    (tmp_path / "bad.yaml").write_text("effects: [{name: magic}]")
+    (tmp_path / "faultless.yaml").write_text("noise: 1.0")
+    out = tmp_path / "out"
+    names = {"BAD": "bad.yaml", "FAULTLESS": "faultless.yaml"}
+    arguments = [str(tmp_path / names[a]) if a in names else a for a in arguments]
+    arguments = [a.replace("OUT", str(out)) for a in arguments]
+    assert main(["record", "--out", str(out), *arguments]) == 2
+    assert words in capsys.readouterr().err
+    assert not (out / "recordings").exists()
+
+
+def test_full_folder_is_not_overwritten(tmp_path, capsys):
+    """A folder with content is left alone."""
+    (tmp_path / "precious").write_text("")
+    assert main(["record", "--out", str(tmp_path)]) == 2
+    assert "not empty" in capsys.readouterr().err
+
+
+def test_effects_say_what_they_do_not_take():
+    """An unknown parameter, a place outside the line and two effects at odds are refused by
+    name.
+    """
+    known = read_yaml(SHEET)
+    for effect, words in (
+        ({"name": "leak", "position": 99.0, "conductance": 1e-12}, "outside the line"),
+        ({"name": "leak", "place": 1.0}, "place"),
+        ({"name": "resonator", "position": 0.0, "frequency_hz": 1e3, "damping": 0.1,
+          "compliance": 1e-14}, "outlet"),
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match=words):
+            build(known, {"effects": [effect]})
+
+
+def test_built_in_rig_reads_and_differs_from_its_sheet_within_the_stated_uncertainty():
+    """The true line lies within 2.5 stated deviations of the sheet's; faults have one size each."""
+    known, rig = read_rig(SHEET, SEAL)
+    stated = known["uncertainty"]
+    true = read_yaml(SEAL)["line"]["segments"]
+    for nominal, real in zip(known["line"]["segments"], true, strict=True):
+        for key, deviation in nominal.items():
+            assert abs(real[key] / deviation - 1) < 2.5 * stated[key]
+    assert set(rig.faults) == {"slipper", "cylinder"}
+
+
+def test_recording_at_constant_speed_repeats_every_revolution():
+    """Without noise, wander and speed error, one revolution is like the other."""
+    rig = build(read_yaml(SHEET), QUICK)
+    take = record(rig, Point("a", 3000.0, 8e6, 0.2), np.random.default_rng(1))
+    revolutions = take.pressure[0].reshape(10, 1024)
+    assert np.abs(revolutions - revolutions[0]).max() < 1e-3
+
+
+def test_rig_imports_nothing_of_the_twin():
+    """No module of virtualrig imports rippletwin, nor the other way round."""
+    for package, other in (("virtualrig", "rippletwin"), ("rippletwin", "virtualrig")):
+        for file in Path("src", package).rglob("*.py"):
+            for node in ast.walk(ast.parse(file.read_text())):
+                names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+                if isinstance(node, ast.ImportFrom):
+                    names = [node.module or ""]
+                assert not any(name.split(".")[0] == other for name in names), file
+
+
+def test_unreadable_yaml_is_named(tmp_path):
+    """Broken YAML and a list where keys are wanted name the file."""
+    for text in ("a: [1", "- 1"):
+        (tmp_path / "x.yaml").write_text(text)
+        with pytest.raises(RigError, match=r"x\.yaml"):
+            read_yaml(tmp_path / "x.yaml")
