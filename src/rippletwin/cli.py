@@ -73,7 +73,56 @@ def calibrate(commands) -> None:
     parser.set_defaults(run=run)
 
 
-COMMANDS = (check, calibrate)
+def explain(commands) -> None:
+    """rippletwin explain CASE --out DIR"""
+    parser = commands.add_parser(
+        "explain", help="say what physics the twin lacks, and where, with verdict.json"
+    )
+    parser.add_argument("case", help="a folder with a rig.yaml")
+    parser.add_argument("--out", required=True, help="folder for verdict.json, twin.json, figures")
+    parser.add_argument(
+        "--json-only", action="store_true", help="print the verdict as JSON and nothing else"
+    )
+    parser.add_argument("--processes", type=int, default=2, help="processes to fit with")
+    parser.add_argument("--no-figures", action="store_true", help="write no figures")
+
+    def run(arguments) -> int:
+        import json
+        import os
+
+        # One thread a process: the matrices are small, and the processes share the cores.
+        os.environ.setdefault("OMP_NUM_THREADS", "1")
+        from tqdm import tqdm
+
+        from rippletwin.case import load_case
+        from rippletwin.explain.run import explain as find
+        from rippletwin.explain.verdict import write
+
+        case = load_case(arguments.case, states={"healthy"})
+        bars = {}
+
+        def progress(what, done, total):
+            if what not in bars:
+                bars[what] = tqdm(total=total, desc=what, disable=arguments.json_only)
+            bars[what].update(done - bars[what].n)
+
+        try:
+            explanation = find(case, arguments.processes, progress)
+        finally:
+            for bar in bars.values():
+                bar.close()
+        result = write(explanation, arguments.out)
+        if not arguments.no_figures:
+            from rippletwin.figures.explain import draw
+
+            draw(explanation, arguments.out)
+        print(json.dumps(result) if arguments.json_only else result["sentence"])
+        return 0
+
+    parser.set_defaults(run=run)
+
+
+COMMANDS = (check, calibrate, explain)
 
 
 def main(argv: list[str] | None = None) -> int:
