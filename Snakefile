@@ -34,3 +34,4 @@ rule all:
         rules.plot_accuracy.output,
         rules.plot_calibration.output,
         expand(rules.plot_confusion.output, dataset=config["datasets"]),
+        expand(rules.plot_seeds.output, dataset=simulated()),

@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 import yaml
+from snakemake.exceptions import WorkflowError
 
 ROOT = Path(workflow.basedir)
 SOURCE = ROOT / "src"
@@ -25,16 +26,21 @@ os.environ.setdefault("MALLOC_TOP_PAD_", str(256 * 2**20))
 RECORDED_HERE = config["case"] == "virtualrig"
 CASE = f"{RESULTS}/case" if RECORDED_HERE else config["case"].rstrip("/")
 RIG = f"{CASE}/rig.yaml"
+if RECORDED_HERE:
+    SHEET = {}  # made in one piece with the recordings
+elif Path(RIG).is_file():
+    SHEET = yaml.safe_load(Path(RIG).read_text())
+else:
+    raise WorkflowError(f"case: {CASE} has no rig.yaml; see docs/cases.md")
 
 
 def recordings():
     """The case's files besides rig.yaml: one folder where the virtual rig makes them."""
     if RECORDED_HERE:
         return [f"{CASE}/recordings"]
-    entries = yaml.safe_load(Path(RIG).read_text()).get("recordings", [])
     named = [
         name
-        for entry in entries
+        for entry in SHEET.get("recordings", [])
         for name in (
             entry.get("file"),
             entry.get("flow_ripple"),
@@ -45,23 +51,27 @@ def recordings():
     return sorted({f"{CASE}/{name}" for name in named})
 
 
-def rig(*sections):
-    """Params: these sections of rig.yaml, so that editing another one reruns nothing.
+def rig_sheet():
+    """rig.yaml as an input whose age does not matter: `rig_sections` tells what was edited."""
+    return RIG if RECORDED_HERE else ancient(RIG)
 
-    The rule's own input is ancient(RIG).
-    """
 
-    def read(wildcards, input):
-        sheet = yaml.safe_load(Path(input.rig).read_text())
-        return {section: sheet.get(section) for section in sections}
-
-    return read
+def rig_sections(*names):
+    """Params: these sections of rig.yaml, so that editing another one reruns nothing."""
+    return {name: SHEET.get(name) for name in names}
 
 
 # ---- datasets, networks, seeds --------------------------------------------------------------
 
 STATES = ["H", "S", "C1", "C2"]
 EXPERIMENTAL = "experimental"  # the dataset that learns from recordings
+
+
+def simulated():
+    """The configured datasets that learn from simulations."""
+    return [dataset for dataset in config["datasets"] if dataset != EXPERIMENTAL]
+
+
 SEEDS = range(config["seeds"])
 # Longest first, as measured; see benchmarks/ of a run.
 SLOWEST = [
@@ -158,8 +168,9 @@ def library(script):
     pending, found = [SCRIPTS / script], set()
     while pending:
         file = pending.pop()
-        reached = {found_file for name in imported(file) for found_file in files_of(name)}
-        if "pkgutil" in imported(file):  # a package that takes in whatever lies in its folder
+        names = list(imported(file))
+        reached = {path for name in names for path in files_of(name)}
+        if "pkgutil" in names:  # it takes in whatever lies in its folder
             reached |= set(file.parent.glob("*.py"))
         pending += reached - found
         found |= reached
@@ -169,4 +180,6 @@ def library(script):
 def virtualrig():
     """Every file of the virtual rig, another program: its code, its sheet and what it conceals."""
     files = (SOURCE / "virtualrig").rglob("*")
-    return sorted(os.path.relpath(file) for file in files if file.suffix in (".py", ".yaml"))
+    return sorted(
+        os.path.relpath(file) for file in files if file.suffix in (".py", ".yaml")
+    )

@@ -1,7 +1,7 @@
 # The pump, healthy and faulty -> outlet flow, and pressure in a pipe nobody calibrated.
 rule fault:
     input:
-        rig=ancient(RIG),
+        rig=rig_sheet(),
         recordings=rules.ingest.output.windows,
         source=library("fault.py"),
     output:
@@ -14,7 +14,7 @@ rule fault:
     resources:
         mem_mb=1000,
     params:
-        rig=rig("fluid", "pump", "line", "sensors"),
+        rig=rig_sections("fluid", "pump", "line", "sensors"),
         leak_area=lambda wildcards: config["faults"]["leak_area"].get(
             wildcards.state, 0.0
         ),

@@ -25,7 +25,7 @@ if RECORDED_HERE:
 
 rule ingest:
     input:
-        rig=ancient(RIG),
+        rig=rig_sheet(),
         recordings=recordings(),
         source=library("ingest.py"),
     output:
@@ -38,7 +38,7 @@ rule ingest:
     resources:
         mem_mb=2000,
     params:
-        rig=rig("pump", "sensors", "recordings"),
+        rig=rig_sections("pump", "sensors", "recordings"),
         windows=config["windows"]["per_recording"],
         samples=config["windows"]["samples_per_revolution"],
     script:

@@ -82,3 +82,38 @@ rule plot_accuracy:
         mem_mb=1000,
     script:
         "../scripts/plot_accuracy.py"
+
+
+rule plot_seeds:
+    input:
+        rig=rig_sheet(),
+        seeds=f"{RESULTS}/seeds/{{dataset}}.zarr",
+        source=library("plot_seeds.py"),
+    output:
+        ripple=report(
+            f"{RESULTS}/figures/seeds_{{dataset}}.png",
+            category="simulated signals",
+            caption="../report/seeds.rst",
+        ),
+        ripple_svg=f"{RESULTS}/figures/seeds_{{dataset}}.svg",
+        sst=report(
+            f"{RESULTS}/figures/sst_{{dataset}}.png",
+            category="simulated signals",
+            caption="../report/sst.rst",
+        ),
+        sst_svg=f"{RESULTS}/figures/sst_{{dataset}}.svg",
+    log:
+        f"{RESULTS}/logs/plot_seeds/{{dataset}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/plot_seeds/{{dataset}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        rig=rig_sections("pump"),
+        min_frequency_hz=config["sst"]["min_frequency_hz"],
+        max_frequency_hz=config["sst"]["max_frequency_hz"],
+        voices=config["sst"]["voices"],
+        k=config["sst"]["k"],
+    script:
+        "../scripts/plot_seeds.py"

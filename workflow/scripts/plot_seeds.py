@@ -1,0 +1,45 @@
+"""The simulated revolution of every state, and its synchrosqueezed image at the first channel."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from job import start
+from rippletwin import store
+from rippletwin.case import load_case
+from rippletwin.case import load_case
+from rippletwin.figures import diagnosis, ripple, save
+from rippletwin.imaging import SstSettings, amplitude_scale, image_axes, sst_images
+
+tell = start(snakemake)
+rig = load_case(Path(snakemake.input.rig).parent, states=()).rig
+pistons = load_case(Path(snakemake.input.rig).parent, states=()).rig.pump["pistons"]
+dataset = snakemake.wildcards.dataset
+seeds = store.load(snakemake.input.seeds)
+states = [str(state) for state in seeds.state.values]
+signals = seeds.signal.isel(channel=0).values
+signals = signals - signals.mean(axis=-1, keepdims=True)
+
+pressure = seeds.signal.attrs["units"] == "Pa"
+scale, label = (1e6, "pressure ripple / MPa") if pressure else (1e-3 / 60, "flow ripple / L/min")
+angle = np.arange(signals.shape[-1]) * 360 / signals.shape[-1]
+figure = ripple.states(angle, dict(zip(states, signals)), f"{dataset}: {label}", scale)
+save(figure, snakemake.output.ripple, snakemake.output.ripple_svg)
+
+windows = np.tile(signals[:, None], 2)
+rate = seeds.sizes["time"] * seeds.speed_hz
+params = snakemake.params
+settings = SstSettings(
+    min_frequency_hz=params.min_frequency_hz,
+    max_frequency_hz=params.max_frequency_hz,
+    voices=params.voices,
+    k=params.k,
+)
+healthy = windows[[states.index("H")]]
+settings = replace(settings, scale=amplitude_scale(healthy, rate, settings))
+images = sst_images(windows, rate, settings)[:, 0]
+frequency_hz, _ = image_axes(settings, 2 / seeds.speed_hz)
+figure = diagnosis.sst(dict(zip(states, images)), frequency_hz, seeds.speed_hz, pistons)
+save(figure, snakemake.output.sst, snakemake.output.sst_svg)
+tell(f"{len(states)} states")
