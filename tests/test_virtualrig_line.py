@@ -273,3 +273,19 @@ def test_full_amplitude_orifice_is_harmonic_balance():
     linear = exact(harmonics, orifice_admittance(orbit))
     assert misfit(linear, truth).min() > 5e-3
     assert misfit(rig, truth).max() < 3e-4
+
+
+def test_turbulent_friction_is_darcys_pressure_drop():
+    """A smooth flow loses Hagen-Poiseuille's share and f (l/D) rho v^2/2 between the sensors."""
+    factor = 0.05
+    _, orbit = bench(np.full(2, FLOW), ("turbulent_friction", {"factor": factor}))
+    drop, at = 0.0, 0.0
+    for segment in SEGMENTS:
+        inside = min(at + segment["length"], SENSORS[1]) - max(at, SENSORS[0])
+        at += segment["length"]
+        diameter = segment["diameter"]
+        speed = FLOW / (np.pi / 4 * diameter**2)
+        laminar = 32 * RHO * NU * speed / diameter**2
+        drop += max(inside, 0) * (laminar + factor * RHO * speed**2 / (2 * diameter))
+    means = orbit.pressure.mean(axis=1)
+    assert means[0] - means[1] == pytest.approx(drop, rel=1e-3)

@@ -69,7 +69,13 @@ def case(tmp_path_factory):
     point = {"label": "a", "speed_rpm": 3000.0, "load_pressure": 8.0e6, "seconds": 0.5}
     (folder / "points.yaml").write_text(yaml.safe_dump({"points": [point]}))
     arguments = ["record", "--out", str(folder / "case"), "--true-flow", str(folder / "truth")]
-    arguments += ["--sealed", str(folder / "seal.yaml"), "--points", str(folder / "points.yaml")]
+    arguments += [
+        "--flow-ripple",
+        "--sealed",
+        str(folder / "seal.yaml"),
+        "--points",
+        str(folder / "points.yaml"),
+    ]
     assert main(arguments) == 0
     return folder
 
@@ -80,10 +86,11 @@ def test_case_folder_is_complete_and_says_nothing_of_the_truth(case):
     assert {key: written[key] for key in sheet} == sheet
     (entry,) = written["recordings"]
     assert entry == {
-        "file": "recordings/a.h5", "speed_rpm": 3000.0, "load_pressure": 8e6, "state": "healthy"
+        "file": "recordings/a.h5", "speed_rpm": 3000.0, "load_pressure": 8e6, "state": "healthy",
+        "flow_ripple": "flow_ripple_a.csv",
     }  # fmt: skip
     files = {p.relative_to(case / "case").as_posix() for p in (case / "case").rglob("*.*")}
-    assert files == {"rig.yaml", "recordings/a.h5"}
+    assert files == {"rig.yaml", "recordings/a.h5", "flow_ripple_a.csv"}
     text = (case / "case" / "rig.yaml").read_text()
     assert not any(word in text for word in ("source_impedance", "1.23e-05", "777", "noise"))
     with h5py.File(case / "case" / entry["file"]) as file:
@@ -112,6 +119,17 @@ def test_truth_is_the_outlet_flow_of_the_recording(case):
     _, rig = read_rig()
     assert flow.mean() == pytest.approx(rig.pump.displacement * 50, rel=0.03)
     assert 0.01 < flow.std() / flow.mean() < 0.3 and pressure.std() > 1e4
+
+
+def test_nominal_flow_ripple_is_the_sheets_and_not_the_true_one(case):
+    """One revolution of flow of the sheet's pump: the right mean, but not the sealed rig's ripple."""
+    table = np.loadtxt(case / "case" / "flow_ripple_a.csv", delimiter=",", skiprows=1)
+    with h5py.File(case / "truth" / "a.h5") as file:
+        true = file["outlet_flow"][:]
+    assert table[0, 0] == 0 and table[-1, 0] == pytest.approx(360 * (1 - 1 / len(table)))
+    assert table[:, 1].mean() == pytest.approx(true.mean(), rel=0.02)
+    spectra = [np.abs(np.fft.rfft(flow)[9:100:9]) for flow in (table[:, 1], true)]
+    assert np.linalg.norm(spectra[0] - spectra[1]) > 0.02 * np.linalg.norm(spectra[1])
 
 
 @pytest.mark.parametrize(

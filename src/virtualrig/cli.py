@@ -7,8 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
-from virtualrig.folder import listed, prepare, write_recording, write_sheet, write_truth
-from virtualrig.recorder import Point, record
+from virtualrig.folder import (
+    listed,
+    prepare,
+    ripple_name,
+    write_recording,
+    write_ripple,
+    write_sheet,
+    write_truth,
+)
+from virtualrig.recorder import Point, nominal_ripple, record
 from virtualrig.rig import SEAL, SHEET, RigError, read_rig, read_yaml
 
 _STATES = tuple(
@@ -49,6 +57,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     make.add_argument("--sheet", type=Path, default=SHEET, help="what the rig's owner knows")
     make.add_argument("--sealed", type=Path, default=SEAL, help="what the rig really is")
+    make.add_argument(
+        "--flow-ripple",
+        action="store_true",
+        help="add flow ripples that the sheet's pump gives on the sheet's line",
+    )
     make.add_argument("--true-flow", type=Path, help="folder for the true outlet flow (sealed)")
     return parser
 
@@ -80,4 +93,7 @@ def _record(options: argparse.Namespace) -> None:
         write_recording(options.out / "recordings" / f"{point.label}.h5", take)
         if options.true_flow is not None:
             write_truth(options.true_flow / f"{point.label}.h5", take)
-    write_sheet(options.out, known, [listed(point) for point in points])
+        if options.flow_ripple and not point.faults:
+            write_ripple(options.out / ripple_name(point), *nominal_ripple(known, point))
+    entries = [listed(point, options.flow_ripple and not point.faults) for point in points]
+    write_sheet(options.out, known, entries)

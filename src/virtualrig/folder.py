@@ -45,14 +45,28 @@ def write_sheet(folder: Path, known: dict, recordings: list[dict]) -> None:
     (folder / "rig.yaml").write_text(_HEADER + text)
 
 
-def listed(point: Point) -> dict:
+def write_ripple(path: Path, angle_deg: np.ndarray, flow: np.ndarray) -> None:
+    """One revolution of flow as `angle_deg,flow_m3_s`."""
+    table = np.column_stack([angle_deg, flow])
+    np.savetxt(path, table, fmt="%.9g", delimiter=",", header="angle_deg,flow_m3_s", comments="")
+
+
+def listed(point: Point, with_ripple: bool) -> dict:
     """The entry of one recording in rig.yaml."""
-    return {
+    entry = {
         "file": f"recordings/{point.label}.h5",
         "speed_rpm": point.speed_rpm,
         "load_pressure": point.load_pressure,
         "state": point.state,
     }
+    if with_ripple:
+        entry["flow_ripple"] = ripple_name(point)
+    return entry
+
+
+def ripple_name(point: Point) -> str:
+    """File of the nominal flow ripple of a point, relative to the case folder."""
+    return f"flow_ripple_{point.label}.csv"
 
 
 def prepare(folder: Path, truth: Path | None) -> None:

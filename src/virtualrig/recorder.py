@@ -7,7 +7,7 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 
 from virtualrig.orbit import Bench, Orbit
-from virtualrig.rig import Rig, Sensing
+from virtualrig.rig import Rig, Sensing, build
 
 SAMPLING_RATE_HZ = 51200.0
 
@@ -29,9 +29,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Take:
-    """A recording: `pressure` (sensors, samples) Pa; `turns` (samples,) true crank turns;
-    `orbit`.
-    """
+    """A recording: `pressure` (sensors, samples) Pa, true crank `turns` (samples,), `orbit`."""
 
     pressure: np.ndarray
     turns: np.ndarray
@@ -51,12 +49,20 @@ def record(rig: Rig, point: Point, rng: np.random.Generator) -> Take:
     return Take(pressure, turns, orbits[len(orbits) // 2])
 
 
+def nominal_ripple(known: dict, point: Point) -> tuple[np.ndarray, np.ndarray]:
+    """What a model of the sheet's pump on the sheet's line gives: crank angle, deg, and flow, m3/s.
+
+    No concealed physics: values of the sheet, steady friction, the operating point as set. One
+    revolution in steps of 360/RECORDS deg.
+    """
+    orbit = Bench(build(known, {})).settle(point.speed_rpm, point.load_pressure)
+    return 360 * np.arange(len(orbit.outlet_flow)) / len(orbit.outlet_flow), orbit.outlet_flow
+
+
 def wander(
     count: int, deviation: float, correlation_s: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """Slow relative deviation of speed (count,): Gaussian, smooth, zero mean, as correlated as
-    told.
-    """
+    """Slow relative deviation of speed (count,): Gaussian, smooth, with zero mean."""
     step = 0.02
     grid = np.arange(int(np.ceil(count / SAMPLING_RATE_HZ / step)) + 2)
     width = correlation_s / 2 / step
@@ -69,8 +75,9 @@ def wander(
 
 
 def family(bench: Bench, speed: np.ndarray, load_pressure: float) -> list[Orbit]:
-    """Orbits at the mean of `speed` (r/min) and, where it wanders, at its extremes; one valve
-    setting.
+    """Orbits at the mean of `speed` (r/min) and, where it wanders, at its extremes.
+
+    The valve is set once, at the mean.
     """
     middle = bench.settle(speed.mean(), load_pressure)
     reach = np.abs(speed - speed.mean()).max()
