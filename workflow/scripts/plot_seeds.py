@@ -8,12 +8,10 @@ import numpy as np
 from job import start
 from rippletwin import store
 from rippletwin.case import load_case
-from rippletwin.case import load_case
 from rippletwin.figures import diagnosis, ripple, save
 from rippletwin.imaging import SstSettings, amplitude_scale, image_axes, sst_images
 
 tell = start(snakemake)
-rig = load_case(Path(snakemake.input.rig).parent, states=()).rig
 pistons = load_case(Path(snakemake.input.rig).parent, states=()).rig.pump["pistons"]
 dataset = snakemake.wildcards.dataset
 seeds = store.load(snakemake.input.seeds)
