@@ -4,7 +4,7 @@ rule train:
         samples=samples_of,
         source=library("train.py"),
     output:
-        weights=f"{RESULTS}/models/{{dataset}}/{{architecture}}.pt",
+        weights=temp(f"{RESULTS}/models/{{dataset}}/{{architecture}}.pt"),
         history=f"{RESULTS}/models/{{dataset}}/{{architecture}}.json",
     log:
         f"{RESULTS}/logs/train/{{dataset}}/{{architecture}}.log",

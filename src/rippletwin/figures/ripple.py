@@ -52,21 +52,6 @@ def states(
     return fig
 
 
-def harmonics(
-    frequency_hz: np.ndarray, curves: Mapping[str, np.ndarray], sensors: Sequence[str]
-) -> Figure:
-    """Magnitude of the piston harmonics at each sensor: name -> (S, F) complex Pa."""
-    fig, axes = style.figure(len(sensors), 1, height=1.9, sharex=True)
-    for k, (ax, sensor) in enumerate(zip(axes[:, 0], sensors)):
-        for marker, (name, values) in zip("os^dv", curves.items()):
-            look = {key: v for key, v in _LOOK.get(name, {}).items() if key != "ls"}
-            ax.semilogy(frequency_hz, np.abs(values[k]) / 1e3, marker, ms=4, label=name, **look)
-        ax.set_ylabel(f"{sensor}: amplitude / kPa")
-    _legend(fig, axes)
-    axes[-1, 0].set_xlabel("frequency / Hz")
-    return fig
-
-
 def _legend(fig: Figure, axes: np.ndarray) -> None:
     handles, labels = axes[0, 0].get_legend_handles_labels()
     fig.legend(handles, labels, loc="outside upper right", ncols=len(labels))
