@@ -80,11 +80,12 @@ def disagreement(fits: Sequence[Fit]) -> tuple[float, str]:
     return worst
 
 
-def drift(early: Sequence, late: Sequence) -> tuple[float, str]:
+def drift(early: Sequence, late: Sequence, delay: float) -> tuple[float, str]:
     """Smallest p-value, over recordings, that two parts of it agree, and the recording's label.
 
     The shaft angle between the parts is free, the covariances are the parts' own, and a relative
-    error of a tenth of the model's floor is allowed. Corrected for the number of recordings.
+    error is allowed: half the model's floor, and what another mean speed does to the phase of ten
+    passages of the line. Corrected for the number of recordings.
     """
     worst = (1.0, "")
     for a, b in zip(early, late):
@@ -93,7 +94,9 @@ def drift(early: Sequence, late: Sequence) -> tuple[float, str]:
         orders = np.asarray(a.orders, float)
         power = np.mean(np.abs(a.values) ** 2, axis=0)
         variance = np.einsum("fss->sf", a.covariance + b.covariance).real
-        variance = variance + (0.1 * FLOOR) ** 2 * power
+        speed = abs(a.speed_hz / b.speed_hz - 1.0)
+        phase = 2 * np.pi * a.frequency_hz * 10.0 * delay * speed
+        variance = variance + ((0.5 * FLOOR) ** 2 + phase**2) * power
         match = np.sum(np.conj(a.values) * b.values / variance, axis=0)
         # The angle: first coarsely, from the strongest order, then refined by the phase slope.
         grid = np.linspace(-np.pi, np.pi, 4001) / np.gcd.reduce(np.asarray(a.orders, int))

@@ -75,6 +75,8 @@ def needed_over(best: Fit, search: Search) -> float:
 def equivalents(search: Search) -> tuple[tuple[str, ...], ...]:
     """Classes of effect names whose evidence is too close to the best explanation's."""
     best = search.best
+    if best.hypothesis[-1][0].certain:
+        return ()  # known to be there; what could do its work besides is no rival
     own = set(best.names)
     rest = own - {best.names[-1]} if len(own) > 1 else set()
     close = {best.names[-1]}

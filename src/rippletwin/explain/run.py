@@ -89,7 +89,7 @@ def explain_observations(
             found.base.floor,
             detect.pull(found.base),
             detect.disagreement(single),
-            detect.drift(early, late),
+            detect.drift(early, late, sum(segment.delay for segment in rig.line)),
         )
         explanation = found.others[0] if _prefers_other(found) else found.best
         held = late if len(data) == 1 and late else None

@@ -21,7 +21,8 @@ ACCEPT = 8.0
 parametric bootstraps of no-effect cases with refitting is below it (docs/explain.md)."""
 
 CERTAIN = -3.0  # the same for an effect that no real line is without: twenty to one against it
-MOST = 3  # effects at a time
+MOST = 4  # effects at a time
+STAND_INS = 10  # single effects tried in the place of another
 GOOD = 2.0 * FLOOR  # relative model error at which a fit is as good as it can be believed
 
 
@@ -161,7 +162,7 @@ def search(pool: Workers, progress: Callable[[str, int, int], None] | None = Non
             if new.evidence - best.evidence < CERTAIN:
                 break
         best, rivals = new, step
-        best = backward(pool, best)
+        best = exchange(pool, backward(pool, best), singles)
         if len(best.hypothesis) >= MOST:
             break
         jobs = [
@@ -174,6 +175,42 @@ def search(pool: Workers, progress: Callable[[str, int, int], None] | None = Non
     return Search(base, singles, best, rivals)
 
 
+def exchange(pool: Workers, best: Fit, singles: Sequence[Fit], rounds: int = 2) -> Fit:
+    """Put another effect in the place of each while that is better and the fit still poor.
+
+    The first effect taken in does the work of all that are missing; once others are there it may
+    be the wrong one. What stands in is the best few single effects.
+    """
+    for _ in range(rounds):
+        if len(best.hypothesis) < 2 or best.floor <= GOOD:
+            break
+        stand_ins = [f.hypothesis[0] for f in singles[:STAND_INS]]
+        jobs = []
+        for k in range(len(best.hypothesis)):
+            rest = best.hypothesis[:k] + best.hypothesis[k + 1 :]
+            jobs += [
+                restarted(best, (*rest, c), pool.base.rig)
+                for c in stand_ins
+                if c not in best.hypothesis
+            ]
+        better = _ranked(pool.fit(jobs))
+        if not better or better[0].evidence < best.evidence + 1.0:
+            break
+        best = better[0]
+    return best
+
+
+def restarted(best: Fit, hypothesis: Hypothesis, rig) -> dict:
+    """The job that fits from nominal again, effects in common starting where they were."""
+    names = {f"{effect.name}@{place}" for effect, place in hypothesis}
+    index, theta = best.twin.index, best.twin.theta
+    kept = {name: float(theta[k]) for name, k in index.items() if name.split(".")[0] in names}
+    return {
+        "hypothesis": hypothesis,
+        "starts": [{**kept, **start} for start in scan(rig, hypothesis)],
+    }
+
+
 def extended(best: Fit, candidate, rig) -> dict:
     """The job that adds a candidate to a fit.
 
@@ -182,10 +219,7 @@ def extended(best: Fit, candidate, rig) -> dict:
     """
     hypothesis = (*best.hypothesis, candidate)
     if best.floor > GOOD:
-        index, theta = best.twin.index, best.twin.theta
-        kept = {name: float(theta[k]) for name, k in index.items() if "@" in name}
-        starts = [{**kept, **start} for start in scan(rig, hypothesis)]
-        return {"hypothesis": hypothesis, "starts": starts}
+        return restarted(best, hypothesis, rig)
     return {"hypothesis": hypothesis, "fit": best}
 
 

@@ -99,14 +99,21 @@ def sentence(e: Explanation, result: dict, found: list[dict], base) -> str:
             f"The twin lacks {join(names)}: with it the misfit on data it has not seen goes from "
             f"{before:.1%} to {after:.1%} of the measured ripple."
         ]
+        numbers = {}
         for f in found:
             for name, p in f["parameters"].items():
                 low, high = p["ci95"]
                 unit = "" if p["unit"] == "1" else f" {p['unit']}"
-                words.append(
+                numbers[
                     f"{name.replace('_', ' ').capitalize()} {p['value']:.3g}{unit} "
                     f"({low:.3g} to {high:.3g})."
-                )
+                ] = None
+            if f["effect"].certain:
+                numbers[
+                    f"{f['effect'].name.replace('_', ' ').capitalize()} is taken in because no "
+                    "such line is without it; these data neither ask for it nor speak against it."
+                ] = None
+        words += numbers
         if kind == "ambiguous":
             classes = "; ".join(join(names) for names in result["equivalents"])
             words.append(f"These recordings cannot tell apart {classes}.")
