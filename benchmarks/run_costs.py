@@ -1,0 +1,47 @@
+"""What a run of the workflow cost: time and peak memory of each rule, disk left behind.
+
+    python benchmarks/run_costs.py [results]
+
+Reads the benchmark files that the workflow writes. Wall seconds add up over jobs; two jobs run at a
+time, so the whole run takes about half of the sum. Resident memory is that of the largest job.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pandas as pd
+
+
+def costs(results: Path) -> pd.DataFrame:
+    """One row a rule: jobs, wall and processor seconds, largest resident memory (MB)."""
+    rows = []
+    folder = results / "benchmarks"
+    for path in sorted(folder.rglob("*.tsv")):
+        row = pd.read_csv(path, sep="\t", na_values="-").iloc[0]
+        rule = path.relative_to(folder).with_suffix("").parts[0]
+        rows.append((rule, row["s"], row["cpu_time"], row["max_rss"]))
+    table = pd.DataFrame(rows, columns=["rule", "wall_s", "cpu_s", "peak_mb"])
+    grouped = table.groupby("rule")
+    return pd.DataFrame(
+        {
+            "jobs": grouped.size(),
+            "wall_s": grouped.wall_s.sum().round(),
+            "cpu_s": grouped.cpu_s.sum().round(),
+            "peak_mb": grouped.peak_mb.max().round(),
+        }
+    ).sort_values("wall_s", ascending=False)
+
+
+def main() -> None:
+    results = Path(sys.argv[1] if len(sys.argv) > 1 else "results")
+    table = costs(results)
+    print(table.to_string())
+    size = sum(path.stat().st_size for path in results.rglob("*") if path.is_file())
+    print(f"all: {table.wall_s.sum():.0f} s of jobs, largest job {table.peak_mb.max():.0f} MB")
+    print(f"disk: {size / 1e6:.0f} MB in {results}")
+
+
+if __name__ == "__main__":
+    main()
