@@ -111,7 +111,7 @@ def sentence(e: Explanation, result: dict, found: list[dict], base) -> str:
             if f["effect"].certain:
                 numbers[
                     f"{f['effect'].name.replace('_', ' ').capitalize()} is taken in because no "
-                    "such line is without it; these data neither ask for it nor speak against it."
+                    "such line is without it, unless data speak against it."
                 ] = None
         words += numbers
         if kind == "ambiguous":

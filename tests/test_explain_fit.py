@@ -1,0 +1,153 @@
+"""Fitting hypotheses: derivatives, recovery, evidence, and what a search makes of them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from explain_made import make
+from rippletwin.effects import EFFECTS, Place
+from rippletwin.explain.detect import drift, interior_test, pull
+from rippletwin.explain.fit import fit_hypothesis, refine
+from rippletwin.explain.locate import profile
+from rippletwin.explain.posterior import FLOOR, Posterior
+from rippletwin.explain.search import ACCEPT, Workers, scan, search
+from rippletwin.explain.validate import validate
+from rippletwin.forward import Forward
+from rippletwin.twin import Twin
+
+VOLUME = ((EFFECTS["line_volume"], Place("position")),)
+HOSE = ((EFFECTS["viscoelastic_wall"], Place("segment 2", 1)),)
+GAIN = ((EFFECTS["sensor_gain"], Place("sensor p2", 1)),)
+LEAK = ((EFFECTS["leak"], Place("position")),)
+TRUTH = {
+    "line_volume@position.position": 4.4,
+    "line_volume@position.volume": 6e-5,
+    "viscoelastic_wall@segment 2.compliance_ratio": 0.2,
+    "viscoelastic_wall@segment 2.retardation_time": 3e-4,
+    "sensor_gain@sensor p2.gain_error": 0.08,
+    "leak@position.position": 5.0,
+    "leak@position.conductance": 4e-11,
+}
+
+
+@pytest.mark.parametrize("hypothesis", [(), VOLUME, HOSE, GAIN])
+def test_derivatives_equal_difference_quotients(hypothesis):
+    """All columns in one sweep agree with central differences of the whole nonlinear model to the
+    2 % that holding the orifice's remainder costs."""
+    rng = np.random.default_rng(1)
+    _, observations, truth = make(rng, hypothesis, TRUTH)
+    posterior = Posterior(truth, observations)
+    theta = truth.theta + 0.1 * rng.normal(size=len(truth.theta))
+    columns = posterior.forward.derivatives(theta)
+    forward = Forward(truth, observations)
+    for k, column in enumerate(columns):
+        step = 1e-5 * np.eye(len(theta))[k]
+        up, down = (np.concatenate(forward(theta + side * step), 1) for side in (1, -1))
+        quotient = (up - down) / 2e-5
+        assert np.linalg.norm(column - quotient) < 0.02 * np.linalg.norm(quotient) + 1e-6
+
+
+def test_whitened_residual_of_the_truth_has_unit_variance():
+    """At the true parameters, with noise alone, the residuals have mean square 1 (chi-square)."""
+    _, observations, truth = make(np.random.default_rng(2), source=0.0, noise=4e5)
+    posterior = Posterior(truth, observations)
+    posterior.floor, posterior.source_sd = 0.0, 0.0
+    r = posterior.whitened(posterior.predict(truth.theta))[0]
+    assert abs(np.mean(np.abs(r) ** 2) - 1) < 5 / np.sqrt(r.size)
+
+
+def test_blind_to_the_source_ignores_its_amplitude():
+    """Scaling the source at every frequency by anything leaves the source-free residual alone."""
+    rng = np.random.default_rng(3)
+    _, observations, truth = make(rng)
+    posterior = Posterior(truth, observations, source_free=True)
+    prediction = posterior.predict(truth.theta)
+    other = prediction * np.exp(rng.normal(size=prediction.shape[1]) * 1j) * 1.7
+    np.testing.assert_allclose(
+        np.abs(posterior.whitened(prediction)[0]) ** 2,
+        np.abs(posterior.whitened(other)[0]) ** 2,
+        atol=1e-6,
+    )
+
+
+@pytest.mark.parametrize("hypothesis", [VOLUME, HOSE, LEAK], ids=["volume", "hose", "leak"])
+def test_continuation_finds_the_truth_from_nominal(hypothesis):
+    """From nominal values that are off as stated, the fit with the true effect ends as good as one
+    started at the truth, with the effect's parameters within four standard deviations."""
+    bench, observations, truth = make(np.random.default_rng(11), hypothesis, TRUTH)
+    base = Twin(bench, observations)
+    found = fit_hypothesis(base, hypothesis, observations, scan(bench, hypothesis))
+    known = refine(base, hypothesis, observations, [truth.theta])
+    assert found.floor < 2 * FLOOR
+    assert found.evidence > known.evidence - 1.0
+    for p in truth.parameters:
+        if "@" in p.name:
+            k = truth.index[p.name]
+            assert abs(found.twin.theta[k] - truth.theta[k]) < 4 * found.sd[k]
+
+
+def test_search_takes_nothing_in_where_nothing_is_missing(monkeypatch):
+    """On a no-effect case no effect of a part of the library reaches the threshold."""
+    monkeypatch.setattr("rippletwin.explain.search.library", lambda *_: [*HOSE, *GAIN, *VOLUME])
+    bench, observations, _ = make(np.random.default_rng(5))
+    found = search(Workers(Twin(bench, observations), observations))
+    assert found.best.hypothesis == ()
+    assert found.base.floor < 2 * FLOOR
+    assert found.gain(found.singles[0]) < ACCEPT
+
+
+def test_search_names_the_effect_and_it_holds_on_points_left_out(monkeypatch):
+    """A sensor's gain is told from a hose and a volume, and transfers to unseen points."""
+    monkeypatch.setattr("rippletwin.explain.search.library", lambda *_: [*HOSE, *GAIN, *VOLUME])
+    bench, observations, _ = make(np.random.default_rng(6), GAIN, TRUTH)
+    pool = Workers(Twin(bench, observations), observations)
+    found = search(pool)
+    assert found.best.names == ("sensor_gain",)
+    checked = validate(pool, found.base, found.best)
+    assert checked.holds
+    assert checked.after["held_out"].misfit < 0.5 * checked.before["held_out"].misfit
+
+
+def test_profile_peaks_at_the_leak():
+    """The scan of free corrections about the base fit peaks within 0.3 m of the true leak."""
+    bench, observations, _ = make(np.random.default_rng(7), LEAK, TRUTH)
+    base = fit_hypothesis(Twin(bench, observations), (), observations)
+    found = profile(base, observations)
+    kind, low, high = found.interval()
+    assert kind == "shunt"
+    assert low - 0.3 < 5.0 < high + 0.3
+
+
+def test_interior_relation_needs_no_source_or_load():
+    """p2 follows from p1 and p3 in noise-free data of another source and another load."""
+    bench, observations, truth = make(np.random.default_rng(8), source=0.5, noise=0.0)
+    fit = refine(Twin(bench, observations), (), observations, [truth.theta])
+    fit = type(fit)(**{**fit.__dict__, "twin": truth})
+    for error in interior_test(observations, fit):
+        assert np.max(error) < 1e-6
+
+
+def test_drift_is_seen_and_noise_is_not():
+    """Two noisy halves of one state agree; halves of states 3 % apart do not."""
+    rng = np.random.default_rng(9)
+    _, early, truth = make(rng)
+    other = [o for o in early]
+    changed = truth.theta.copy()
+    changed[truth.index["wave_speed[1]"]] += 0.5
+    late = Forward(truth, early)(changed)
+
+    drifted = [replace(o, values=h) for o, h in zip(early, late)]
+    delay = sum(s.delay for s in truth.rig.line)
+    assert drift(early, other, delay)[0] > 0.01
+    assert drift(early, drifted, delay)[0] < 1e-6
+
+
+def test_pull_names_the_parameter():
+    """The largest pull is that of the parameter moved farthest, effects not counted."""
+    bench, observations, truth = make(np.random.default_rng(10))
+    fit = refine(Twin(bench, observations), (), observations, [truth.theta])
+    theta = np.zeros_like(fit.twin.theta)
+    theta[fit.twin.index["diameter[2]"]] = -5.0
+    moved = type(fit)(**{**fit.__dict__, "twin": fit.twin.with_(theta=theta)})
+    assert pull(moved) == (5.0, "diameter[2]")
