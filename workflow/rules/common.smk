@@ -1,6 +1,7 @@
 # What several stages share: where files are, and what a job depends on besides them.
 import ast
 import os
+import sys
 from pathlib import Path
 
 import yaml
@@ -12,6 +13,8 @@ SCRIPTS = ROOT / "workflow" / "scripts"
 PAPER = os.path.relpath(ROOT / "resources" / "paper_accuracy.csv")
 RESULTS = config["results"]
 
+# The virtual rig's command is found even where the environment is not activated.
+os.environ["PATH"] = os.pathsep.join([os.path.dirname(sys.executable), os.environ["PATH"]])
 # numba does not follow `threads:`.
 os.environ.setdefault("NUMBA_NUM_THREADS", "1")
 # Training spends half its time on page faults unless the heap keeps what is freed; malloc reads
