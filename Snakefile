@@ -17,6 +17,7 @@ validate(config, "workflow/schemas/config.schema.yaml")
 include: "workflow/rules/common.smk"
 include: "workflow/rules/recordings.smk"
 include: "workflow/rules/calibrate.smk"
+include: "workflow/rules/explain.smk"
 include: "workflow/rules/faults.smk"
 include: "workflow/rules/propagate.smk"
 include: "workflow/rules/flow_sensor.smk"

@@ -14,7 +14,7 @@ PAPER = os.path.relpath(ROOT / "resources" / "paper_accuracy.csv")
 RESULTS = config["results"]
 
 # The virtual rig's command is found even where the environment is not activated.
-os.environ["PATH"] = os.pathsep.join([os.path.dirname(sys.executable), os.environ["PATH"]])
+shell.prefix(f"PATH={os.path.dirname(sys.executable)}:$PATH; ")
 # numba does not follow `threads:`.
 os.environ.setdefault("NUMBA_NUM_THREADS", "1")
 # Training spends half its time on page faults unless the heap keeps what is freed; malloc reads

@@ -1,0 +1,26 @@
+# What physics the calibrated twin still lacks: snakemake --cores 2 explain
+rule explain:
+    input:
+        rig=rig_sheet(),
+        recordings=recordings(),
+        source=library("explain.py"),
+    output:
+        verdict=f"{RESULTS}/explain/verdict.json",
+        twin=f"{RESULTS}/explain/twin.json",
+        figures=report(
+            directory(f"{RESULTS}/explain/figures"),
+            patterns=["{name}.png"],
+            category="missing physics",
+            caption="../report/explain.rst",
+        ),
+    log:
+        f"{RESULTS}/logs/explain.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/explain.tsv"
+    threads: 2
+    resources:
+        mem_mb=3000,
+    params:
+        rig=rig_sections("fluid", "pump", "line", "sensors", "load", "uncertainty"),
+    script:
+        "../scripts/explain.py"
