@@ -14,6 +14,7 @@ from rippletwin.explain.posterior import FLOOR, Posterior
 from rippletwin.explain.search import ACCEPT, Workers, scan, search
 from rippletwin.explain.validate import validate
 from rippletwin.forward import Forward
+from rippletwin.misfit import relative_misfit
 from rippletwin.twin import Twin
 
 VOLUME = ((EFFECTS["line_volume"], Place("position")),)
@@ -98,15 +99,18 @@ def test_search_takes_nothing_in_where_nothing_is_missing(monkeypatch):
 
 
 def test_search_names_the_effect_and_it_holds_on_points_left_out(monkeypatch):
-    """A sensor's gain is told from a hose and a volume, and transfers to unseen points."""
+    """A sensor's gain is told from a hose and a volume, and transfers to unseen points: there the
+    misfit comes within 1.2 of what the true parameters leave, noise and the source's error."""
     monkeypatch.setattr("rippletwin.explain.search.library", lambda *_: [*HOSE, *GAIN, *VOLUME])
-    bench, observations, _ = make(np.random.default_rng(6), GAIN, TRUTH)
+    bench, observations, truth = make(np.random.default_rng(6), GAIN, TRUTH)
     pool = Workers(Twin(bench, observations), observations)
     found = search(pool)
     assert found.best.names == ("sensor_gain",)
     checked = validate(pool, found.base, found.best)
     assert checked.holds
-    assert checked.after["held_out"].misfit < 0.5 * checked.before["held_out"].misfit
+    measured = np.concatenate([o.values for o in observations], axis=1)
+    floor = relative_misfit(measured, np.concatenate(truth.predict(observations), axis=1))
+    assert checked.after["held_out"].misfit < 1.2 * floor < checked.before["held_out"].misfit
 
 
 def test_profile_peaks_at_the_leak():
