@@ -162,6 +162,9 @@ class Forward:
             load_resistance=resistance,
             heat_capacity_ratio=fluid.heat_capacity_ratio,
             prandtl=fluid.prandtl,
+            orders=self.order,
+            recording=self.recording,
+            mean_flow=self.mean_flow,
         )
 
     def _orifice_admittance(self, factor: float) -> np.ndarray:

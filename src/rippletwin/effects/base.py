@@ -106,6 +106,8 @@ class LineState:
     mean_pressure    Pa absolute, (F,) or scalar: of the operating point each frequency belongs to
     load_resistance  static dp/dq of the load in Pa s/m3, (F,) or scalar; None where it has none
     heat_capacity_ratio, prandtl   of a gas, else None
+    orders, recording, mean_flow   shaft order, recording's number and mean flow (m3/s) of each
+                     frequency, (F,); None where there is no shaft
     """
 
     density: float
@@ -116,6 +118,9 @@ class LineState:
     load_resistance: np.ndarray | float | None = None
     heat_capacity_ratio: float | None = None
     prandtl: float | None = None
+    orders: np.ndarray | None = None
+    recording: np.ndarray | None = None
+    mean_flow: np.ndarray | None = None
 
     def area(self, k: int):
         """Cross section of segment k, m2."""

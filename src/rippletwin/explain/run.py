@@ -14,6 +14,7 @@ from rippletwin.explain import detect
 from rippletwin.explain.fit import Fit, prepare
 from rippletwin.explain.judge import ADEQUATE, Judgement, judge
 from rippletwin.explain.search import GOOD, Search, Workers, extended, search, workers
+from rippletwin.explain.shaft import ShaftLines, shaft_lines
 from rippletwin.explain.validate import Validation, validate
 from rippletwin.spectra import observe, revolutions_of
 from rippletwin.twin import Twin
@@ -25,7 +26,8 @@ HIGHEST_HZ = 4000.0
 class Explanation:
     """All that was found; `rippletwin.explain.verdict` writes it down.
 
-    observations are as fitted; single holds the base fitted to each of them alone.
+    observations are as fitted; single holds the base fitted to each of them alone, shaft what the
+    shaft orders say that are no multiples of the pistons' number.
     """
 
     rig: object
@@ -35,6 +37,7 @@ class Explanation:
     judgement: Judgement
     validation: Validation
     single: tuple[Fit, ...]
+    shaft: ShaftLines | None = None
 
     @property
     def twin(self) -> Twin:
@@ -95,7 +98,8 @@ def explain_observations(
         held = late if len(data) == 1 and late else None
         validation = validate(pool, found.base, explanation, held)
     judgement = judge(found, alarms, validation if explanation.hypothesis else None)
-    return Explanation(rig, tuple(data), alarms, found, judgement, validation, tuple(single))
+    lines = shaft_lines(judgement.accepted.twin, observations, HIGHEST_HZ)
+    return Explanation(rig, tuple(data), alarms, found, judgement, validation, tuple(single), lines)
 
 
 def _others(pool: Workers, found: Search) -> list[Fit]:

@@ -45,6 +45,8 @@ def library(rig, observations: Sequence, named: bool = True) -> list[tuple[Effec
             continue
         if effect.name == "entrained_air" and "periodic" not in kinds:
             continue
+        if effect.name in ("piston_spread", "speed_fluctuation"):
+            continue  # act at shaft orders that are not fitted, see `rippletwin.explain.shaft`
         found.append((effect, place))
     return found
 

@@ -42,8 +42,25 @@ def verdict(explanation: Explanation) -> dict:
         for entry in named
         if judgement.verdict != "unexplained"
     ]
+    shaft = e.shaft.name if e.shaft is not None else None
+    kind = judgement.verdict
+    if shaft is not None:
+        unit = "rad" if shaft == "speed_fluctuation" else "1"
+        # The sampling error of a mean over recordings is far below what the pump itself varies.
+        amplitude = {"value": e.shaft.value, "ci95": [0.8 * e.shaft.value, 1.2 * e.shaft.value]}
+        effects.append(
+            {
+                "name": shaft,
+                "element": "source",
+                "parameters": {"amplitude": {**amplitude, "unit": unit}},
+                "probability": 1.0 - e.shaft.p_value,
+            }
+        )
+        if kind in ("consistent", "calibration_only"):
+            kind = "named"
+        present = True
     result = {
-        "verdict": judgement.verdict,
+        "verdict": kind,
         "mismatch": {
             "present": present,
             "p_value": detect.p_value(gain, tried),
@@ -62,6 +79,8 @@ def verdict(explanation: Explanation) -> dict:
 def _where(e: Explanation, found: list[dict]) -> dict:
     base = e.search.base
     element, position = "line", [0.0, float(e.rig.length)]
+    if not found and e.shaft is not None and e.shaft.name is not None:
+        element, position = "source", [0.0, 0.0]
     if found:
         spans = [span(e.rig, f["effect"], f["place"], f["parameters"]) for f in found]
         element, position = spans[0]
@@ -130,6 +149,11 @@ def sentence(e: Explanation, result: dict, found: list[dict], base) -> str:
             )
     elif kind == "bad_data":
         words = [f"The data contradict themselves: {e.judgement.reason}."]
+    if e.shaft is not None and e.shaft.name is not None:
+        words.append(
+            f"Shaft-order lines of {e.shaft.relative:.1%} of the ripple show "
+            f"{e.shaft.name.replace('_', ' ')}: they resemble a single-piston fault."
+        )
     if "drift" in e.alarms.ringing:
         words.append(f"Early and late windows of {e.alarms.drift[1]} differ: the state drifted.")
     if "pull" in e.alarms.ringing and not e.judgement.accepted.hypothesis:

@@ -1,0 +1,53 @@
+"""Pistons that are not all alike: lines at every shaft order, the lowest first.
+
+They look like a fault of a single piston, and so are never absorbed silently.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rippletwin.effects.base import Effect, Parameter, normal, source_place
+
+
+def half_sine(orders: np.ndarray) -> np.ndarray:
+    """Harmonics (F,) of one piston's delivery, a half sine of unit mean, at shaft `orders` >= 1."""
+    n = np.asarray(orders, dtype=float)
+    even = np.where(n % 2 == 0, -2.0 / np.where(n == 1, np.inf, n**2 - 1.0), 0.0)
+    return np.where(n == 1, -0.5j * np.pi, even)
+
+
+def _apply(network, line, values, place):
+    count = 2 * len([name for name in values if name.startswith("cosine")]) + 1
+    turn = np.asarray(line.orders, int) % count
+    amplitude = np.zeros(len(turn), complex)
+    for m in range(1, count // 2 + 1):
+        a = complex(values[f"cosine_{m}"], values[f"sine_{m}"])
+        amplitude = (
+            amplitude + np.where(turn == m, a, 0.0) + np.where(turn == count - m, np.conj(a), 0.0)
+        )
+    added = line.mean_flow * half_sine(line.orders) * amplitude
+    network.source_flow = network.source_flow + np.where(turn == 0, 0.0, added)
+
+
+def _parameters(rig, place):
+    pairs = rig.pump.get("pistons", 9) // 2
+    return tuple(
+        Parameter(f"{part}_{m}", "1", normal(0.0, 5e-3))
+        for m in range(1, pairs + 1)
+        for part in ("cosine", "sine")
+    )
+
+
+EFFECT = Effect(
+    name="piston_spread",
+    element="source",
+    medium="any",
+    equation="Q_n += Q_0 h_n A_(n mod z), A_m = (1/z) sum_j a_j e^(-2 pi j m/z): piston j delivers "
+    "1 + a_j times the mean, h_n the harmonics of a half sine; odd z",
+    source="Ivantysyn & Ivantysynova 2001, Hydrostatic Pumps and Motors, sec. 3.2 (kinematic flow)",
+    time_domain="flow ripple plus the pistons' own half sines times a_j",
+    parameters=_parameters,
+    places=source_place,
+    apply=_apply,
+)
