@@ -36,7 +36,7 @@ EFFECT = Effect(
     name="speed_fluctuation",
     element="source",
     medium="any",
-    equation="Q_(k+1) += j k b X_k/2, Q_(k-1) += j k b* X_k/2: shaft angle theta + Re(b e^(j theta))",
+    equation="Q_(k+1) += j k b X_k/2, Q_(k-1) += j k b* X_k/2, angle + Re(b e^(j angle))",
     source="Randall 2011, Vibration-based Condition Monitoring, sec. 3.3 (phase modulation)",
     time_domain="flow ripple read at the modulated shaft angle",
     parameters=lambda rig, place: (
