@@ -7,7 +7,14 @@ import pytest
 import torch
 from torch import nn
 
-from rippletwin.attention import alignment, attention, fault_region, feature_positions, grad_cam
+from rippletwin.attention import (
+    alignment,
+    attention,
+    density,
+    fault_region,
+    feature_positions,
+    grad_cam,
+)
 from rippletwin.networks import ARCHITECTURES, build
 
 
@@ -127,3 +134,21 @@ def test_alignment_by_hand_and_at_chance():
     attended, share = alignment(heat, region)
     np.testing.assert_array_equal(attended, [1, 0, 0.25, np.nan])
     np.testing.assert_array_equal(share, [0.25] * 4)
+
+
+def test_region_of_an_image_is_a_frequency():
+    """By hand: the fault lights up the middle row at two times and the last at one; half the
+    difference is in the middle row, whenever it comes, and attention there counts at any time."""
+    faulty = np.zeros((1, 1, 3, 4))
+    faulty[0, 0, 1, 1:3] = faulty[0, 0, 2, 0] = 1
+    region = fault_region(np.zeros_like(faulty), faulty)
+    np.testing.assert_array_equal(region, [[False, True, False]])
+    heat = np.array([[[0, 0, 0, 1.0], [3, 0, 0, 0], [0, 0, 0, 0]]])
+    attended, share = alignment(heat, region)
+    np.testing.assert_allclose([attended[0], share[0]], [0.75, 1 / 3])
+
+
+def test_density_has_mean_one_or_is_nothing():
+    """Whatever the scale of the logits, the mean over an input is one; without attention NaN."""
+    heat = density(np.array([[1.0, 3.0], [100.0, 300.0], [0.0, 0.0]]))
+    np.testing.assert_array_equal(heat, [[0.5, 1.5], [0.5, 1.5], [np.nan, np.nan]])

@@ -53,33 +53,48 @@ def attention(
     return _spread(network, coarse.shape[1], np.shape(x)[-2], axis=0, cyclic=False) @ fine
 
 
-def fault_region(healthy: np.ndarray, faulty: np.ndarray, energy: float = 0.5) -> np.ndarray:
-    """Where a fault shows: the smallest region that holds ``energy`` of the squared difference.
+def density(heat: np.ndarray) -> np.ndarray:
+    """Heat (n, ...) over its mean in each input: 1 where attention is spread evenly.
 
-    healthy, faulty : (n, channels, ...) noise-free inputs at the same crank angle. Returns booleans
-    (n, ...): crank angles, or pixels, each sample its own. Raises ValueError for equal inputs.
+    Unlike logits, it compares between networks. NaN for an input without any attention.
+    """
+    mean = heat.reshape(len(heat), -1).mean(1).reshape(-1, *[1] * (heat.ndim - 1))
+    with np.errstate(invalid="ignore"):
+        return np.where(mean > 0, heat / mean, np.nan)
+
+
+def fault_region(healthy: np.ndarray, faulty: np.ndarray, energy: float = 0.5) -> np.ndarray:
+    """Where a fault shows: the fewest places that hold ``energy`` of the squared difference.
+
+    healthy, faulty : noise-free inputs at the same crank angle. Windows (n, channels, M) give crank
+    angles, booleans (n, M); images (n, channels, rows, columns) give frequencies, (n, rows): when
+    in the revolution a frequency lights up is of no meaning for a fault that every revolution
+    repeats. Raises ValueError for equal inputs.
     """
     difference = np.square(np.asarray(faulty, dtype=float) - healthy).sum(1)
-    flat = difference.reshape(len(difference), -1)
-    if not flat.sum(1).all():
+    if difference.ndim == 3:
+        difference = difference.sum(-1)
+    total = difference.sum(1, keepdims=True)
+    if not total.all():
         raise ValueError("a faulty input equals the healthy one: there is no region to attend to")
-    order = np.argsort(-flat, axis=1)
-    before = np.cumsum(np.take_along_axis(flat, order, 1), 1) / flat.sum(1, keepdims=True)
-    inside = np.zeros_like(flat, dtype=bool)
+    order = np.argsort(-difference, axis=1)
+    held = np.cumsum(np.take_along_axis(difference, order, 1), 1) / total
+    inside = np.zeros_like(difference, dtype=bool)
     # a place belongs as long as those stronger than it do not hold the share yet
-    first = np.pad(before[:, :-1], ((0, 0), (1, 0))) < energy
-    np.put_along_axis(inside, order, first, 1)
-    return inside.reshape(difference.shape)
+    np.put_along_axis(inside, order, np.pad(held[:, :-1], ((0, 0), (1, 0))) < energy, 1)
+    return inside
 
 
 def alignment(heat: np.ndarray, region: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Share of the attention that falls into the region, and share that the region is of all.
 
-    heat : (n, ...) of ``attention``; region : (n, ...) booleans. Returns two arrays (n,). Attention
-    that looks anywhere alike has equal shares: their ratio is one, more means it seeks the fault.
-    NaN where there is no attention at all (no positive evidence for the class).
+    heat : ``attention``, (n, M) or (n, rows, columns); region : booleans of ``fault_region``,
+    (n, M) or (n, rows). Returns two arrays (n,). Attention that looks everywhere alike has equal
+    shares: their ratio is one, more means it seeks the fault. NaN where there is no attention at
+    all (no positive evidence for the class).
     """
-    heat, region = heat.reshape(len(heat), -1), region.reshape(len(region), -1)
+    if heat.ndim == 3:
+        heat = heat.sum(-1)
     total = heat.sum(1)
     with np.errstate(invalid="ignore"):
         attended = np.where(total > 0, (heat * region).sum(1) / total, np.nan)
