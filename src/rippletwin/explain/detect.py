@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
+from rippletwin.explain import residuals
 from rippletwin.explain.fit import Fit
 from rippletwin.explain.posterior import FLOOR, Posterior
 
@@ -118,21 +119,11 @@ def p_value(gain: float, tried: int) -> float:
 
 
 def bands(fit: Fit, observations: Sequence) -> list[list[float]]:
-    """Frequency bands (Hz) in which the fit's whitened residual stands out, joined where close."""
+    """Frequency bands (Hz) in which the fit's whitened residual stands out."""
     posterior, r = _whitened(fit, observations)
-    frequency = np.concatenate([o.frequency_hz for o in posterior.observations])
-    size = np.mean(np.abs(r) ** 2, axis=0)
-    order = np.argsort(frequency)
-    frequency, size = frequency[order], size[order]
-    found = []
-    for f, s in zip(frequency, size):
-        if s < 9.0:
-            continue
-        if found and f < 1.25 * found[-1][1]:
-            found[-1][1] = float(f)
-        else:
-            found.append([float(f), float(f)])
-    return found
+    frequency = [o.frequency_hz for o in posterior.observations]
+    spacing = max(float(np.median(np.diff(f))) for f in frequency if len(f) > 1)
+    return residuals.bands(np.concatenate(frequency), np.mean(np.abs(r) ** 2, axis=0), spacing)
 
 
 def conditions(fit: Fit, observations: Sequence) -> list[int]:
@@ -143,13 +134,11 @@ def conditions(fit: Fit, observations: Sequence) -> list[int]:
 
 
 def crank_angles(fit: Fit, observations: Sequence, samples: int = 360) -> list[list[float]]:
-    """Shaft angles (deg, within a piston's pitch) where the residual's ripple is concentrated.
-
-    Those that hold half of its energy, of periodic recordings on the common shaft angle.
-    """
+    """Shaft angles (deg, within a piston's pitch) where the residual's ripple is concentrated,
+    of periodic recordings on the common shaft angle."""
     posterior = _posterior(fit, observations)
     prediction = posterior.predict(fit.twin.theta)
-    energy, pitch = np.zeros(samples), None
+    waves, pitch = [], None
     for o, part in zip(posterior.observations, posterior.forward.slices):
         if o.orders is None:
             continue
@@ -157,19 +146,10 @@ def crank_angles(fit: Fit, observations: Sequence, samples: int = 360) -> list[l
         turn = 0.0 if index is None else fit.twin.parameters[index].value(fit.twin.theta[index])
         orders = np.asarray(o.orders, float)
         pitch = 2 * np.pi / np.gcd.reduce(np.asarray(o.orders, int))
-        angle = pitch * np.arange(samples) / samples
         residual = (o.values - prediction[:, part]) * np.exp(-1j * turn * orders)
-        wave = (residual @ np.exp(1j * np.outer(orders, angle))).real
-        energy += np.sum(wave**2, axis=0) / np.sum(np.abs(o.values) ** 2)
-    if pitch is None or not np.any(energy):
-        return []
-    strong = np.argsort(-energy)
-    count = int(np.searchsorted(np.cumsum(energy[strong]), 0.5 * energy.sum())) + 1
-    inside = np.zeros(samples, bool)
-    inside[strong[:count]] = True
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(int)))
-    step = np.rad2deg(pitch) / samples
-    return [[float(a * step), float(b * step)] for a, b in edges.reshape(-1, 2)]
+        wave = residual @ np.exp(1j * np.outer(orders, pitch * np.arange(samples) / samples))
+        waves.append(wave / np.linalg.norm(o.values))
+    return residuals.angles(np.concatenate(waves), float(np.rad2deg(pitch))) if waves else []
 
 
 def residual_map(fit: Fit, observations: Sequence) -> list[np.ndarray]:
