@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from explain_made import make
+from explain_made import POINTS, make
 from rippletwin.effects import EFFECTS, Place
 from rippletwin.explain.detect import drift, interior_test, pull
 from rippletwin.explain.fit import fit_hypothesis, refine
@@ -155,3 +155,28 @@ def test_pull_names_the_parameter():
     theta[fit.twin.index["diameter[2]"]] = -5.0
     moved = type(fit)(**{**fit.__dict__, "twin": fit.twin.with_(theta=theta)})
     assert pull(moved) == (5.0, "diameter[2]")
+
+
+def test_log_likelihood_is_that_of_the_whole_covariance_matrix():
+    """Squares and log determinant of the whitened residual are those of one dense Gaussian with
+    noise, model error, rough and smooth source error over all sensors, frequencies, recordings."""
+    rng = np.random.default_rng(12)
+    _, observations, truth = make(rng, points=POINTS[:2])
+    posterior = Posterior(truth, observations, 2000.0)
+    posterior.floor, posterior.source_sd, posterior.smooth_sd = 0.02, 0.03, 0.1
+    prediction = posterior.predict(truth.theta + 0.05 * rng.normal(size=len(truth.theta)))
+    f, recording = posterior.forward.frequency_hz, posterior.forward.recording
+    kernel = (1 + np.outer(f, f) / 1e6) * np.exp(-0.5 * np.subtract.outer(f, f) ** 2 / 1e6)
+    kernel *= 0.5 + 0.5 * (recording[:, None] == recording)
+    source = 0.03**2 * np.eye(len(f)) + 0.1**2 * kernel
+    h = prediction.ravel()
+    sensors = len(prediction)
+    dense = np.outer(h, h.conj()) * np.kron(np.ones((sensors, sensors)), source)
+    noise = np.concatenate([o.covariance[:, 0, 0].real for o in posterior.observations])
+    dense += np.diag(np.tile(noise + 0.02**2 * posterior.power, sensors))
+    e = (posterior.values - prediction).ravel()
+    r, log_determinant = posterior.whitened(prediction)
+    square = np.sum(np.abs(r) ** 2)
+    assert square == pytest.approx((e.conj() @ np.linalg.solve(dense, e)).real, rel=2e-3)
+    # The kernel is cut at 0.3 % of its largest eigenvalue; evidence is judged in whole units.
+    assert log_determinant == pytest.approx(np.linalg.slogdet(dense)[1], abs=0.7)

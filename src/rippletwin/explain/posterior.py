@@ -1,11 +1,21 @@
 """How likely the data are under a twin, with derivatives: `rippletwin.likelihood` for explaining.
 
-The model of the errors is that of `rippletwin.likelihood`: noise with a covariance C, a relative
-model error delta common to all sensors, and a relative source error sigma along the prediction,
+The model of the errors is noise with a covariance C, a relative model error delta common to all
+sensors, and the error of a nominal source, relative and along the prediction h, in two parts:
 
-    E[e e^H] = C + delta^2 m I + sigma^2 h h^H,
+    E[e e^H] = C + delta^2 m I + (sigma^2 I + tau^2 K) o h h^H
 
-built from the prediction h and not from the data (a shrinking model would fit anything else).
+sigma is the part that differs from harmonic to harmonic, tau the part that is smooth in frequency,
+as a wrong bulk modulus or port timing makes it. Between frequencies f and f' of recordings o and p
+
+    K = (1 + f f'/f0^2) exp(-(f - f')^2/(2 l^2)) (1/2 + 1/2 [o = p]),     f0 = l = 1 kHz:
+
+it grows with frequency, for an error of timing is one of phase, and half of it is common to all
+operating points, for it is the same pump that is modelled wrongly. A smooth error is what an effect
+at the pump, friction or a hose may look like; without it their standard deviations would be several
+times too small, and an effect at the pump would be named where only the ripple is wrong.
+
+All is built from the prediction and not from the data (a shrinking model would fit anything else).
 Explaining adds a least delta, and the choice to be blind to the source: sigma infinite, which
 projects its amplitude and phase out at every frequency. All observations stand side by side.
 """
@@ -23,10 +33,12 @@ FLOOR = 0.004
 """Least relative model error. A twin of a real line is not better than this however small its
 sensors' noise: harmonic means over a wandering speed, the orifice's exponent, the mesh."""
 
-FLOORS = np.geomspace(FLOOR, 1.5, 16)
-SOURCE_SDS = np.array([0.01, 0.02, 0.04, 0.07, 0.1])
-"""Relative error of a nominal flow ripple's harmonic: one of these, the last being the largest
-that is put down to the ripple."""
+FLOORS = np.geomspace(FLOOR, 1.5, 9)
+SOURCE_SDS = np.array([0.003, 0.01, 0.03, 0.1])
+"""sigma is one of these, the last being the largest that is put down to the ripple."""
+SMOOTH_SDS = np.array([0.01, 0.03, 0.1])  # the same for tau
+CORRELATION_HZ = 1000.0  # l and f0
+KEPT = 3e-3  # of the kernel's largest eigenvalue
 
 
 class Posterior:
@@ -36,7 +48,7 @@ class Posterior:
     max_frequency_hz     nothing above it is used
     source_free          blind to the source
 
-    `floor` and `source_sd` (delta and sigma) are set by `estimate_errors`.
+    `floor`, `source_sd` and `smooth_sd` (delta, sigma, tau) are set by `estimate_errors`.
     """
 
     def __init__(self, twin, observations: Sequence, max_frequency_hz=None, source_free=False):
@@ -44,7 +56,8 @@ class Posterior:
         self.observations = [cut(o, max_frequency_hz) for o in observations]
         self.forward = DifferentiableForward(twin, self.observations)
         self.source_free = source_free
-        self.floor, self.source_sd, self.most = 0.1, float(SOURCE_SDS[2]), np.inf
+        self.floor, self.source_sd, self.smooth_sd = 0.1, float(SOURCE_SDS[2]), 0.0
+        self.most = np.inf
         self.prior = np.array([not p.flat for p in twin.parameters])
         data = [comparable(o, twin.rig) for o in self.observations]
         covariance = np.concatenate([o.covariance for o in data])
@@ -62,6 +75,11 @@ class Posterior:
             for o in data
         ]
         self._known, self._free = np.concatenate(known), np.concatenate(free)
+        nominal = ~(self._known | self._free)
+        self._nominal = np.flatnonzero(nominal)
+        self._basis = smooth_basis(
+            self.forward.frequency_hz[nominal], self.forward.recording[nominal]
+        )
         self.count = 2 * (self.values.size - int(np.sum(self._free)))
         self._pressures = all(o.kind != "input_impedance" for o in data)
 
@@ -83,24 +101,25 @@ class Posterior:
     def whitened(self, prediction: np.ndarray) -> tuple[np.ndarray, float]:
         """Residuals (..., S, F) of unit variance and the log determinant of their covariance.
 
-        A leading dimension of `prediction` is one of many predictions; the determinant is then
+        A leading dimension of `prediction` is one of many predictions; the covariance is then
         the first one's.
         """
+        metric = self._metric(prediction[(0,) * (prediction.ndim - 2)])
+        return metric.apply(self._rotated - self._rotate(prediction)), metric.log_determinant
+
+    def _metric(self, prediction: np.ndarray) -> Metric:
+        """Whitening by the covariance that a prediction (S, F) implies."""
         sd = np.sqrt(self._variances + self.floor**2 * self.power)
-        h = self._rotate(prediction)
-        e, u = (self._rotated - h) / sd, h / sd
-        size = np.maximum(np.sum(np.abs(u) ** 2, axis=-2), 1e-300)
-        stretch = 1.0 + np.where(self._known, 0.0, self.source_sd**2) * size
-        shorten = np.where(self._free, 1.0, 1.0 - 1.0 / np.sqrt(stretch))
-        along = np.sum(np.conj(u) * e, axis=-2) / size
-        r = e - (shorten * along)[..., None, :] * u
-        first = (0,) * (prediction.ndim - 2)
-        power = np.sum(np.abs(h[first]) ** 2, axis=0)
-        volume = np.where(self._free, size[first] / power, stretch[first])
-        return r, float(np.sum(np.log(sd**2)) + np.sum(np.log(volume)))
+        return Metric(
+            self._rotate(prediction),
+            sd,
+            np.where(self._known, 0.0, np.where(self._free, np.inf, self.source_sd)),
+            self._nominal,
+            self.smooth_sd * self._basis,
+        )
 
     def estimate_errors(self, prediction: np.ndarray) -> None:
-        """Set floor and source error to their most likely values given the residuals.
+        """Set floor and source errors to their most likely values given the residuals.
 
         Degrees of freedom taken by the parameters are made up for by scaling the sum of squares.
         """
@@ -110,48 +129,140 @@ class Posterior:
         squares, inner = np.abs(self._rotated - h) ** 2, np.conj(h) * (self._rotated - h)
         sizes = np.abs(h) ** 2
         floors = FLOORS
-        sds = SOURCE_SDS[:1] if np.all(self._free | self._known) else SOURCE_SDS
+        any_nominal = len(self._nominal) > 0
+        sds = SOURCE_SDS if any_nominal else SOURCE_SDS[:1]
+        taus = SMOOTH_SDS if any_nominal else np.zeros(1)
         for _ in range(2):
             weight = 1.0 / (self._variances + floors[:, None, None] ** 2 * self.power)
             square = np.sum(squares * weight, axis=1)  # (D, F)
-            cross = np.abs(np.sum(inner * weight, axis=1)) ** 2
+            cross = np.sum(inner * weight, axis=1)
             size = np.maximum(np.sum(sizes * weight, axis=1), 1e-300)
             stretch = 1.0 + np.where(self._known, 0.0, sds[:, None, None] ** 2) * size  # (G, D, F)
-            along = np.where(self._free, 1.0, 1.0 - 1.0 / stretch) * cross / size
+            along = np.where(self._free, 1.0, 1.0 - 1.0 / stretch) * np.abs(cross) ** 2 / size
             logs = np.log(np.where(self._free, size, stretch))
             cost = np.sum(scale * (square - along) + logs, axis=2)
-            cost -= np.sum(np.log(weight), axis=(1, 2))
-            source, best = np.unravel_index(np.argmin(cost), cost.shape)
-            self.floor, self.source_sd = float(floors[best]), float(sds[source])
+            cost = cost - np.sum(np.log(weight), axis=(1, 2)) + np.zeros((len(taus), 1, 1))
+            if any_nominal:  # (T, G, D): what the smooth error of unit prior changes
+                gain = 1.0 / stretch[..., self._nominal]
+                gram = np.einsum(
+                    "gdf,if,jf->gdij", size[:, self._nominal] * gain, self._basis, self._basis,
+                    optimize=["einsum_path", (0, 1), (0, 1)],
+                )  # fmt: skip
+                share = (cross[:, self._nominal] * gain) @ self._basis.T  # (G, D, J)
+                root = np.linalg.cholesky(
+                    np.eye(len(self._basis)) + taus[:, None, None, None, None] ** 2 * gram
+                )
+                both = np.stack([share.real, share.imag], axis=-1)
+                solved = np.linalg.solve(root, np.broadcast_to(both, (len(taus), *both.shape)))
+                cost -= scale * taus[:, None, None] ** 2 * np.sum(solved**2, axis=(-2, -1))
+                cost += 2 * np.sum(np.log(np.diagonal(root, axis1=-2, axis2=-1)), axis=-1)
+            smooth, source, best = np.unravel_index(np.argmin(cost), cost.shape)
+            self.floor = float(floors[best])
+            self.source_sd, self.smooth_sd = float(sds[source]), float(taus[smooth])
             near = floors[max(best - 1, 0)], floors[min(best + 1, len(floors) - 1)]
-            floors, sds = np.geomspace(*near, 7), sds[source : source + 1]
+            floors = np.geomspace(*near, 7)
+            sds, taus = sds[source : source + 1], taus[smooth : smooth + 1]
         self.floor = min(self.floor, self.most)
 
     def linearise(self, theta: np.ndarray, prediction: np.ndarray):
-        """Residual (N,) and its Jacobian (N, P) at the present errors."""
+        """Residual (N,) and its Jacobian (N, P) at the present errors, their covariance held."""
         if self._pressures:
-            moved = prediction + STEP * self.forward.derivatives(theta)
+            slopes = self.forward.derivatives(theta)
         else:
-            moved = np.stack([self.predict(theta + STEP * e) for e in np.eye(len(theta))])
-        r = self.residual(theta, prediction)
-        columns = _real(self.whitened(moved)[0]).reshape(len(theta), -1)
-        count = columns.shape[1]
-        jacobian = np.zeros((len(r), len(theta)))
-        jacobian[:count] = (columns - r[:count]).T / STEP
-        jacobian[count:] = np.eye(len(theta))[self.prior]
-        return r, jacobian
+            moved = [self.predict(theta + STEP * e) for e in np.eye(len(theta))]
+            slopes = (np.stack(moved) - prediction) / STEP
+        metric = self._metric(prediction)
+        whitened = metric.apply(self._rotated - self._rotate(prediction))
+        # The sum of squares is least over the source's error, so its gradient is that with the
+        # source held at its most likely value, which every slope therefore carries.
+        slopes = slopes * self._source(prediction, metric, whitened)
+        columns = -_real(metric.apply(self._rotate(slopes))).reshape(len(theta), -1)
+        r = np.concatenate([_real(whitened).ravel(), theta[self.prior]])
+        return r, np.concatenate([columns.T, np.eye(len(theta))[self.prior]])
 
     def best_source(self, prediction: np.ndarray) -> np.ndarray:
         """The prediction with every free source at its most likely amplitude, (S, F)."""
+        return np.where(self._free, self._amplitude(prediction), 1.0) * prediction
+
+    def _source(self, prediction, metric: Metric, whitened: np.ndarray) -> np.ndarray:
+        """Most likely source (F,) relative to the prediction's, given whitened residuals."""
+        pull = np.sum(np.conj(self._rotate(prediction)) * metric.adjoint(whitened), axis=0)
+        error = self.source_sd**2 * pull
+        smooth = self._basis.T @ (self._basis @ pull[self._nominal])
+        error[self._nominal] += self.smooth_sd**2 * smooth
+        return np.where(
+            self._free, self._amplitude(prediction), 1.0 + np.where(self._known, 0.0, error)
+        )
+
+    def _amplitude(self, prediction: np.ndarray) -> np.ndarray:
         weight = 1.0 / (self._variances + self.floor**2 * self.power)
         h = self._rotate(prediction)
-        amplitude = np.sum(weight * np.conj(h) * self._rotated, 0) / np.sum(
-            weight * np.abs(h) ** 2, 0
+        return np.sum(weight * np.conj(h) * self._rotated, 0) / np.maximum(
+            np.sum(weight * np.abs(h) ** 2, 0), 1e-300
         )
-        return np.where(self._free, amplitude, 1.0) * prediction
 
     def _rotate(self, x: np.ndarray) -> np.ndarray:
         return np.einsum("fsk,...sf->...kf", self._rotation, x)
+
+
+class Metric:
+    """Multiplication by an inverse root of the covariance sd^2 + source h h^H + smooth part.
+
+    h (S, F), sd (S, F), source (F,) the error of each frequency's source (0 known, inf free),
+    nominal the N frequencies that have a smooth error and its basis (J, N).
+    """
+
+    def __init__(self, h, sd, source, nominal, basis):
+        self._sd, self._u = sd, h / sd
+        self._size = np.maximum(np.sum(np.abs(self._u) ** 2, axis=0), 1e-300)
+        free = np.isinf(source)
+        stretch = 1.0 + np.where(free, 0.0, source) ** 2 * self._size
+        self._shorten = np.where(free, 1.0, 1.0 - 1.0 / np.sqrt(stretch))
+        power = np.sum(np.abs(h) ** 2, axis=0)
+        volume = np.where(free, self._size / np.maximum(power, 1e-300), stretch)
+        self.log_determinant = float(2.0 * np.sum(np.log(sd)) + np.sum(np.log(volume)))
+        self._part, self._columns = nominal, None
+        if np.any(basis):
+            # Whitened so far, the smooth error is B c with unit c: I + B B^H in the span of B.
+            gram = (basis * (self._size / stretch)[nominal]) @ basis.T
+            grown, turn = np.linalg.eigh(gram)
+            grown = np.maximum(grown, 1e-12)
+            columns = (turn / np.sqrt(grown)).T @ basis  # orthonormal over (S, N) with u
+            self._columns = columns[:, None, :] * (self._u / np.sqrt(stretch))[:, nominal]
+            self._reduce = 1.0 - 1.0 / np.sqrt(1.0 + grown)
+            self.log_determinant += float(np.sum(np.log1p(grown)))
+
+    def apply(self, x: np.ndarray) -> np.ndarray:
+        """x (..., S, F) multiplied."""
+        return self._shorten_smooth(self._shorten_rough(x / self._sd))
+
+    def adjoint(self, x: np.ndarray) -> np.ndarray:
+        """x (..., S, F) multiplied by the root's adjoint: adjoint(apply(x)) is C^-1 x."""
+        return self._shorten_rough(self._shorten_smooth(x)) / self._sd
+
+    def _shorten_rough(self, y):
+        along = np.sum(np.conj(self._u) * y, axis=-2) / self._size
+        return y - (self._shorten * along)[..., None, :] * self._u
+
+    def _shorten_smooth(self, y):
+        if self._columns is None:
+            return y
+        y = y.copy()
+        piece = y[..., self._part].reshape(*y.shape[:-2], -1)
+        columns = self._columns.reshape(len(self._columns), -1)
+        share = (piece @ np.conj(columns).T) * self._reduce
+        y[..., self._part] = (piece - share @ columns).reshape(*y.shape[:-1], -1)
+        return y
+
+
+def smooth_basis(frequency_hz: np.ndarray, recording: np.ndarray) -> np.ndarray:
+    """Basis (J, N) of errors smooth in frequency, basis.T @ basis = K; recording (N,) numbers."""
+    f = np.asarray(frequency_hz, float) / CORRELATION_HZ
+    kernel = (1.0 + np.outer(f, f)) * np.exp(-0.5 * np.subtract.outer(f, f) ** 2)
+    kernel = kernel * (0.5 + 0.5 * np.equal.outer(recording, recording))
+    values, vectors = np.linalg.eigh(kernel)
+    kept = values > KEPT * np.max(values, initial=0.0)
+    return np.sqrt(values[kept])[:, None] * vectors[:, kept].T
 
 
 def _real(r: np.ndarray) -> np.ndarray:
