@@ -25,6 +25,7 @@ include: "workflow/rules/augment.smk"
 include: "workflow/rules/image.smk"
 include: "workflow/rules/train.smk"
 include: "workflow/rules/evaluate.smk"
+include: "workflow/rules/compound.smk"
 include: "workflow/rules/report.smk"
 
 
@@ -36,3 +37,9 @@ rule all:
         rules.plot_calibration.output,
         expand(rules.plot_confusion.output, dataset=config["datasets"]),
         expand(rules.plot_seeds.output, dataset=simulated()),
+        rules.report_cost.output if corrected() else [],
+        rules.report_compound.output if COMPOUND else [],
+        expand(
+            rules.plot_seeds.output,
+            dataset=[ASIDE + dataset for dataset in simulated() if COMPOUND],
+        ),

@@ -14,6 +14,7 @@ import pandas as pd
 from rippletwin.networks import ARCHITECTURES, CLASSES
 
 TRUE_STATES = ("H", "S", "C")
+UNKNOWN = "?"  # state of a recording that is there to be diagnosed
 SEVERITY = {"pressure": "C1", "flow": "C2"}  # what the paper calls right for C
 DOMAINS = {"time": "Time domain", "image": "Time-frequency domain"}
 
@@ -27,14 +28,20 @@ def score(
     """Accuracies (fractions) of predictions on recordings.
 
     truth : (n,) states of the recordings, of ``TRUE_STATES`` (C1 or C2 where severity is known).
+        Windows of state ``UNKNOWN`` do not count.
     predicted : (n,) indices into ``CLASSES``.  signal : a key of ``severity``.
 
     Returns ``accuracy`` (the paper's scoring), ``accuracy_either`` (C1 and C2 both right for a C),
-    ``confusion`` (3, 4) counts and ``n``. Raises ValueError for an unknown state or no window.
+    ``confusion`` (3, 4) counts and ``n``, the windows that count; the accuracies are NaN where
+    none does. Raises ValueError for a state that is none of these, or for no window at all.
     """
     truth, predicted = np.asarray(truth, dtype=str), np.asarray(predicted)
     if truth.shape != predicted.shape or not truth.size:
         raise ValueError(f"{truth.shape} states for {predicted.shape} predictions")
+    truth, predicted = truth[truth != UNKNOWN], predicted[truth != UNKNOWN]
+    if not truth.size:
+        nothing = np.zeros((len(TRUE_STATES), len(CLASSES)), dtype=int)
+        return {"accuracy": np.nan, "accuracy_either": np.nan, "confusion": nothing, "n": 0}
     said = np.array(CLASSES)[predicted]
     wanted = np.where(truth == "C", severity[signal], truth)
     cylinder = np.isin(truth, ("C", "C1", "C2"))
@@ -94,7 +101,10 @@ def confusion_of(rows: pd.DataFrame) -> np.ndarray:
 
 
 def summarise(rows: pd.DataFrame, column: str = "accuracy") -> pd.DataFrame:
-    """Mean, standard deviation (of the sample; 0 for one run) and runs of each table cell."""
+    """Mean, standard deviation (of the sample; 0 for one run) and runs of each table cell.
+
+    A cell whose windows are all of unknown state has a mean of NaN and no runs.
+    """
     cells = rows.groupby(["architecture", "dataset"], sort=False)[column]
     table = cells.agg(["mean", "std", "count"]).reset_index()
     return table.fillna({"std": 0.0})
@@ -104,14 +114,11 @@ def accuracy_table(rows: pd.DataFrame, paper: pd.DataFrame, column: str = "accur
     """The paper's table in markdown: ours, with the paper's mean and deviation in brackets.
 
     rows : tidy results (``result_row``); paper : columns architecture, dataset, mean, std.
-    Datasets appear in the paper's order, then those the paper has not; a cell nobody ran is a dash.
+    Datasets appear in the paper's order, each followed by that of the corrected twin, then those
+    the paper has not; a cell nobody ran, or nobody can score, is a dash.
     """
     ours, theirs = _cells(summarise(rows, column)), _cells(paper)
-    known = list(dict.fromkeys(paper["dataset"]))
-    ran = list(dict.fromkeys(rows["dataset"]))
-    extra = [d for d in ran if d not in known]
-    simulated = [d for d in known if d != "experimental"]
-    datasets = simulated + extra + [d for d in known if d not in simulated]
+    datasets = _in_order([*paper["dataset"], *rows["dataset"]])
 
     lines = [
         "| Input | Architecture | " + " | ".join(datasets) + " |",
@@ -139,6 +146,70 @@ def confusion_table(counts: np.ndarray) -> str:
     return "\n".join(lines) + "\n"
 
 
+def cost_table(rows: pd.DataFrame, column: str = "accuracy") -> str:
+    """Markdown of what the left-out physics cost: each dataset beside the corrected twin's.
+
+    rows : tidy results (``result_row``). A line a network, and one for the mean of those networks
+    that ran on both; the cost is accuracy with the corrected twin less that with the calibrated,
+    in per cent of all windows. A cell nobody ran is a dash.
+    """
+    table = summarise(rows, column)
+    cells, means = _cells(table), table.set_index(["architecture", "dataset"])["mean"]
+    pairs = [(d, d + "+") for d in _in_order(rows["dataset"]) if d + "+" in set(rows["dataset"])]
+    ran = [name for name in ARCHITECTURES if name in set(rows["architecture"])]
+    head = [title for without, plus in pairs for title in (without, plus, "cost")]
+    lines = ["| Architecture | " + " | ".join(head) + " |", "|---|" + "---|" * len(head)]
+    for name in ran:
+        line = []
+        for pair in pairs:
+            without, plus = (means.get((name, dataset), np.nan) for dataset in pair)
+            cost = "–" if np.isnan(plus - without) else f"{plus - without:+.1f}"
+            line += [*(cells.get((name, dataset), "–") for dataset in pair), cost]
+        lines.append(f"| {ARCHITECTURES[name].title} | " + " | ".join(line) + " |")
+    line = []
+    for pair in pairs:
+        both = pd.DataFrame({d: means.xs(d, level="dataset") for d in pair}).dropna()
+        without, plus = (both[dataset].mean() for dataset in pair)
+        numbers = f"{without:.1f}", f"{plus:.1f}", f"{plus - without:+.1f}"
+        line += numbers if len(both) else ["–"] * 3
+    lines.append("| mean of networks | " + " | ".join(line) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def answer_table(answers: pd.DataFrame) -> str:
+    """Markdown of what networks say of recordings that cannot be scored: a class's share, per cent.
+
+    answers : columns recording, dataset, architecture and predicted (of ``CLASSES``), a row a
+    window and seed.
+    """
+    lines = [
+        "| Recording | Dataset | Architecture | windows | " + " | ".join(CLASSES) + " |",
+        "|---|---|---|---|" + "---|" * len(CLASSES),
+    ]
+    for keys, said in answers.groupby(["recording", "dataset", "architecture"], sort=False):
+        recording, dataset, architecture = keys
+        share = [f"{100 * (said['predicted'] == name).mean():.0f}" for name in CLASSES]
+        cells = [str(recording), dataset, ARCHITECTURES[architecture].title, str(len(said))]
+        lines.append("| " + " | ".join([*cells, *share]) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _in_order(datasets) -> list[str]:
+    """Each dataset once: a plus after its dataset, recordings last, else as they come."""
+    found = list(dict.fromkeys(datasets))
+    first = {dataset: k for k, dataset in reversed(list(enumerate(map(_without_plus, found))))}
+
+    def place(dataset):
+        return dataset == "experimental", first[_without_plus(dataset)], dataset
+
+    return sorted(found, key=place)
+
+
+def _without_plus(dataset: str) -> str:
+    return dataset.removesuffix("+")
+
+
 def _cells(table: pd.DataFrame) -> dict[tuple[str, str], str]:
     keys = zip(table["architecture"], table["dataset"])
-    return {key: f"{m:.1f} ± {s:.1f}" for key, m, s in zip(keys, table["mean"], table["std"])}
+    cells = {key: f"{m:.1f} ± {s:.1f}" for key, m, s in zip(keys, table["mean"], table["std"])}
+    return {key: text for key, text in cells.items() if not text.startswith("nan")}

@@ -76,8 +76,8 @@ def to_dict(calibration: Calibration) -> dict:
 
 
 def twin_of(data: dict) -> Twin:
-    """The calibrated twin in what `to_dict` made."""
-    return Twin.from_dict(data["twin"])
+    """The twin in what `to_dict` made, or in what `Twin.to_dict` did."""
+    return Twin.from_dict(data.get("twin", data))
 
 
 def markdown(calibration: Calibration) -> str:
@@ -180,7 +180,7 @@ def save(calibration: Calibration, folder: str | Path) -> None:
 
 
 def load_twin(path: str | Path) -> Twin:
-    """The calibrated twin of a twin.json."""
+    """The twin of a twin.json, that of a calibration or the corrected one of `explain`."""
     return twin_of(json.loads(Path(path).read_text()))
 
 

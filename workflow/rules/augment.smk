@@ -2,7 +2,7 @@
 rule augment:
     input:
         signals=f"{RESULTS}/seeds/{{dataset}}.zarr",
-        recorded=lambda wildcards: f"{RESULTS}/recordings/{signal_of(wildcards.dataset)}.zarr",
+        recorded=recorded_signal_of,
         source=library("augment.py"),
     output:
         temp(directory(f"{RESULTS}/samples/{{dataset}}/{{seed}}x{{revolutions}}.zarr")),
@@ -24,7 +24,7 @@ rule augment:
 
 rule pair:
     input:
-        recorded=lambda wildcards: f"{RESULTS}/recordings/{signal_of(wildcards.dataset)}.zarr",
+        recorded=recorded_signal_of,
         source=library("pair.py"),
     output:
         temp(directory(f"{RESULTS}/samples/{{dataset}}/recordedx2.zarr")),

@@ -1,6 +1,7 @@
 # What several stages share: where files are, and what a job depends on besides them.
 import ast
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -67,12 +68,19 @@ def rig_sections(*names):
 # ---- datasets, networks, seeds --------------------------------------------------------------
 
 STATES = ["H", "S", "C1", "C2"]
+COMPOUND = ["+".join(faults) for faults in config["faults"]["compound"]]
 EXPERIMENTAL = "experimental"  # the dataset that learns from recordings
+ASIDE = "compound/"  # compound faults as a dataset would have them: compound/CFD-Q
 
 
 def simulated():
     """The configured datasets that learn from simulations."""
     return [dataset for dataset in config["datasets"] if dataset != EXPERIMENTAL]
+
+
+def corrected():
+    """The configured datasets that learn from the corrected twin."""
+    return [dataset for dataset in config["datasets"] if dataset.endswith("+")]
 
 
 SEEDS = range(config["seeds"])
@@ -88,9 +96,9 @@ SLOWEST = [
 
 
 wildcard_constraints:
-    state="|".join(STATES),
-    dataset=f"CFD-P|CFD-MOC-P|CFD-Q|{EXPERIMENTAL}",
-    signal="pressure|flow",
+    state="|".join(map(re.escape, STATES + COMPOUND)),
+    dataset=rf"(?:{ASIDE})?(?:CFD-P|CFD-MOC-P\+?|CFD-Q\+?)|{EXPERIMENTAL}",
+    plus=r"\+?",
     architecture="[a-z0-9_]+",
     seed="[0-9]+",
     revolutions="1|2",
@@ -98,7 +106,45 @@ wildcard_constraints:
 
 
 def signal_of(dataset):
-    return "flow" if dataset.startswith("CFD-Q") else "pressure"
+    """What networks judge: pressure along the line, or flow at the pump."""
+    return "flow" if "CFD-Q" in dataset else "pressure"
+
+
+def plus_of(dataset):
+    """ "+" where the twin is the corrected one, as in file names."""
+    return "+" if dataset.endswith("+") else ""
+
+
+def twin_of(wildcards):
+    """The calibrated twin, or the one that `explain` corrected."""
+    return rules.explain.output.twin if wildcards.plus else rules.calibrate.output.twin
+
+
+def states_of(wildcards):
+    """The simulated states of a dataset, a store each: pressure in a line, or the pump's flow."""
+    dataset = wildcards.dataset
+    propagated = f"propagated{plus_of(dataset)}"
+    return expand(
+        f"{RESULTS}/{{folder}}/{{state}}.zarr",
+        folder=propagated if "CFD-MOC-P" in dataset else "faults",
+        state=COMPOUND if dataset.startswith(ASIDE) else STATES,
+    )
+
+
+def leak_area_of(wildcards):
+    """Leak of a state, m2; a list where several faults come together."""
+    areas = [
+        config["faults"]["leak_area"].get(fault, 0.0)
+        for fault in wildcards.state.split("+")
+    ]
+    return areas if len(areas) > 1 else areas[0]
+
+
+def recorded_signal_of(wildcards):
+    """Recorded windows of a dataset's signal; flow is seen through the line of its own twin."""
+    dataset = wildcards.dataset
+    plus = plus_of(dataset) if signal_of(dataset) == "flow" else ""
+    return f"{RESULTS}/recordings/{signal_of(dataset)}{plus}.zarr"
 
 
 def domain_of(architecture):
@@ -113,7 +159,7 @@ def recorded_of(wildcards):
     """What a network is tested on."""
     if domain_of(wildcards.architecture) == "image":
         return f"{RESULTS}/images/{wildcards.dataset}/recorded.zarr"
-    return f"{RESULTS}/recordings/{signal_of(wildcards.dataset)}.zarr"
+    return recorded_signal_of(wildcards)
 
 
 def samples_of(wildcards):
@@ -125,11 +171,19 @@ def samples_of(wildcards):
     return [f"{RESULTS}/samples/{wildcards.dataset}/{seed}x1.zarr" for seed in SEEDS]
 
 
+def compound_samples_of(wildcards):
+    """Samples of compound faults for a network of a dataset: of the first seed."""
+    dataset = ASIDE + wildcards.dataset
+    if domain_of(wildcards.architecture) == "image":
+        return f"{RESULTS}/images/{dataset}/0.zarr"
+    return f"{RESULTS}/samples/{dataset}/0x1.zarr"
+
+
 def reference_of(wildcards):
     """What the images of a dataset are scaled by."""
     if wildcards.dataset == EXPERIMENTAL:
         return f"{RESULTS}/recordings/pressure.zarr"
-    return f"{RESULTS}/seeds/{wildcards.dataset}.zarr"
+    return f"{RESULTS}/seeds/{wildcards.dataset.removeprefix(ASIDE)}.zarr"
 
 
 def urgency_of(wildcards):

@@ -15,9 +15,7 @@ rule fault:
         mem_mb=1000,
     params:
         rig=rig_sections("fluid", "pump", "line", "sensors"),
-        leak_area=lambda wildcards: config["faults"]["leak_area"].get(
-            wildcards.state, 0.0
-        ),
+        leak_area=leak_area_of,
         pipe_length=config["faults"]["pipe_length"],
     script:
         "../scripts/fault.py"

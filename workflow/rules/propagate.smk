@@ -1,17 +1,18 @@
 # One noise-free revolution a state: the seed signals of each simulated dataset.
+# propagated: through the calibrated line; propagated+: through the corrected one.
 rule propagate:
     input:
         flow=f"{RESULTS}/faults/{{state}}.zarr",
         healthy=f"{RESULTS}/faults/H.zarr",
         recordings=rules.ingest.output.windows,
-        twin=rules.calibrate.output.twin,
+        twin=twin_of,
         source=library("propagate.py"),
     output:
-        directory(f"{RESULTS}/propagated/{{state}}.zarr"),
+        directory(f"{RESULTS}/propagated{{plus}}/{{state}}.zarr"),
     log:
-        f"{RESULTS}/logs/propagate/{{state}}.log",
+        f"{RESULTS}/logs/propagate{{plus}}/{{state}}.log",
     benchmark:
-        f"{RESULTS}/benchmarks/propagate/{{state}}.tsv"
+        f"{RESULTS}/benchmarks/propagate{{plus}}/{{state}}.tsv"
     threads: 1
     resources:
         mem_mb=1000,
@@ -24,11 +25,7 @@ rule propagate:
 
 rule seed_signal:
     input:
-        states=lambda wildcards: expand(
-            f"{RESULTS}/{{stage}}/{{state}}.zarr",
-            stage="propagated" if wildcards.dataset == "CFD-MOC-P" else "faults",
-            state=STATES,
-        ),
+        states=states_of,
         source=library("seed_signal.py"),
     output:
         directory(f"{RESULTS}/seeds/{{dataset}}.zarr"),
@@ -40,7 +37,10 @@ rule seed_signal:
     resources:
         mem_mb=1000,
     params:
-        signal=lambda wildcards: signal_of(wildcards.dataset),
+        # What a flow sensor sees is the flow that any line can be driven with.
+        signal=lambda wildcards: {"pressure": "pressure", "flow": "source_flow"}[
+            signal_of(wildcards.dataset)
+        ],
         bandwidth_hz=config["flow_sensor"]["bandwidth_hz"],
     script:
         "../scripts/seed_signal.py"

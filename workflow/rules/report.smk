@@ -11,6 +11,7 @@ rule report:
             dataset=config["datasets"],
             architecture=config["architectures"],
         ),
+        recorded=rules.ingest.output.windows,
         paper=PAPER,
         source=library("report.py"),
     output:
@@ -37,6 +38,29 @@ rule report:
         ],
     script:
         "../scripts/report.py"
+
+
+rule report_cost:
+    input:
+        table=rules.report.output.table,
+        verdict=rules.explain.output.verdict,
+        twin=rules.explain.output.twin,
+        source=library("report_cost.py"),
+    output:
+        report(
+            f"{RESULTS}/cost_of_missing_physics.md",
+            category="accuracy",
+            caption="../report/cost.rst",
+        ),
+    log:
+        f"{RESULTS}/logs/report_cost.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/report_cost.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    script:
+        "../scripts/report_cost.py"
 
 
 rule plot_confusion:
@@ -88,6 +112,7 @@ rule plot_seeds:
     input:
         rig=rig_sheet(),
         seeds=f"{RESULTS}/seeds/{{dataset}}.zarr",
+        reference=reference_of,
         source=library("plot_seeds.py"),
     output:
         ripple=report(

@@ -26,6 +26,7 @@ for seed, weights in enumerate(torch.load(snakemake.input.weights)):
     table = pd.DataFrame(probability, columns=[f"p_{name}" for name in CLASSES]).round(5)
     table.insert(0, "predicted", np.array(CLASSES)[predicted])
     table.insert(0, "truth", truth)
+    table.insert(0, "recording", recorded.recording.values[kept])
     table.insert(0, "window", kept)
     table.insert(0, "seed", seed)
     tables.append(table)

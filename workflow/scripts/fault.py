@@ -1,7 +1,11 @@
-"""Outlet flow of the pump in one state, coupled to an uncalibrated pipe, and the pressure in it."""
+"""Outlet flow of the pump in one state, coupled to an uncalibrated pipe, and the pressure in it.
+
+A state such as S+C1 is several faults together, all from the same piston on.
+"""
 
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
 from job import start
@@ -24,8 +28,12 @@ def ripple(outlet, fault=None):
     return simulate(rig.pump, rig.fluid, speed_rpm, outlet, fault, samples)
 
 
-fault = {"H": None, "S": Slipper}.get(state, Cylinder)
-fault = fault and fault(params.leak_area)
+kinds = {"S": Slipper, "C1": Cylinder, "C2": Cylinder}
+fault = [
+    kinds[name](area)
+    for name, area in zip(state.split("+"), np.atleast_1d(params.leak_area))
+    if name in kinds
+]
 # A faulty pump meets the orifice that the healthy one left.
 result = healthy = ripple(Pipe(pipe, positions, load_pressure=recorded.load_pressure))
 if fault:

@@ -1,5 +1,6 @@
-"""Recorded pressure windows -> flow at the pump outlet, by the calibrated line."""
+"""Recorded pressure windows -> flow at the pump outlet, by the line of a twin."""
 
+import numpy as np
 import xarray as xr
 
 from job import start
@@ -10,17 +11,46 @@ from rippletwin.report import load_twin
 from rippletwin.spectra import noise_cycle_scatter
 
 tell = start(snakemake)
+params = snakemake.params
 recorded = store.load(snakemake.input.recorded)
-estimate = estimate_flow(
-    recorded.signal.values,
-    recorded.speed_hz,
-    network_of(load_twin(snakemake.input.twin), recorded.load_pressure),
-    recorded.noise_std.values,
-    snakemake.params.bandwidth_hz,
-)
-healthy = recorded.state.values == "H"
+network = network_of(load_twin(snakemake.input.twin), recorded.load_pressure)
+told = recorded.noise_std.values, params.bandwidth_hz
+
+
+def by_network(windows):
+    """The physics-informed network: trained once for this line, then solved a window at a time."""
+    import torch
+
+    from rippletwin.flow_sensor import pinn
+
+    torch.set_num_threads(snakemake.threads)
+    settings = pinn.Settings(width=params.width, steps=params.steps)
+
+    def progress(step, loss):
+        if step % 50 == 0:
+            tell(f"step {step}: loss {loss:.2g}")
+
+    speed_hz = recorded.speed_hz
+    trunk, _ = pinn.train(network, speed_hz, params.bandwidth_hz, settings, progress)
+    tell(f"equations hold to {float(trunk.residual):.2g} of the waves")
+    return pinn.estimate_flow(windows, speed_hz, network, trunk, *told)
+
+
+windows = recorded.signal.values
+if params.method == "pinn":
+    estimate = by_network(windows)
+else:
+    estimate = estimate_flow(windows, recorded.speed_hz, network, *told)
 # Nothing is left above the bandwidth for wavelet details to find: the noise is what scatters.
-noise = noise_cycle_scatter(estimate.flow[healthy][:, None])
+recording, healthy = recorded.recording.values, recorded.state.values == "H"
+noise = np.mean(
+    [
+        noise_cycle_scatter(estimate.flow[recording == k][:, None])
+        for k in np.unique(recording[healthy] if healthy.any() else recording)
+    ],
+    axis=0,
+)
+line = "corrected" if snakemake.wildcards.plus else "calibrated"
 store.save(
     xr.Dataset(
         {
@@ -42,8 +72,8 @@ store.save(
         },
         attrs=recorded.attrs
         | {
-            "source": f"spectral flow sensor on {recorded.source}",
-            "bandwidth_hz": snakemake.params.bandwidth_hz,
+            "source": f"{params.method} flow sensor, {line} line, on {recorded.source}",
+            "bandwidth_hz": params.bandwidth_hz,
         },
     ),
     snakemake.output[0],

@@ -34,8 +34,10 @@ settings = SstSettings(
     voices=params.voices,
     k=params.k,
 )
-healthy = windows[[states.index("H")]]
-settings = replace(settings, scale=amplitude_scale(healthy, rate, settings))
+reference = store.load(snakemake.input.reference)
+healthy = reference.signal.sel(state="H").isel(channel=[0]).values[None]
+healthy = healthy - healthy.mean(axis=-1, keepdims=True)
+settings = replace(settings, scale=amplitude_scale(np.tile(healthy, 2), rate, settings))
 images = sst_images(windows, rate, settings)[:, 0]
 frequency_hz, _ = image_axes(settings, 2 / seeds.speed_hz)
 figure = diagnosis.sst(dict(zip(states, images)), frequency_hz, seeds.speed_hz, pistons)

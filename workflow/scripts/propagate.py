@@ -1,4 +1,4 @@
-"""Pressure at the sensors of the calibrated line, driven by the pump in one state."""
+"""Pressure at the sensors of the twin's line, driven by the pump in one state."""
 
 import xarray as xr
 
@@ -9,6 +9,7 @@ from rippletwin.report import load_twin
 
 tell = start(snakemake)
 params = snakemake.params
+line = "corrected" if snakemake.wildcards.plus else "calibrated"
 recorded = store.load(snakemake.input.recordings)
 fault, healthy = store.load(snakemake.input.flow), store.load(snakemake.input.healthy)
 result = propagate(
@@ -34,7 +35,7 @@ store.save(
         attrs={
             "state": snakemake.wildcards.state,
             "speed_hz": recorded.speed_hz,
-            "source": "the calibrated line by the method of characteristics",
+            "source": f"the {line} line by the method of characteristics",
         },
     ),
     snakemake.output[0],

@@ -1,4 +1,4 @@
-"""The noise-free revolution of every state in one store; flow as far as the sensor sees it."""
+"""The noise-free revolution of every state in one store; flow as far as a sensor sees it."""
 
 import numpy as np
 import xarray as xr
@@ -11,15 +11,15 @@ tell = start(snakemake)
 params = snakemake.params
 stores = [store.load(path) for path in snakemake.input.states]
 signals = [dataset[params.signal] for dataset in stores]
-values = np.array([signal.values for signal in signals])
-if params.signal == "flow":
+values = np.array([np.atleast_2d(signal.values) for signal in signals])
+if signals[0].attrs["units"] == "m3/s":
     values = band_limit(values, stores[0].attrs["speed_hz"], params.bandwidth_hz)
 store.save(
     xr.Dataset(
         {"signal": (("state", "channel", "time"), values, signals[0].attrs)},
         coords={
             "state": [dataset.attrs["state"] for dataset in stores],
-            "channel": signals[0][signals[0].dims[0]].values,
+            "channel": signals[0].channel.values if "channel" in signals[0].dims else ["outlet"],
         },
         attrs={key: stores[0].attrs[key] for key in ("speed_hz", "source")},
     ),

@@ -23,6 +23,7 @@ def samples(path):
     if "label" in data:
         return data.signal.values, data.label.values
     kept, _ = split_by_time(np.bincount(data.recording), params.share)
+    kept = kept[data.state.values[kept] != "?"]  # nothing to learn from an unknown state
     state = np.where(data.state == "C", params.cylinder, data.state)[kept]
     return data.signal.values[kept], np.array([CLASSES.index(s) for s in state])
 

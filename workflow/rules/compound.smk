@@ -1,0 +1,49 @@
+# Compound faults, which no network learnt -> what the networks make of them.
+rule evaluate_compound:
+    input:
+        samples=compound_samples_of,
+        weights=rules.train.output.weights,
+        source=library("evaluate_compound.py"),
+    output:
+        f"{RESULTS}/compound/{{dataset}}/{{architecture}}.csv",
+    log:
+        f"{RESULTS}/logs/evaluate_compound/{{dataset}}/{{architecture}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/evaluate_compound/{{dataset}}/{{architecture}}.tsv"
+    priority: 30
+    threads: 1
+    resources:
+        mem_mb=2000,
+    script:
+        "../scripts/evaluate_compound.py"
+
+
+rule report_compound:
+    input:
+        answers=expand(
+            f"{RESULTS}/compound/{{dataset}}/{{architecture}}.csv",
+            dataset=simulated(),
+            architecture=config["architectures"],
+        ),
+        source=library("report_compound.py"),
+    output:
+        report(
+            f"{RESULTS}/compound.md",
+            category="compound faults",
+            caption="../report/compound.rst",
+        ),
+    log:
+        f"{RESULTS}/logs/report_compound.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/report_compound.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        cells=[
+            (dataset, architecture)
+            for dataset in simulated()
+            for architecture in config["architectures"]
+        ],
+    script:
+        "../scripts/report_compound.py"

@@ -1,0 +1,26 @@
+"""What the networks of every seed say of simulated faults that come together."""
+
+import numpy as np
+import pandas as pd
+import torch
+
+from job import start
+from rippletwin import store
+from rippletwin.networks import CLASSES, build
+from rippletwin.training import predict
+
+tell = start(snakemake)
+torch.set_num_threads(snakemake.threads)
+samples = store.load(snakemake.input.samples)
+x, faults = samples.signal.values, np.array(samples.label.attrs["classes"])[samples.label.values]
+
+tables = []
+for seed, weights in enumerate(torch.load(snakemake.input.weights)):
+    network = build(snakemake.wildcards.architecture, channels=x.shape[1])
+    network.load_state_dict(weights)
+    predicted, _ = predict(network, x)
+    tables.append(
+        pd.DataFrame({"seed": seed, "recording": faults, "predicted": np.array(CLASSES)[predicted]})
+    )
+pd.concat(tables).to_csv(snakemake.output[0], index=False)
+tell(f"{len(x)} windows, {len(tables)} seeds")

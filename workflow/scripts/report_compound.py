@@ -1,0 +1,25 @@
+"""A page on compound faults: how often networks that know single faults call them what."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from job import start
+from rippletwin.accuracy import answer_table
+
+tell = start(snakemake)
+answers = pd.concat(
+    pd.read_csv(path).assign(dataset=dataset, architecture=architecture)
+    for (dataset, architecture), path in zip(
+        snakemake.params.cells, snakemake.input.answers, strict=True
+    )
+)
+Path(snakemake.output[0]).write_text(
+    f"""# Faults that come together
+
+Simulated with the leaks of the single faults, both from the same piston on, and shown to networks
+that learnt single faults only. Shares of the answers over samples and seeds, per cent.
+
+{answer_table(answers)}"""
+)
+tell(f"{answers.recording.nunique()} compound faults, {len(snakemake.params.cells)} networks")
