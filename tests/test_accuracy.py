@@ -11,9 +11,11 @@ import pytest
 
 from rippletwin.accuracy import (
     accuracy_table,
+    answer_table,
     confusion,
     confusion_of,
     confusion_table,
+    cost_table,
     result_row,
     score,
     summarise,
@@ -75,6 +77,34 @@ def test_unknown_states_and_nothing_are_refused():
         score([], [], "pressure")
 
 
+def test_windows_of_unknown_state_are_not_scored():
+    """Half the windows known: accuracy is that of the known half; none known: no number at all,
+    and a dash in the table rather than a zero."""
+    scored = score(["H", "?", "S", "?"], [H, S, H, H], "pressure")
+    assert scored["accuracy"] == 0.5 and scored["n"] == 2 and scored["confusion"].sum() == 2
+    nothing = score(["?", "?"], [H, S], "pressure")
+    assert np.isnan(nothing["accuracy"]) and nothing["n"] == 0
+    rows = pd.DataFrame([result_row("cnn1d_3_1", "CFD-Q", 0, nothing)])
+    table = accuracy_table(rows, PAPER.iloc[:0])
+    assert "nan" not in table and "–" in table.splitlines()[4]
+    assert confusion_of(rows).sum() == 0
+
+
+def test_answers_are_shares_of_windows_and_seeds():
+    """By hand: two seeds, two windows, three answers S and one C2."""
+    answers = pd.DataFrame(
+        {
+            "recording": "unknown.csv",
+            "dataset": "CFD-Q",
+            "architecture": "cnn1d_3_1",
+            "predicted": ["S", "S", "C2", "S"],
+        }
+    )
+    title = ARCHITECTURES["cnn1d_3_1"].title
+    line = f"| unknown.csv | CFD-Q | {title} | 4 | 0 | 75 | 0 | 25 |"
+    assert answer_table(answers).splitlines()[2] == line
+
+
 def tidy():
     """Two seeds of one cell, one of another, of a dataset the paper has not."""
     rows = []
@@ -102,11 +132,11 @@ def test_mean_and_deviation_of_the_seeds():
 
 
 def test_the_table_has_the_papers_layout():
-    """Ten rows in the paper's order, its four columns with ours in between, its figures in
-    brackets beside ours, a dash for what was not run."""
+    """Ten rows in the paper's order, its four columns with ours in between (a plus after its
+    dataset), its figures in brackets beside ours, a dash for what was not run."""
     lines = accuracy_table(tidy(), PAPER).splitlines()
     header = [cell.strip() for cell in lines[0].strip("|").split("|")]
-    assert header[2:] == ["CFD-P", "CFD-MOC-P", "CFD-Q", "CFD-P+", "experimental"]
+    assert header[2:] == ["CFD-P", "CFD-P+", "CFD-MOC-P", "CFD-Q", "experimental"]
     assert [line.split("|")[2].strip() for line in lines[2:]] == [
         a.title for a in ARCHITECTURES.values()
     ]
@@ -114,6 +144,17 @@ def test_the_table_has_the_papers_layout():
     assert (
         "75.0 ± 35.4 (28.0 ± 10.7)" in row and "– (66.8 ± 0.2)" in row and "| 50.0 ± 0.0 |" in row
     )
+
+
+def test_the_cost_is_the_corrected_less_the_calibrated():
+    """By hand: 75 with the calibrated twin, 50 with the corrected. A network that ran on one of
+    them alone has no cost and does not enter the mean."""
+    alone = result_row("resnet18_1d", "CFD-P", 0, score(["H"], [H], "pressure"))
+    lines = cost_table(pd.concat([tidy(), pd.DataFrame([alone])])).splitlines()
+    assert lines[0] == "| Architecture | CFD-P | CFD-P+ | cost |"
+    assert lines[2].endswith("| 75.0 ± 35.4 | 50.0 ± 0.0 | -25.0 |")
+    assert lines[3].endswith("| 100.0 ± 0.0 | – | – |")
+    assert lines[4] == "| mean of networks | 75.0 | 50.0 | -25.0 |"
 
 
 def test_the_papers_table_is_the_papers():

@@ -8,7 +8,15 @@ import pytest
 
 from workflow_copy import make, planned, snakemake
 
-TESTED_AGAIN = {"evaluate", "report", "plot_accuracy", "plot_confusion"}
+TESTED_AGAIN = {
+    "evaluate",
+    "evaluate_compound",
+    "report",
+    "report_compound",
+    "report_cost",
+    "plot_accuracy",
+    "plot_confusion",
+}
 # Samples and images are temporary: who needs them again makes them again.
 TIME_AGAIN = {"augment", "train"} | TESTED_AGAIN
 IMAGES_AGAIN = {"augment", "pair", "image", "train"} | TESTED_AGAIN
@@ -67,9 +75,11 @@ def test_prior_in_rig_yaml_reruns_calibration_and_what_needs_the_twin(workflow):
     """A prior concerns calibration alone: neither the windows nor the pump are made again."""
     edit(workflow / "case/rig.yaml", "diameter: 0.03", "diameter: 0.05")
     rules, text = planned(workflow)
-    assert {"calibrate", "plot_calibration", "propagate", "flow_sensor"} <= rules
+    assert {"calibrate", "plot_calibration", "explain", "propagate", "flow_sensor"} <= rules
     assert not {"ingest", "fault"} & rules
-    assert "output: out/models/CFD-MOC-P/" in text and "output: out/models/CFD-P/" not in text
+    for dataset in ("CFD-MOC-P", "CFD-MOC-P+"):
+        assert f"output: out/models/{dataset}/" in text
+    assert "output: out/models/CFD-P/" not in text
 
 
 def test_pump_in_rig_yaml_reruns_faults(workflow):
@@ -89,6 +99,34 @@ def test_effect_file_reruns_calibration(workflow):
     effect = workflow / "src/rippletwin/effects/leak.py"
     effect.write_text(effect.read_text() + "\n# edited\n")
     assert "calibrate" in planned(workflow)[0]
+
+
+def test_physics_of_explain_reruns_the_corrected_columns_only(workflow):
+    """What only `explain` imports changes the corrected twin, not the calibrated one."""
+    search = workflow / "src/rippletwin/explain/search.py"
+    search.write_text(search.read_text() + "\n# edited\n")
+    rules, text = planned(workflow)
+    assert {"explain", "propagate", "flow_sensor"} <= rules and "calibrate" not in rules
+    for dataset in ("CFD-MOC-P+", "CFD-Q+"):
+        assert f"output: out/models/{dataset}/" in text
+    assert "output: out/models/CFD-MOC-P/" not in text
+
+
+def test_method_of_the_flow_sensor_reruns_the_flow_columns_only(workflow):
+    """Spectral or physics-informed: the flow of recordings changes, no simulation does."""
+    edit(workflow / "config/config.yaml", "method: spectral", "method: pinn")
+    rules, text = planned(workflow)
+    assert "flow_sensor" in rules and not {"calibrate", "explain", "propagate", "fault"} & rules
+    assert "output: out/models/CFD-Q+/" in text and "output: out/models/CFD-MOC-P" not in text
+
+
+def test_a_compound_fault_adds_jobs_of_its_own(workflow):
+    """Another pair of faults is simulated, propagated and shown; nothing is trained again but
+    what temporary files ask for."""
+    edit(workflow / "overlay.yaml", "[[S, C1]]", "[[S, C1], [S, C2]]")
+    rules, text = planned(workflow)
+    assert {"fault", "propagate", "seed_signal", "evaluate_compound", "report_compound"} <= rules
+    assert "output: out/faults/S+C2.zarr" in text and "output: out/faults/S.zarr" not in text
 
 
 def test_unknown_key_is_named(workflow):

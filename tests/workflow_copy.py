@@ -40,7 +40,7 @@ OVERLAY = """\
 results: out
 case: case
 seeds: 1
-datasets: [CFD-P, CFD-MOC-P, CFD-MOC-P+, CFD-Q, CFD-Q+]
+datasets: [CFD-P, CFD-MOC-P, CFD-MOC-P+, CFD-Q+]
 faults: {compound: [[S, C1]]}
 architectures: [cnn1d_341_100, cnn2d_7_2]
 """
