@@ -9,6 +9,7 @@ import numpy as np
 
 from rippletwin.explain.detect import Alarms
 from rippletwin.explain.fit import Fit
+from rippletwin.explain.locate import extent
 from rippletwin.explain.search import ACCEPT, GOOD, Search
 from rippletwin.explain.validate import Validation
 
@@ -134,15 +135,7 @@ def span(rig, effect, place, parameters: dict) -> tuple[str, list[float]]:
         if low >= starts[k] and high <= ends[k]:
             return f"segment {k + 1}", [low, high]
         return between(rig, low, high), [low, high]
-    if place.element.startswith("segment"):
-        return place.element, [float(starts[place.index]), float(ends[place.index])]
-    if place.element.startswith("sensor"):
-        x = rig.sensors[place.index].position
-        return place.element, [x, x]
-    total = float(ends[-1])
-    return place.element, {"source": [0.0, 0.0], "load": [total, total]}.get(
-        place.element, [0.0, total]
-    )
+    return place.element, list(extent(rig, place.element))
 
 
 def between(rig, low: float, high: float) -> str:

@@ -14,74 +14,220 @@ priors). Both are Gaussian, so that the log evidence gained is exact for small c
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rippletwin.explain.describe import posterior_of, whitened_columns
 from rippletwin.explain.fit import Fit
-from rippletwin.explain.posterior import FLOOR, Posterior
+from rippletwin.explain.posterior import FLOOR
 from rippletwin.line.chain import Insert
 
 STRENGTH = 0.3  # prior standard deviation of a correction, of the characteristic immittance
 PLACES = 60
-PROBE = 1e-3  # of the characteristic immittance
+PROBE = 1e-3  # of the correction
+COMPARED = 6  # single effects looked at without the source too
 
 
 @dataclass(frozen=True)
 class Profile:
-    """Log evidence gained (PLACES,) at `position` (PLACES,) m by a free "shunt" or "series"."""
+    """Log evidence gained (PLACES,) at `position` (PLACES,) m by a free "shunt" or "series".
+
+    `left` is the mean square that the best of them leaves of the whitened residual: above 1 no
+    single place accounts for all, and differences of evidence weigh that much less.
+    """
 
     position: np.ndarray
     gain: dict[str, np.ndarray]
+    left: float = 1.0
 
     def interval(self, drop: float = 3.0) -> tuple[str, float, float]:
         """Kind and ends (m) of the stretch within `drop` of the best place."""
         kind = max(self.gain, key=lambda k: np.max(self.gain[k]))
+        drop = drop * max(self.left, 1.0)
         inside = self.position[self.gain[kind] > np.max(self.gain[kind]) - drop]
-        return kind, float(inside[0]), float(inside[-1])
+        half = 0.5 * (self.position[1] - self.position[0])  # of the scan's step
+        return kind, float(inside[0] - half), float(inside[-1] + half)
 
 
 def profile(fit: Fit, observations: Sequence, places: int = PLACES) -> Profile | None:
     """The profile about a fit; None without two sensors."""
-    if len(fit.twin.rig.sensors) < 2 or any(o.kind == "input_impedance" for o in observations):
+    scan = _Scan.about(fit, observations)
+    if scan is None:
         return None
-    posterior = Posterior(fit.twin, observations, None, fit.source_free)
-    posterior.floor, posterior.source_sd = FLOOR, fit.source_sd
-    theta = fit.twin.theta
-    prediction = posterior.predict(theta)
-    r, jacobian = posterior.linearise(theta, prediction)
-    residual = r[: 2 * prediction.size]
-    jacobian = jacobian[: 2 * prediction.size]
-    network = posterior.forward.network(theta)
-    length = network.length
+    length = scan.network.length
     position = (np.arange(places) + 0.5) / places * length
-    gains = {}
-    for kind in ("shunt", "series"):
-        unit = np.sqrt(network.shunt[0] / network.series[0])
-        unit = unit if kind == "shunt" else 1.0 / unit
-        columns = [
-            _columns(posterior, network, prediction, kind, x, PROBE * unit) for x in position
-        ]
-        gains[kind] = np.array([_gain(residual, jacobian, c) for c in columns])
-    return Profile(position, gains)
+    found = {
+        kind: np.array([scan.weigh(scan.at(kind, x)) for x in position])
+        for kind in ("shunt", "series")
+    }
+    best = max(found.values(), key=lambda pairs: pairs[:, 0].max())
+    left = float(best[np.argmax(best[:, 0]), 1])
+    return Profile(position, {kind: pairs[:, 0] for kind, pairs in found.items()}, left)
 
 
-def _columns(posterior, network, prediction, kind, x, immittance) -> np.ndarray:
-    """Whitened responses (S, F, complex) to a correction of STRENGTH at x, frequency by frequency.
+def elements(fit: Fit, observations: Sequence) -> dict[str, float]:
+    """Log evidence gained by one free correction a frequency of each element of the rig.
 
-    A correction acts on its own frequency alone, so one column a frequency is all there is.
+    "source", "load" (admittance beside it), "segment k, series" and "segment k, shunt" (the whole
+    segment's impedance or admittance per metre) and "sensor NAME". Empty without two sensors.
     """
-    network.inserts.append(Insert(float(x), kind, immittance))
-    held = network.load
-    changed = network.readings()
-    network.inserts.pop()
-    network.load = held
-    moved = posterior.whitened(np.stack([prediction, changed]))[0]
-    return (moved[1] - moved[0]) / PROBE * STRENGTH
+    scan = _Scan.about(fit, observations)
+    if scan is None:
+        return {}
+    gains = {"source": scan.gain(scan.prediction * STRENGTH)}
+    for k in range(len(fit.twin.rig.line)):
+        for kind in ("series", "shunt"):
+            gains[f"segment {k + 1}, {kind}"] = scan.gain(scan.along(kind, k))
+    gains["load"] = scan.gain(scan.at("shunt", scan.network.length))
+    for k, sensor in enumerate(fit.twin.rig.sensors):
+        row = np.zeros_like(scan.prediction)
+        row[k] = STRENGTH * scan.prediction[k]
+        gains[f"sensor {sensor.name}"] = scan.gain(row)
+    return gains
 
 
-def _gain(residual: np.ndarray, jacobian: np.ndarray, columns: np.ndarray) -> float:
-    """Log Bayes factor of free corrections, the line's parameters being refitted to first order.
+@dataclass(frozen=True)
+class Located:
+    """Where a mismatch sits before anything is named.
+
+    element    "source", "load", "sensor NAME", "segment k" (all of it) or "position"
+    position   interval (m from the pump)
+    kind       "shunt", "series", or "" for source and sensors
+    gains      of every element, and of the best "position"
+    """
+
+    element: str
+    position: tuple[float, float]
+    kind: str
+    gains: dict[str, float]
+
+
+def locate(fit: Fit, observations: Sequence) -> Located | None:
+    """The element whose free correction adds most evidence to a fit; None without two sensors.
+
+    One place is preferred to the whole segment about it unless that is clearly better.
+    """
+    gains, scan = elements(fit, observations), profile(fit, observations)
+    if scan is None:
+        return None
+    kind, low, high = scan.interval()
+    drop = 3.0 * max(scan.left, 1.0)
+    gains["position"] = float(np.max(scan.gain[kind]))
+    best = max(gains, key=gains.get)
+    rig = fit.twin.rig
+    if gains["position"] > gains[best] - drop:
+        return Located("position", (max(low, 0.0), min(high, float(rig.length))), kind, gains)
+    element, _, kind = best.partition(", ")
+    return Located(element, extent(rig, element), kind, gains)
+
+
+def extent(rig, element: str) -> tuple[float, float]:
+    """Interval along the line (m) of an element of the rig; all of it where it has no place."""
+    if element.startswith("segment"):
+        ends = np.cumsum([0.0, *(s.length for s in rig.line)])
+        k = int(element.split()[1])
+        return float(ends[k - 1]), float(ends[k])
+    if element.startswith("sensor"):
+        (x,) = [s.position for s in rig.sensors if f"sensor {s.name}" == element]
+        return float(x), float(x)
+    total = float(rig.length)
+    return {"source": (0.0, 0.0), "load": (total, total)}.get(element, (0.0, total))
+
+
+class _Scan:
+    """A fit's whitened residual and Jacobian, against which corrections are held.
+
+    A correction is the change (S, F) of the prediction that it makes at STRENGTH: it acts on its
+    own frequency alone, so one column a frequency is all there is.
+    """
+
+    @classmethod
+    def about(cls, fit: Fit, observations: Sequence) -> _Scan | None:
+        if len(fit.twin.rig.sensors) < 2 or any(o.kind == "input_impedance" for o in observations):
+            return None
+        return cls(fit, observations)
+
+    def __init__(self, fit: Fit, observations: Sequence):
+        self.posterior = posterior_of(fit, observations, FLOOR)
+        theta = fit.twin.theta
+        self.prediction = self.posterior.predict(theta)
+        r, jacobian = self.posterior.linearise(theta, self.prediction)
+        self.residual = r[: 2 * self.prediction.size]
+        self.jacobian = jacobian[: 2 * self.prediction.size]
+        self.network = self.posterior.forward.network(theta)
+
+    def at(self, kind: str, x: float) -> np.ndarray:
+        """Of a "shunt" or a "series" element at x (m)."""
+        unit = np.sqrt(self.network.shunt[0] / self.network.series[0])
+        unit = unit if kind == "shunt" else 1.0 / unit
+        inserts = [*self.network.inserts, Insert(float(x), kind, PROBE * unit)]
+        return self._change(replace(self.network, inserts=inserts))
+
+    def along(self, kind: str, segment: int) -> np.ndarray:
+        """Of a segment's "series" impedance or "shunt" admittance per metre."""
+        changed = getattr(self.network, kind).copy()
+        changed[segment] *= 1.0 + PROBE
+        return self._change(replace(self.network, **{kind: changed}))
+
+    def _change(self, network) -> np.ndarray:
+        return (network.readings() - self.network.readings()) / PROBE * STRENGTH
+
+    def gain(self, change: np.ndarray) -> float:
+        """Log evidence that a free multiple of `change` at each frequency adds."""
+        return self.weigh(change)[0]
+
+    def weigh(self, change: np.ndarray) -> tuple[float, float]:
+        """`gain`, and the mean square left of the whitened residual."""
+        columns = whitened_columns(
+            self.posterior, self.prediction, self.prediction + PROBE * change
+        )
+        return _gain(self.residual, self.jacobian, columns / PROBE)
+
+
+def compared(search) -> list[Fit]:
+    """The fits worth a second look without the source: base, best and the best single effects."""
+    fits = [search.base, search.best, *search.singles[:COMPARED], *search.others[:1]]
+    return list({_label(f): f for f in fits}.values())
+
+
+def blind(pool, search) -> list[Fit]:
+    """`compared` fits again with a likelihood that is blind to the source, each from where it was.
+
+    Effects at the pump vanish there, effects in the line do not. Empty where no source is known.
+    """
+    if not any(o.source == "nominal" for o in pool.observations):
+        return []
+    return pool.fit(
+        [
+            {"hypothesis": f.hypothesis, "theta": f.twin.theta, "source_free": True}
+            for f in compared(search)
+        ]
+    )
+
+
+def side_by_side(search, blind_fits: Sequence[Fit]) -> list[dict]:
+    """Log evidence over the base with the source's ripple known as stated, and blind to it."""
+    informed = {_label(f): f.evidence for f in compared(search)}
+    unseen = {_label(f): f.evidence for f in blind_fits}
+    return [
+        {
+            "effects": label,
+            "informed": float(informed[label] - informed[""]),
+            "source_free": float(unseen[label] - unseen[""]),
+        }
+        for label in informed
+        if label and label in unseen
+    ]
+
+
+def _label(fit: Fit) -> str:
+    return " + ".join(f"{effect.name}, {place}" for effect, place in fit.hypothesis)
+
+
+def _gain(residual: np.ndarray, jacobian: np.ndarray, columns: np.ndarray) -> tuple[float, float]:
+    """Log Bayes factor of free corrections and the mean square left, the line's parameters being
+    refitted to first order.
 
     Each frequency's correction has one complex column c (S,): marginalised, it turns the unit
     covariance of that frequency into I + c c^H. The parameters are then refitted in the weight of
@@ -100,16 +246,17 @@ def _gain(residual: np.ndarray, jacobian: np.ndarray, columns: np.ndarray) -> fl
     flat = jac.reshape(len(jac), -1)
     before = _refitted(z.ravel(), flat, z.ravel(), flat)
     after = _refitted(z.ravel(), flat, weigh(z).ravel(), weigh(jac).reshape(len(jac), -1))
-    return before - after - float(np.sum(np.log1p(size)))
+    left = after[0] / max(z.size - size.size, 1)
+    return sum(before) - sum(after) - float(np.sum(np.log1p(size))), left
 
 
-def _refitted(z, jac, weighted_z, weighted_jac) -> float:
-    """Least sum of squares (plus half the log determinant) over the parameters with unit priors."""
+def _refitted(z, jac, weighted_z, weighted_jac) -> tuple[float, float]:
+    """Least sum of squares over the parameters with unit priors, and half the log determinant."""
     hessian = 2.0 * (np.conj(jac) @ weighted_jac.T).real + np.eye(len(jac))
     gradient = 2.0 * (np.conj(jac) @ weighted_z).real
     square = float(np.sum(np.conj(z) * weighted_z).real)
     reduced = square - 0.5 * float(gradient @ np.linalg.solve(hessian, gradient))
-    return reduced + 0.5 * float(np.linalg.slogdet(hessian)[1])
+    return reduced, 0.5 * float(np.linalg.slogdet(hessian)[1])
 
 
 def _complex(x: np.ndarray, shape: tuple) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 from rippletwin.case import Case
 from rippletwin.effects import candidates
 from rippletwin.errors import InputError
-from rippletwin.explain import detect
+from rippletwin.explain import detect, locate
 from rippletwin.explain.fit import Fit, prepare
 from rippletwin.explain.judge import ADEQUATE, Judgement, judge
 from rippletwin.explain.search import GOOD, Search, Workers, extended, search, workers
@@ -27,7 +27,8 @@ class Explanation:
     """All that was found; `rippletwin.explain.verdict` writes it down.
 
     observations are as fitted; single holds the base fitted to each of them alone, shaft what the
-    shaft orders say that are no multiples of the pistons' number.
+    shaft orders say that are no multiples of the pistons' number, blind the fits that know nothing
+    of the source (`rippletwin.explain.locate.compared`).
     """
 
     rig: object
@@ -38,6 +39,7 @@ class Explanation:
     validation: Validation
     single: tuple[Fit, ...]
     shaft: ShaftLines | None = None
+    blind: tuple[Fit, ...] = ()
 
     @property
     def twin(self) -> Twin:
@@ -96,10 +98,13 @@ def explain_observations(
         )
         explanation = found.others[0] if _prefers_other(found) else found.best
         held = late if len(data) == 1 and late else None
+        blind = locate.blind(pool, found)
         validation = validate(pool, found.base, explanation, held)
     judgement = judge(found, alarms, validation if explanation.hypothesis else None)
     lines = shaft_lines(judgement.accepted.twin, observations, HIGHEST_HZ)
-    return Explanation(rig, tuple(data), alarms, found, judgement, validation, tuple(single), lines)
+    return Explanation(
+        rig, tuple(data), alarms, found, judgement, validation, tuple(single), lines, tuple(blind)
+    )
 
 
 def _others(pool: Workers, found: Search) -> list[Fit]:

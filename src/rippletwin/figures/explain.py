@@ -1,64 +1,90 @@
-"""Pictures of an explanation: ripple, residuals, profile along the line, evidence, immittance."""
+"""Pictures of an explanation: ripple, residuals, evidence, profile along the line, immittance."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from rippletwin.explain.describe import missing_admittance, named_admittance
+from rippletwin.explain.describe import missing, posterior_of
 from rippletwin.explain.detect import residual_map
-from rippletwin.explain.locate import profile
-from rippletwin.explain.posterior import Posterior
+from rippletwin.explain.judge import intervals
+from rippletwin.explain.locate import elements, profile, side_by_side
 from rippletwin.explain.search import ACCEPT
 from rippletwin.figures import style
 
+POINTS = 4  # operating points or effects shown side by side at most
 SAMPLES = 720
 
 
-def draw(explanation, folder: str | Path, suffix: str = ".png") -> list[Path]:
-    """Write every figure that applies into `folder`/figures; returns their paths."""
+def draw(explanation, folder: str | Path, suffixes: Sequence[str] = (".png", ".svg")) -> list[Path]:
+    """Write every figure that applies into `folder`/figures, once a suffix; returns the paths."""
     folder = Path(folder) / "figures"
     paths = []
     for name, make in FIGURES.items():
         figure = make(explanation)
         if figure is not None:
-            paths.append(folder / f"explain_{name}{suffix}")
-            style.save(figure, paths[-1])
+            new = [folder / f"explain_{name}{suffix}" for suffix in suffixes]
+            style.save(figure, *new)
+            paths += new
     return paths
 
 
 def overlay(e) -> Figure | None:
-    """Ripple of the first periodic recording at each sensor: measured, calibrated, corrected."""
-    periodic = [k for k, o in enumerate(e.observations) if o.orders is not None]
-    if not periodic:
-        return None
-    k = periodic[0]
-    o = e.observations[k]
-    orders = np.asarray(o.orders, float)
-    pitch = 2 * np.pi / np.gcd.reduce(np.asarray(o.orders, int))
-    angle = pitch * np.arange(SAMPLES) / SAMPLES
-    waves = np.exp(1j * np.outer(orders, angle))
-    curves = {"measured": o.values}
+    """Ripple at each sensor (rows) and operating point (columns): measured, calibrated, corrected.
+
+    Of observations that are no periodic ripple the amplitude against frequency.
+    """
+    shown = range(min(len(e.observations), POINTS))
     fits = {"calibrated": e.search.base, "corrected": e.judgement.accepted}
+    curves = {"measured": []}
     for name, fit in fits.items():
-        posterior = Posterior(fit.twin, e.observations)
-        curves[name] = posterior.predict(fit.twin.theta)[:, posterior.forward.slices[k]]
+        posterior = posterior_of(fit, e.observations)
+        h = posterior.best_source(posterior.predict(fit.twin.theta))
+        curves[name] = [h[:, part] for part in posterior.forward.slices]
+        curves["measured"] = [posterior.values[:, part] for part in posterior.forward.slices]
     looks = {
         "measured": dict(color=style.MEASURED, lw=1.8),
         "calibrated": dict(color=style.CALIBRATED, lw=1.0),
         "corrected": dict(color=style.CORRECTED, lw=1.0, ls="-."),
     }
-    fig, axes = style.figure(len(o.values), 1, height=1.7, sharex=True)
-    for s, ax in enumerate(axes[:, 0]):
-        for name, values in curves.items():
-            ax.plot(np.rad2deg(angle), (values[s] @ waves).real / 1e6, label=name, **looks[name])
-        ax.set_ylabel(f"{e.rig.sensors[s].name} / MPa")
-    axes[-1, 0].set_xlabel("shaft angle within a piston's pitch / degrees")
+    rows = max(len(curves["measured"][k]) for k in shown)
+    fig, axes = style.figure(rows, len(shown), height=1.5, sharex="col", sharey="row")
+    for k in shown:
+        o = e.observations[k]
+        axes[0, k].set_title(o.label, loc="left")
+        for s in range(len(curves["measured"][k])):
+            ax = axes[s, k]
+            for name, values in curves.items():
+                x, y = _trace(o, values[k][s])
+                ax.plot(x, y, label=name, **looks[name])
+            if o.orders is None:
+                ax.set_yscale("log")
+        axes[-1, k].set_xlabel("frequency / Hz" if o.orders is None else "shaft angle / degrees")
+    first = e.observations[0]
+    for s in range(rows):
+        if first.kind == "input_impedance":
+            axes[s, 0].set_ylabel("|reflection|")
+        elif first.orders is None:
+            axes[s, 0].set_ylabel(f"|{e.rig.sensors[s].name}| / Pa")
+        else:
+            axes[s, 0].set_ylabel(f"{e.rig.sensors[s].name} / MPa")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     fig.legend(handles, labels, loc="outside upper right", ncols=3)
     return fig
+
+
+def _trace(o, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """x and y of one sensor: ripple in MPa over a piston's pitch, or amplitude over frequency."""
+    if o.orders is None:
+        return o.frequency_hz, np.abs(values)
+    orders = np.asarray(o.orders, float)
+    pitch = 2 * np.pi / np.gcd.reduce(np.asarray(o.orders, int))
+    angle = pitch * np.arange(SAMPLES) / SAMPLES
+    return np.rad2deg(angle), (values @ np.exp(1j * np.outer(orders, angle))).real / 1e6
 
 
 def residuals(e) -> Figure:
@@ -89,67 +115,111 @@ def residuals(e) -> Figure:
 
 
 def evidence(e) -> Figure:
-    """Log evidence that each single effect adds to the base, with the threshold."""
-    shown = e.search.singles[:15]
-    gains = [e.search.gain(f) for f in shown]
-    labels = [f"{f.names[0]}, {f.hypothesis[0][1]}" for f in shown]
-    if len(e.search.best.hypothesis) > 1:
-        labels.insert(0, " + ".join(e.search.best.names))
-        gains.insert(0, e.search.gain(e.search.best))
-    if e.search.others:
-        labels.insert(0, "without a name")
-        gains.insert(0, e.search.gain(e.search.others[0]))
-    fig, axes = style.figure(1, 1, height=0.8 + 0.2 * len(gains))
+    """Log evidence that each explanation adds to the base, with the threshold; beside it what
+    survives in a fit that is blind to the source."""
+    search = e.search
+    shown = {_label(f): f for f in reversed(search.singles[:12])}
+    if len(search.best.hypothesis) > 1:
+        shown[_label(search.best)] = search.best
+    if search.others:
+        shown["no name: " + _label(search.others[0])] = search.others[0]
+    gains = [search.gain(f) for f in shown.values()]
+    places = np.arange(len(shown))
+    fig, axes = style.figure(1, 1, height=0.9 + 0.24 * len(shown))
     ax = axes[0, 0]
-    places = np.arange(len(gains))[::-1]
     colours = [style.CORRECTED if g > ACCEPT else style.NEUTRAL for g in gains]
-    ax.barh(places, gains, color=colours)
-    ax.axvline(ACCEPT, color=style.ALARM, ls="--", lw=1, label="threshold")
+    ax.barh(places, gains, color=colours, height=0.6, label="source as stated")
+    unseen = {row["effects"]: row["source_free"] for row in side_by_side(search, e.blind)}
+    points = [(k, unseen[_label(f)]) for k, f in enumerate(shown.values()) if _label(f) in unseen]
+    if points:
+        k, g = np.array(points).T
+        ax.plot(g, k, "D", ms=5, color=style.MEASURED, mfc="white", label="blind to the source")
+    ax.axvline(ACCEPT, color=style.ALARM, ls="--", lw=1, label=f"threshold {ACCEPT:g}")
+    ax.axvline(0.0, color=style.MEASURED, lw=0.6)
     ax.set_xscale("symlog", linthresh=10)
-    ax.set_yticks(places, labels)
+    ticks = [t for t in (-1000, -100, -10, 0, 10, 100, 1000, 10000) if _within(t, gains, unseen)]
+    ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
+    ax.minorticks_off()
+    ax.set_yticks(places, list(shown))
     ax.set_xlabel("log evidence over the calibrated line")
-    ax.legend(loc="lower right")
+    fig.legend(loc="outside upper right", ncols=3)
     return fig
 
 
 def along(e) -> Figure | None:
-    """Log likelihood gained by one free correction at each place of the line."""
-    found = profile(e.search.base, e.observations)
-    if found is None:
+    """Log evidence gained by one free correction at each place of the line, and of each element."""
+    scan = profile(e.search.base, e.observations)
+    if scan is None:
         return None
-    fig, axes = style.figure(1, 1, height=2.4)
+    gains = elements(e.search.base, e.observations)
+    fig, axes = style.figure(1, 2, height=2.8, sharey=True, width_ratios=(2.2, 1))
     ax = axes[0, 0]
-    for kind, ls in (("shunt", "-"), ("series", "--")):
-        ax.plot(found.position, found.gain[kind], ls=ls, label=f"free {kind}")
+    for kind, ls, colour in (("shunt", "-", style.CALIBRATED), ("series", "--", style.NOMINAL)):
+        ax.plot(scan.position, scan.gain[kind], ls=ls, color=colour, label=f"free {kind} there")
+    edges = np.cumsum([0.0, *(s.length for s in e.rig.line)])
+    for k, (a, b) in enumerate(pairwise(edges)):
+        ax.axvspan(a, b, color=style.NEUTRAL, alpha=0.22 if k % 2 else 0.08, lw=0)
+        ax.text(0.5 * (a + b), 0.02, f"{k + 1}", transform=ax.get_xaxis_transform(), ha="center")
     for sensor in e.rig.sensors:
-        ax.axvline(sensor.position, color=style.NEUTRAL, lw=0.8, ls=":")
-        ax.text(sensor.position, ax.get_ylim()[1], sensor.name, ha="center", va="bottom")
-    for end in np.cumsum([s.length for s in e.rig.line])[:-1]:
-        ax.axvline(end, color=style.NEUTRAL, lw=0.4)
-    ax.set_xlabel("distance from the pump / m")
+        ax.axvline(sensor.position, color=style.MEASURED, lw=0.8, ls=":")
+        ax.text(
+            sensor.position, 1.0, sensor.name, transform=ax.get_xaxis_transform(), ha="center",
+            va="bottom",
+        )  # fmt: skip
+    for entry in intervals(e.judgement.accepted):
+        if "position" in entry["parameters"]:
+            low, high = entry["parameters"]["position"]["ci95"]
+            ax.axvspan(low, high, color=style.CORRECTED, alpha=0.35, lw=0, label="fitted place")
+    ax.set_xlim(edges[0], edges[-1])
+    ax.set_xlabel("distance from the pump / m; numbers: segments")
     ax.set_ylabel("log evidence gained")
     ax.legend()
+    ax = axes[0, 1]
+    names = list(gains)
+    ax.plot(list(gains.values()), "o", color=style.CORRECTED)
+    ax.vlines(range(len(names)), 0, list(gains.values()), color=style.CORRECTED, lw=1)
+    ax.set_xticks(range(len(names)), names, rotation=90)
+    ax.set_title("one element free", loc="left")
     return fig
 
 
 def immittance(e) -> Figure | None:
-    """Missing admittance against frequency, with the named law through it."""
-    named = named_admittance(e.judgement.accepted, e.observations)
-    if named is None:
+    """What the line lacks against frequency, one column an effect, with its law through it."""
+    fit = e.judgement.accepted
+    found = [missing(fit, e.observations, k) for k in range(len(fit.hypothesis))][:POINTS]
+    found = [(name, m) for name, m in zip(fit.names, found) if m is not None]
+    if not found:
         return None
-    position, frequency, law = named
-    points = missing_admittance(e.judgement.accepted, e.observations, position)
-    fig, axes = style.figure(2, 1, height=1.7, sharex=True)
-    order = np.argsort(frequency)
-    for ax, part, title in zip(axes[:, 0], (np.real, np.imag), ("real", "imaginary")):
-        ax.plot(frequency[order], part(points)[order], "o", ms=3, color=style.MEASURED)
-        ax.plot(frequency[order], part(law)[order], color=style.CORRECTED)
-        ax.set_ylabel(f"{title} part / m3/(Pa s)")
-        spread = 3 * np.max(np.abs(law)) or 1.0
-        ax.set_ylim(-spread, spread)
-    axes[-1, 0].set_xlabel("frequency / Hz")
-    axes[0, 0].set_title(f"missing admittance at {position:.2f} m", loc="left")
+    fig, axes = style.figure(2, len(found), height=1.8, sharex="col")
+    for column, (name, m) in zip(axes.T, found):
+        order = np.argsort(m.frequency_hz)
+        f, law = m.frequency_hz[order], m.law[order]
+        known = m.sd[order] < 0.5 * np.max(np.abs(law))
+        for ax, part, title in zip(column, (np.real, np.imag), ("real", "imaginary")):
+            y, sd = part(m.points[order]), m.sd[order] / np.sqrt(2)
+            ax.errorbar(
+                f[known], y[known], sd[known], fmt="o", ms=2.5, lw=0.6, color=style.MEASURED,
+                label="asked for by the data",
+            )  # fmt: skip
+            ax.plot(f, part(law), color=style.CORRECTED, label=name.replace("_", " "))
+            ax.axhline(0.0, color=style.NEUTRAL, lw=0.5)
+            low, high = np.min(part(law)), np.max(part(law))
+            room = max(high - low, 0.3 * np.max(np.abs(law)))
+            ax.set_ylim(low - 0.6 * room, high + 0.6 * room)
+            ax.set_ylabel(f"{title} part / {m.unit}")
+        column[0].set_title(f"{m.quantity},\n{m.where}", loc="left")
+        column[0].legend()
+        column[-1].set_xlabel("frequency / Hz")
     return fig
+
+
+def _label(fit) -> str:
+    return " + ".join(f"{effect.name}, {place}" for effect, place in fit.hypothesis)
+
+
+def _within(tick: float, gains, unseen) -> bool:
+    every = [0.0, ACCEPT, *gains, *unseen.values()]
+    return min(every) <= tick <= max(every)
 
 
 def _edges(x: np.ndarray) -> np.ndarray:
