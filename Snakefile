@@ -27,6 +27,7 @@ include: "workflow/rules/train.smk"
 include: "workflow/rules/evaluate.smk"
 include: "workflow/rules/compound.smk"
 include: "workflow/rules/report.smk"
+include: "workflow/rules/attention.smk"
 
 
 rule all:
@@ -35,6 +36,7 @@ rule all:
         rules.report.output,
         rules.plot_accuracy.output,
         rules.plot_calibration.output,
+        attention_targets(),
         expand(rules.plot_confusion.output, dataset=config["datasets"]),
         expand(rules.plot_seeds.output, dataset=simulated()),
         rules.report_cost.output if corrected() else [],

@@ -156,6 +156,7 @@ rule plot_attention:
 rule claims:
     input:
         table=rules.report.output.table,
+        paper=PAPER,
         rig=rig_sheet(),
         source=library("claims.py"),
     output:
@@ -164,6 +165,7 @@ rule claims:
             category="claims",
             caption="../report/claims.rst",
         ),
+        comparisons=f"{RESULTS}/claims_compared.csv",
         page=f"{RESULTS}/claims.md",
         png=report(
             f"{RESULTS}/figures/claims.png",

@@ -102,7 +102,7 @@ wildcard_constraints:
     architecture="[a-z0-9_]+",
     seed="[0-9]+",
     revolutions="1|2",
-    windows="[0-9]+|recorded",
+    windows="[0-9]+|recorded|probe",
 
 
 def signal_of(dataset):

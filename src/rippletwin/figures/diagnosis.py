@@ -9,6 +9,8 @@ from matplotlib.figure import Figure
 
 from rippletwin.figures import style
 
+ORDERS = "frequency in multiples of shaft\nand pumping frequency"
+
 
 def confusion(
     matrices: Mapping[str, np.ndarray], truth: Sequence[str], predicted: Sequence[str]
@@ -66,33 +68,43 @@ def accuracy(
 
 
 def sst(
-    images: Mapping[str, np.ndarray], frequency_hz: np.ndarray, shaft_hz: float, pistons: int
+    images: Mapping[str, np.ndarray],
+    frequency_hz: np.ndarray,
+    shaft_hz: float,
+    pistons: int,
+    columns: int = 4,
 ) -> Figure:
-    """SST images side by side: name -> (size, size), lowest frequency in the first row.
+    """SST images side by side, `columns` a row: name -> (size, size), lowest frequency in the first
+    row.
 
     frequency_hz (size,) is the (logarithmic) axis of the rows; ticks are multiples of the shaft
     and the pumping frequency. Time runs over two revolutions.
     """
-    columns = min(4, len(images))
+    columns = min(columns, len(images))
     rows = -(-len(images) // columns)
     fig, axes = style.figure(rows, columns, height=2.4, sharex=True, sharey=True)
     for ax in axes.flat[len(images) :]:
         ax.set_visible(False)
     top = max(float(np.max(image)) for image in images.values())
     low = min(float(np.min(image)) for image in images.values())
-    pumping = shaft_hz * pistons
-    ticks = [(shaft_hz, "1 shaft"), (2 * shaft_hz, "2"), (4 * shaft_hz, "4")]
-    ticks += [(k * pumping, "1 pumping" if k == 1 else str(k)) for k in (1, 2, 3, 5, 10)]
     log_axis = np.log(frequency_hz)
-    shown = [(f, text) for f, text in ticks if frequency_hz[0] <= f <= frequency_hz[-1] * 1.001]
     for ax, (name, image) in zip(axes.flat, images.items()):
         mesh = ax.imshow(
             image, origin="lower", aspect="auto", cmap=style.SEQUENTIAL, vmin=low, vmax=top,
             extent=(0, 2, log_axis[0], log_axis[-1]),
         )  # fmt: skip
         ax.set_title(name)
-        ax.set_yticks([np.log(f) for f, _ in shown], [text for _, text in shown])
+        order_ticks(ax, frequency_hz, shaft_hz, pistons)
     fig.supxlabel("revolutions", fontsize=9)
-    fig.supylabel("frequency in multiples of shaft\nand pumping frequency", fontsize=9)
+    fig.supylabel(ORDERS, fontsize=9)
     fig.colorbar(mesh, ax=axes, label="image value", shrink=0.8)
     return fig
+
+
+def order_ticks(ax, frequency_hz: np.ndarray, shaft_hz: float, pistons: int) -> None:
+    """Ticks of a y axis in log(Hz): multiples of the shaft and of the pumping frequency."""
+    pumping = shaft_hz * pistons
+    ticks = [(shaft_hz, "1 shaft"), (2 * shaft_hz, "2"), (4 * shaft_hz, "4")]
+    ticks += [(k * pumping, "1 pumping" if k == 1 else str(k)) for k in (1, 2, 3, 5, 10)]
+    shown = [(f, text) for f, text in ticks if frequency_hz[0] <= f <= frequency_hz[-1] * 1.001]
+    ax.set_yticks([np.log(f) for f, _ in shown], [text for _, text in shown])

@@ -1,0 +1,180 @@
+"""Where networks look: Grad-CAM behind ripples and images; what alignment says of accuracy.
+
+Heat is attention over its mean, one where it is spread evenly, so that networks compare. A figure
+has a column a network and a row a state; what the fault changes is marked by a bar at the edge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib import patheffects
+from matplotlib.figure import Figure
+
+from rippletwin.figures import style
+from rippletwin.figures.diagnosis import ORDERS, order_ticks
+
+_BAR = dict(color=style.ALARM, lw=3, solid_capstyle="butt")
+_SEEN = [patheffects.withStroke(linewidth=2.2, foreground="black")]  # a line seen on any heat
+
+
+def windows(
+    networks: Sequence[str],
+    states: Sequence[str],
+    ripple: np.ndarray,
+    heat: np.ndarray,
+    titles: Sequence[Sequence[str]],
+    label: str,
+    region: np.ndarray | None = None,
+) -> Figure:
+    """Ripples over one revolution, heat behind them.
+
+    ripple (states, M) in the unit of ``label``; heat (networks, states, M), NaN without attention;
+    titles [network][state]; region (states, M) booleans: crank angles that the fault changes.
+    """
+    fig, axes = _panels(networks, states, height=1.25)
+    angle = np.arange(ripple.shape[-1]) * 360 / ripple.shape[-1]
+    reach = 1.25 * np.abs(ripple).max()
+    for ax, network, row in _each(axes):
+        mesh = ax.imshow(
+            heat[network, row][None], extent=(0, 360, -reach, reach), aspect="auto",
+            cmap=_colours(), **_limits(heat),
+        )  # fmt: skip
+        ax.plot(angle, ripple[row], color="white", lw=0.9, path_effects=_SEEN)
+        if region is not None and region[row].any():
+            ax.plot(angle, np.where(region[row], -reach, np.nan), **_BAR, clip_on=False)
+        ax.set_title(titles[network][row], fontsize=7)
+        ax.set(xlim=(0, 360), ylim=(-reach, reach), xticks=(0, 120, 240, 360))
+    fig.supxlabel("crank angle / degrees", fontsize=9)
+    fig.supylabel(label, fontsize=9)
+    _key(fig, axes, mesh)
+    return fig
+
+
+def images(
+    networks: Sequence[str],
+    states: Sequence[str],
+    pictures: np.ndarray,
+    heat: np.ndarray,
+    titles: Sequence[Sequence[str]],
+    frequency_hz: np.ndarray,
+    shaft_hz: float,
+    pistons: int,
+    region: np.ndarray | None = None,
+) -> Figure:
+    """SST images over two revolutions as white contours, heat behind them.
+
+    pictures (states, size, size), lowest frequency first; heat (networks, states, size, size), NaN
+    without attention; frequency_hz (size,) of the rows; region (states, size) booleans: rows that
+    the fault changes. Titles as in ``windows``.
+    """
+    fig, axes = _panels(networks, states, height=1.7)
+    rows = np.log(frequency_hz)
+    times = (np.arange(pictures.shape[-1]) + 0.5) * 2 / pictures.shape[-1]
+    low, high = pictures.min(), pictures.max()
+    for ax, network, row in _each(axes):
+        mesh = ax.imshow(
+            heat[network, row], origin="lower", extent=(0, 2, rows[0], rows[-1]), aspect="auto",
+            cmap=_colours(), **_limits(heat),
+        )  # fmt: skip
+        levels = low + (high - low) * np.array([0.08, 0.25, 0.6])
+        ax.contour(times, rows, pictures[row], levels, colors="white", linewidths=(0.4, 0.7, 1.0))
+        if region is not None:
+            ax.plot(np.full(len(rows), 0), np.where(region[row], rows, np.nan), **_BAR)
+        ax.set_title(titles[network][row], fontsize=7)
+        order_ticks(ax, frequency_hz, shaft_hz, pistons)
+        ax.tick_params(labelsize=6)
+        ax.set(xlim=(0, 2), ylim=(rows[0], rows[-1]), xticks=(0, 1, 2))
+    fig.supxlabel("revolutions", fontsize=9)
+    fig.supylabel(ORDERS, fontsize=9)
+    _key(fig, axes, mesh)
+    return fig
+
+
+def ranks(groups: Mapping[str, tuple[Sequence[str], np.ndarray, np.ndarray, np.ndarray]]) -> Figure:
+    """Accuracy against alignment, a panel a dataset, a point a network.
+
+    groups : dataset -> names, whether each judges images (A,), alignment (A, 2) and accuracy
+    (A, 2) in per cent, mean and standard deviation over seeds.
+    """
+    columns = min(3, len(groups))
+    fig, axes = style.figure(-(-len(groups) // columns), columns, height=2.7, sharey=True)
+    for ax in axes.flat[len(groups) :]:
+        ax.set_visible(False)
+    kind = {name: square for group in groups.values() for name, square in zip(*group[:2])}
+    colours = {
+        name: style.CYCLE[[n for n in kind if kind[n] == kind[name]].index(name)] for name in kind
+    }
+    for ax, (dataset, (labels, image, aligned, accuracy)) in zip(axes.flat, groups.items()):
+        for name, square, x, y in zip(labels, image, aligned, accuracy):
+            ax.errorbar(
+                x[0], y[0], xerr=x[1], yerr=y[1], fmt="s" if square else "o", ms=5, elinewidth=0.6,
+                color=colours[name], label=name, mfc="white" if square else None,
+            )  # fmt: skip
+        ax.axvline(1, color=style.NEUTRAL, lw=0.8, ls=":")
+        ax.set(title=dataset, ylim=(-3, 103))
+    fig.supxlabel("alignment of attention with the simulated fault (1: chance)", fontsize=9)
+    fig.supylabel("accuracy on recordings / %", fontsize=9)
+    handles = {}
+    for ax in axes.flat:
+        handles |= {label: handle for handle, label in zip(*ax.get_legend_handles_labels())}
+    fig.legend(handles.values(), handles, loc="outside lower center", ncols=4, fontsize=7)
+    return fig
+
+
+def claims(groups: Mapping[str, tuple[Sequence[str], np.ndarray]]) -> Figure:
+    """Differences that claims predict to be positive: claim -> labels, (n, 3) difference, ends of
+    its 95 % interval (NaN where unknown), per cent of the windows."""
+    counts = [len(labels) for labels, _ in groups.values()]
+    fig = Figure(figsize=(style.COLUMN, 1.2 + 0.17 * sum(counts) + 0.35 * len(counts)))
+    axes = fig.subplots(len(groups), 1, squeeze=False, sharex=True, height_ratios=counts)[:, 0]
+    for ax, (claim, (labels, values)) in zip(axes, groups.items()):
+        rows = np.arange(len(labels))
+        supports, opposes = values[:, 1] > 0, values[:, 2] < 0
+        for mask, colour, marker, name in (
+            (supports, style.CALIBRATED, "o", "supports"),
+            (opposes, style.ALARM, "s", "opposes"),
+            (~supports & ~opposes, style.NEUTRAL, "D", "open"),
+        ):
+            ax.plot(values[mask, 0], rows[mask], marker, ms=4, color=colour, label=name)
+            ax.hlines(rows[mask], values[mask, 1], values[mask, 2], color=colour, lw=1.2)
+        ax.axvline(0, color="black", lw=0.8)
+        ax.set_title(claim, loc="left")
+        ax.set_yticks(rows, labels, fontsize=6)
+        ax.set_ylim(len(rows) - 0.5, -0.5)
+    axes[-1].set_xlabel("difference of accuracy / % of the windows, 95 % interval over seeds")
+    handles, names = axes[0].get_legend_handles_labels()
+    fig.legend(handles, names, loc="outside upper right", ncols=3)
+    return fig
+
+
+def _panels(networks: Sequence[str], states: Sequence[str], height: float):
+    fig, axes = style.figure(len(states), len(networks), height=height, sharex=True, sharey=True)
+    fig.set_size_inches(max(style.COLUMN, 1.8 * len(networks) + 1.4), height * len(states) + 0.9)
+    for ax, name in zip(axes[0], networks):
+        ax.annotate(
+            name, (0.5, 1.28), xycoords="axes fraction", ha="center", va="bottom", fontsize=9
+        )
+    for ax, state in zip(axes[:, 0], states):
+        ax.set_ylabel(state, rotation=0, ha="right", va="center", fontsize=10, fontweight="bold")
+    return fig, axes
+
+
+def _each(axes: np.ndarray):
+    return ((ax, network, row) for (row, network), ax in np.ndenumerate(axes))
+
+
+def _colours():
+    return mpl.colormaps[style.SEQUENTIAL].with_extremes(bad="0.8")  # grey: no attention
+
+
+def _limits(heat: np.ndarray) -> dict[str, float]:
+    """Colour limits of all panels alike; a few peaks may lie beyond."""
+    return dict(vmin=0, vmax=max(2.0, float(np.nanpercentile(heat, 99)))) if heat.size else {}
+
+
+def _key(fig: Figure, axes: np.ndarray, mesh) -> None:
+    label = "attention over its mean (grey: none)"
+    fig.colorbar(mesh, ax=axes, label=label, extend="max", shrink=0.6, aspect=40)

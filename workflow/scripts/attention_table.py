@@ -1,0 +1,25 @@
+"""Alignment of every network beside its accuracy, and how the one ranks the other."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from job import start
+from rippletwin import store
+from rippletwin.networks import ARCHITECTURES
+from rippletwin.selection import alignment_table, markdown, rank_table
+
+tell = start(snakemake)
+shares = []
+for (dataset, architecture), path in zip(
+    snakemake.params.cells, snakemake.input.attention, strict=True
+):
+    cell = store.load(path)[["attended", "region", "blind"]].to_dataframe().reset_index()
+    domain = ARCHITECTURES[architecture].domain
+    shares.append(cell.assign(dataset=dataset, architecture=architecture, domain=domain))
+table = alignment_table(pd.concat(shares), pd.read_csv(snakemake.input.table))
+ranks = rank_table(table)
+table.to_csv(snakemake.output.table, index=False)
+ranks.to_csv(snakemake.output.ranks, index=False)
+Path(snakemake.output.page).write_text(markdown(table, ranks))
+tell(f"{len(table)} networks, {len(ranks)} rank correlations")

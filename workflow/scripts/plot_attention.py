@@ -1,0 +1,59 @@
+"""Grad-CAM of every network of a dataset: on simulated states and on recordings."""
+
+from pathlib import Path
+
+import numpy as np
+
+from job import start
+from rippletwin import store
+from rippletwin.case import load_case
+from rippletwin.figures import attention, save
+from rippletwin.imaging import SstSettings, image_axes
+from rippletwin.networks import ARCHITECTURES
+
+tell = start(snakemake)
+params, output = snakemake.params, snakemake.output
+cells = [store.load(path) for path in snakemake.input.attention]
+networks = [ARCHITECTURES[name].title for name in params.architectures]
+pistons = load_case(Path(snakemake.input.rig).parent, states=()).rig.pump["pistons"]
+first = cells[0]
+simulated, recorded = first.state.values.tolist(), first.recording.values.tolist()
+regions = np.stack(
+    [
+        first.fault_region.sel(fault=state).values
+        if state in first.fault.values
+        else np.zeros(first.fault_region.shape[1], dtype=bool)
+        for state in simulated
+    ]
+)
+called = [
+    [f"called {name}: {share:.0%}" for name, share in zip(cell.called.values, cell.called_share)]
+    for cell in cells
+]
+aligned = [
+    [""]
+    + [
+        f"{share:.0%} on the fault's {region:.0%}"
+        for share, region in zip(cell.attended[0].values, cell.region.values)
+    ]
+    for cell in cells
+]
+
+
+def draw(states, variable, titles, region=None):
+    signal = first[variable].isel(channel=0).values
+    heat = np.stack([cell[f"{variable}_heat"].values for cell in cells])
+    if snakemake.wildcards.domain == "image":
+        settings = SstSettings(**params.sst)
+        frequency_hz, _ = image_axes(settings, 2 / first.speed_hz)
+        axis = (frequency_hz, first.speed_hz, pistons)
+        return attention.images(networks, states, signal, heat, titles, *axis, region)
+    pressure = first.simulated.attrs["units"] == "Pa"
+    label = "pressure ripple / MPa" if pressure else "flow ripple / L/min"
+    scale = 1e6 if pressure else 1e-3 / 60
+    return attention.windows(networks, states, signal / scale, heat, titles, label, region)
+
+
+save(draw(simulated, "simulated", aligned, regions), output.simulated, output.simulated_svg)
+save(draw(recorded, "recorded", called), output.recorded, output.recorded_svg)
+tell(f"{len(networks)} networks")

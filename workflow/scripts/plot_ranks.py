@@ -1,0 +1,21 @@
+"""Accuracy on recordings against alignment on simulations."""
+
+import pandas as pd
+
+from job import start
+from rippletwin.figures import attention, save
+from rippletwin.networks import ARCHITECTURES
+
+tell = start(snakemake)
+table = pd.read_csv(snakemake.input.table).fillna({"accuracy_std": 0, "alignment_std": 0})
+groups = {
+    dataset: (
+        [ARCHITECTURES[name].title for name in rows.architecture],
+        (rows.domain == "image").to_numpy(),
+        rows[["alignment", "alignment_std"]].to_numpy(),
+        rows[["accuracy", "accuracy_std"]].to_numpy(),
+    )
+    for dataset, rows in table.groupby("dataset", sort=False)
+}
+save(attention.ranks(groups), snakemake.output.png, snakemake.output.svg)
+tell(f"{len(groups)} datasets")
