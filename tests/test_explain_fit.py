@@ -10,7 +10,7 @@ from rippletwin.effects import EFFECTS, Place
 from rippletwin.explain.detect import drift, interior_test, pull
 from rippletwin.explain.fit import fit_hypothesis, refine
 from rippletwin.explain.locate import profile
-from rippletwin.explain.posterior import FLOOR, Posterior
+from rippletwin.explain.posterior import FLOOR, Posterior, source_scale
 from rippletwin.explain.search import ACCEPT, Workers, scan, search
 from rippletwin.explain.validate import validate
 from rippletwin.forward import Forward
@@ -169,7 +169,8 @@ def test_log_likelihood_is_that_of_the_whole_covariance_matrix():
     kernel = (1 + np.outer(f, f) / 1e6) * np.exp(-0.5 * np.subtract.outer(f, f) ** 2 / 1e6)
     kernel *= 0.5 + 0.5 * (recording[:, None] == recording)
     source = 0.03**2 * np.eye(len(f)) + 0.1**2 * kernel
-    h = prediction.ravel()
+    scale = [source_scale(posterior.forward.source[part]) for part in posterior.forward.slices]
+    h = (prediction * np.concatenate(scale)).ravel()
     sensors = len(prediction)
     dense = np.outer(h, h.conj()) * np.kron(np.ones((sensors, sensors)), source)
     noise = np.concatenate([o.covariance[:, 0, 0].real for o in posterior.observations])

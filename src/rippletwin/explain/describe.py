@@ -55,7 +55,7 @@ def posterior_of(fit: Fit, observations: Sequence, floor: float | None = None) -
     model error, by default the fit's own.
     """
     posterior = Posterior(fit.twin, observations, None, fit.source_free)
-    posterior.estimate_errors(posterior.predict(fit.twin.theta))
+    posterior.estimate_errors(posterior.predict(fit.twin.theta), fit.twin.theta)
     posterior.source_sd = float(np.hypot(posterior.source_sd, posterior.smooth_sd))
     posterior.smooth_sd = 0.0
     posterior.floor = fit.floor if floor is None else floor

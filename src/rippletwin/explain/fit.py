@@ -225,7 +225,7 @@ def refine(
 def conclude(posterior: Posterior, hypothesis: Hypothesis, theta: np.ndarray) -> Fit:
     """The fit at a mode: evidence and covariance."""
     prediction = posterior.predict(theta)
-    posterior.estimate_errors(prediction)
+    posterior.estimate_errors(prediction, theta)
     objective = posterior.objective(theta, prediction)
     jacobian = posterior.linearise(theta, prediction)[1]
     hessian = jacobian.T @ jacobian
@@ -248,7 +248,7 @@ def conclude(posterior: Posterior, hypothesis: Hypothesis, theta: np.ndarray) ->
 def descend(posterior: Posterior, theta: np.ndarray, max_steps: int):
     """Levenberg-Marquardt: theta (P,) and minus the log posterior; sets the posterior's errors."""
     prediction = posterior.predict(theta)
-    posterior.estimate_errors(prediction)
+    posterior.estimate_errors(prediction, theta)
     value = posterior.objective(theta, prediction)
     damping = 1e-2
     for _ in range(max_steps):
@@ -270,7 +270,7 @@ def descend(posterior: Posterior, theta: np.ndarray, max_steps: int):
             break
         damping = max(damping / 8.0, 1e-9)
         theta, prediction = new, new_prediction
-        posterior.estimate_errors(prediction)
+        posterior.estimate_errors(prediction, theta)
         last, value = value, min(new_value, posterior.objective(theta, prediction))
         if last - value < CONVERGED:
             break

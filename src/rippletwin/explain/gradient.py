@@ -39,6 +39,16 @@ class DifferentiableForward(Forward):
         self._remainder = self._held_at = None
         self._hold = False
 
+    def linear_load(self, theta: np.ndarray) -> np.ndarray | None:
+        """Readings (S, F) with the orifice linear; None where it is no orifice or is so already."""
+        if self._orifice is None:
+            return None
+        held, self._orifice = self._orifice, None
+        try:
+            return self.network(theta).readings()
+        finally:
+            self._orifice = held
+
     def derivatives(self, theta: np.ndarray) -> np.ndarray:
         """d readings/d theta, (P, S, F); rows S are the rig's sensors, F all frequencies."""
         if not np.array_equal(self._held_at, theta):

@@ -3,7 +3,7 @@
 The model of the errors is noise with a covariance C, a relative model error delta common to all
 sensors, and the error of a nominal source, relative and along the prediction h, in two parts:
 
-    E[e e^H] = C + delta^2 m I + (sigma^2 I + tau^2 K) o h h^H
+    E[e e^H] = C + (delta^2 m + lambda^2 n) I + (sigma^2 I + tau^2 K) o g h (g h)^H
 
 sigma is the part that differs from harmonic to harmonic, tau the part that is smooth in frequency,
 as a wrong bulk modulus or port timing makes it. Between frequencies f and f' of recordings o and p
@@ -14,6 +14,12 @@ it grows with frequency, for an error of timing is one of phase, and half of it 
 operating points, for it is the same pump that is modelled wrongly. A smooth error is what an effect
 at the pump, friction or a hose may look like; without it their standard deviations would be several
 times too small, and an effect at the pump would be named where only the ripple is wrong.
+
+g >= 1 is the size of the nominal ripple about a harmonic over that of the harmonic itself: where
+two parts of the ripple cancel, or 40 dB below the strongest harmonic, a few per cent of the parts
+are a large part of the sum. n is the mean square over sensors of what an orifice's products of
+harmonics make of the prediction; they are wrong by lambda, several times the harmonics' own error,
+and come from the load and not along h.
 
 All is built from the prediction and not from the data (a shrinking model would fit anything else).
 Explaining adds a least delta, and the choice to be blind to the source: sigma infinite, which
@@ -38,6 +44,8 @@ SOURCE_SDS = np.array([0.003, 0.01, 0.03, 0.1])
 """sigma is one of these, the last being the largest that is put down to the ripple."""
 SMOOTH_SDS = np.array([0.01, 0.03, 0.1])  # the same for tau
 CORRELATION_HZ = 1000.0  # l and f0
+LEAST = 0.01  # of the strongest harmonic: smaller ones are uncertain by more than their own share
+PRODUCTS = 0.2  # lambda
 KEPT = 3e-3  # of the kernel's largest eigenvalue
 
 
@@ -57,7 +65,7 @@ class Posterior:
         self.forward = DifferentiableForward(twin, self.observations)
         self.source_free = source_free
         self.floor, self.source_sd, self.smooth_sd = 0.1, float(SOURCE_SDS[2]), 0.0
-        self.most = np.inf
+        self.most, self._products = np.inf, 0.0
         self.prior = np.array([not p.flat for p in twin.parameters])
         data = [comparable(o, twin.rig) for o in self.observations]
         covariance = np.concatenate([o.covariance for o in data])
@@ -77,7 +85,11 @@ class Posterior:
         self._known, self._free = np.concatenate(known), np.concatenate(free)
         nominal = ~(self._known | self._free)
         self._nominal = np.flatnonzero(nominal)
-        self._basis = smooth_basis(
+        self._scale = np.ones(len(nominal))  # g
+        for o, part in zip(data, self.forward.slices):
+            if o.source == "nominal":
+                self._scale[part] = source_scale(self.forward.source[part])
+        self._basis = self._scale[nominal] * smooth_basis(
             self.forward.frequency_hz[nominal], self.forward.recording[nominal]
         )
         self.count = 2 * (self.values.size - int(np.sum(self._free)))
@@ -109,22 +121,25 @@ class Posterior:
 
     def _metric(self, prediction: np.ndarray) -> Metric:
         """Whitening by the covariance that a prediction (S, F) implies."""
-        sd = np.sqrt(self._variances + self.floor**2 * self.power)
+        sd = np.sqrt(self._variances + self._products + self.floor**2 * self.power)
         return Metric(
             self._rotate(prediction),
             sd,
-            np.where(self._known, 0.0, np.where(self._free, np.inf, self.source_sd)),
+            np.where(self._known, 0.0, np.where(self._free, np.inf, self.source_sd * self._scale)),
             self._nominal,
             self.smooth_sd * self._basis,
         )
 
-    def estimate_errors(self, prediction: np.ndarray) -> None:
-        """Set floor and source errors to their most likely values given the residuals.
+    def estimate_errors(self, prediction: np.ndarray, theta: np.ndarray) -> None:
+        """Set floor and source errors to their most likely values given the residuals at theta.
 
         Degrees of freedom taken by the parameters are made up for by scaling the sum of squares.
         """
         taken = min(len(self.prior), 0.5 * self.count)
         scale = self.count / max(self.count - taken, 1.0)
+        linear = self.forward.linear_load(theta)
+        if linear is not None:
+            self._products = PRODUCTS**2 * np.mean(np.abs(prediction - linear) ** 2, axis=0)
         h = self._rotate(prediction)
         squares, inner = np.abs(self._rotated - h) ** 2, np.conj(h) * (self._rotated - h)
         sizes = np.abs(h) ** 2
@@ -133,11 +148,15 @@ class Posterior:
         sds = SOURCE_SDS if any_nominal else SOURCE_SDS[:1]
         taus = SMOOTH_SDS if any_nominal else np.zeros(1)
         for _ in range(2):
-            weight = 1.0 / (self._variances + floors[:, None, None] ** 2 * self.power)
+            weight = 1.0 / (
+                self._variances + self._products + floors[:, None, None] ** 2 * self.power
+            )
             square = np.sum(squares * weight, axis=1)  # (D, F)
             cross = np.sum(inner * weight, axis=1)
             size = np.maximum(np.sum(sizes * weight, axis=1), 1e-300)
-            stretch = 1.0 + np.where(self._known, 0.0, sds[:, None, None] ** 2) * size  # (G, D, F)
+            stretch = (
+                1.0 + np.where(self._known, 0.0, (self._scale * sds[:, None, None]) ** 2) * size
+            )
             along = np.where(self._free, 1.0, 1.0 - 1.0 / stretch) * np.abs(cross) ** 2 / size
             logs = np.log(np.where(self._free, size, stretch))
             cost = np.sum(scale * (square - along) + logs, axis=2)
@@ -187,7 +206,7 @@ class Posterior:
     def _source(self, prediction, metric: Metric, whitened: np.ndarray) -> np.ndarray:
         """Most likely source (F,) relative to the prediction's, given whitened residuals."""
         pull = np.sum(np.conj(self._rotate(prediction)) * metric.adjoint(whitened), axis=0)
-        error = self.source_sd**2 * pull
+        error = (self.source_sd * self._scale) ** 2 * pull
         smooth = self._basis.T @ (self._basis @ pull[self._nominal])
         error[self._nominal] += self.smooth_sd**2 * smooth
         return np.where(
@@ -263,6 +282,15 @@ def smooth_basis(frequency_hz: np.ndarray, recording: np.ndarray) -> np.ndarray:
     values, vectors = np.linalg.eigh(kernel)
     kept = values > KEPT * np.max(values, initial=0.0)
     return np.sqrt(values[kept])[:, None] * vectors[:, kept].T
+
+
+def source_scale(source: np.ndarray) -> np.ndarray:
+    """g (F,) of a ripple's harmonics (F,) in ascending order, two neighbours a side counting."""
+    power = np.abs(source) ** 2
+    kernel = np.exp(-0.5 * np.arange(-2, 3) ** 2.0)
+    about = np.convolve(power, kernel / kernel.sum())[2:-2]
+    about = np.maximum(about, power) + LEAST**2 * np.max(power)
+    return np.sqrt(about / np.maximum(power, 1e-300))
 
 
 def _real(r: np.ndarray) -> np.ndarray:
