@@ -14,7 +14,8 @@ import numpy as np
 
 from rippletwin.line.balance import balance_orifice
 from rippletwin.line.chain import Network
-from rippletwin.line.moc import End, Pipe, simulate
+from rippletwin.line.moc import simulate
+from rippletwin.line.parts import End, Line, Pipe
 from rippletwin.line.segment import series_impedance, shunt_admittance
 
 DENSITY, VISCOSITY = 870.0, 3.2e-5
@@ -71,7 +72,7 @@ def revolution(friction: str, steps: int, periods: int = 1):
     spectrum = np.zeros(steps // 2 + 1, complex)
     spectrum[orders] = network(orders).source_flow * steps / 2
     spectrum[0] = MEAN_FLOW * steps
-    return simulate(
+    line = Line(
         PIPES,
         np.fft.irfft(spectrum, steps),
         1 / SHAFT_HZ,
@@ -80,9 +81,8 @@ def revolution(friction: str, steps: int, periods: int = 1):
         viscosity=VISCOSITY,
         friction=friction,
         positions=SENSORS,
-        periods=periods,
-        tolerance=1e-4,
     )
+    return simulate(line, periods=periods, tolerance=1e-4)
 
 
 def main() -> None:

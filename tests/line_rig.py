@@ -3,7 +3,7 @@
 import numpy as np
 
 from rippletwin.line.chain import Network
-from rippletwin.line.moc import Pipe
+from rippletwin.line.parts import Pipe
 from rippletwin.line.segment import series_impedance, shunt_admittance
 
 DENSITY, VISCOSITY = 870.0, 3.2e-5
@@ -27,7 +27,7 @@ def immittances(s, pipes=PIPES, friction="unsteady", viscosity=VISCOSITY):
     ]
     shunt = [
         shunt_admittance(s, density=DENSITY, wave_speed=p.wave_speed, diameter=p.diameter)
-        * (1 + p.creep / (1 + s * p.retardation))
+        * p.yielding(s)
         for p in pipes
     ]
     return np.array(series), np.array(shunt)

@@ -1,4 +1,4 @@
-"""From the flow of a pump to the pressure at the sensors, through a calibrated line in time."""
+"""From the flow of a pump to what the sensors read, through a twin's line in time."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import resample
 
+from rippletwin.effects.base import LineState
 from rippletwin.errors import InputError
 from rippletwin.line import moc
+from rippletwin.line.parts import End, Line, Pipe, capacitance
 
 PERIODS = 200  # at most, until the line repeats itself
 
@@ -27,7 +29,7 @@ def propagate(
 
     Parameters
     ----------
-    twin : calibrated, without effects beyond its friction law.
+    twin : calibrated, with the effects it was corrected by.
     flow, healthy_flow : (M,) m3/s at the pump outlet over one revolution, of the pump to simulate
         and of the healthy one, whose mean settles the orifice that a faulty pump also meets.
     speed_hz, load_pressure : rev/s, and Pa upstream of the load when the pump is healthy.
@@ -36,42 +38,58 @@ def propagate(
 
     Returns the `Transient` with M samples a revolution. The load factor of the twin scales orifice
     and mean flow alike, so that the load pressure stays that of the recording, as in the frequency
-    domain. Raises InputError for a load given as a measured impedance, ValueError for effects.
+    domain. Raises InputError for a load given as a measured impedance.
     """
-    if twin.effects:
-        raise ValueError("effects beyond friction have to be propagated in the frequency domain")
+    line = line_in_time(twin, flow, healthy_flow, speed_hz, load_pressure, source_capacitance)
+    count = moc.steps_a_period(line.pipes, line.period, steps)
+    line.flow = resample(line.flow, count)
+    transient = moc.simulate(line, periods=PERIODS, tolerance=tolerance)
+    return replace(
+        transient,
+        pressure=resample(transient.pressure, len(flow), axis=1),
+        flow=resample(transient.flow, len(flow), axis=1),
+    )
+
+
+def line_in_time(twin, flow, healthy_flow, speed_hz, load_pressure, source_capacitance=0.0) -> Line:
+    """The twin as a `Line`, every effect in it; arguments as `propagate`'s."""
     rig = twin.calibrated_rig()
     if rig.load.kind == "impedance":
         raise InputError(
             "rig.yaml", "load.kind", "a measured impedance has no time domain", "Give an orifice"
         )
     factor = twin.values().get("load", 1.0)
-    mean = float(np.mean(healthy_flow))
-    coefficient = 0.0
+    mean = nominal = float(np.mean(healthy_flow))
+    coefficient, resistance = 0.0, None
     if rig.load.kind == "orifice":
         root = np.sqrt(load_pressure - rig.load.back_pressure)
         coefficient = rig.load.coefficient or factor * mean / root
-        mean = coefficient * root
+        mean, resistance = coefficient * root, 2.0 * root / coefficient
+        nominal = mean / factor
     pressure = rig.load.back_pressure if rig.load.kind == "orifice" else load_pressure
-    pipes = [moc.Pipe(s.length, s.diameter, s.wave_speed) for s in rig.line]
-    period = 1.0 / speed_hz
-    count = moc.steps_a_period(pipes, period, steps)
-    driven = resample(flow - np.mean(healthy_flow) + mean, count)
-    transient = moc.simulate(
-        pipes,
-        driven,
-        period,
-        moc.End(rig.load.kind, pressure, coefficient),
+    line = Line(
+        pipes=[Pipe(s.length, s.diameter, s.wave_speed) for s in rig.line],
+        flow=np.asarray(flow, dtype=float) - np.mean(healthy_flow) + mean,
+        period=1.0 / speed_hz,
+        end=End(rig.load.kind, pressure, coefficient),
         density=rig.fluid.density,
         viscosity=rig.fluid.kinematic_viscosity,
         friction=twin.friction,
         positions=[sensor.position for sensor in rig.sensors],
-        shunts=[moc.Shunt(0.0, capacitance=source_capacitance)] if source_capacitance else [],
-        periods=PERIODS,
-        tolerance=tolerance,
+        mean_flow=mean,
+        source=[capacitance(0.0, source_capacitance)] if source_capacitance else [],
     )
-    return replace(
-        transient,
-        pressure=resample(transient.pressure, len(flow), axis=1),
-        flow=resample(transient.flow, len(flow), axis=1),
+    state = LineState(
+        density=line.density,
+        viscosity=line.viscosity,
+        diameters=np.array([s.diameter for s in rig.line]),
+        wave_speeds=np.array([s.wave_speed for s in rig.line]),
+        mean_pressure=load_pressure,
+        load_resistance=resistance,
+        heat_capacity_ratio=rig.fluid.heat_capacity_ratio,
+        prandtl=rig.fluid.prandtl,
+        mean_flow=nominal,
     )
+    for effect, place, values in twin.effect_values(twin.theta):
+        effect.in_time(line, state, values, place)
+    return line

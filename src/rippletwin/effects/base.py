@@ -1,11 +1,13 @@
 """What an effect is: a piece of physics that a twin may lack, at a place it can be.
 
 An effect is one file in this folder that defines `EFFECT`, an instance of `Effect`. The registry
-finds it there; nothing else changes. In the frequency domain an effect mutates a network
-(`rippletwin.line.chain.Network`); `time_domain` says what it is for the method of characteristics.
+finds it there; nothing else changes. It says the same thing twice: `apply` mutates a network of
+the frequency domain (`rippletwin.line.chain.Network`), `in_time` a line of the time domain
+(`rippletwin.line.parts.Line`): its pipes, elements, flow or sensors.
 
-Values may be floats or arrays of shape (B, 1) for B parameter sets at once: everything here is
-elementwise, so that a network with leading batch dimension is mutated by the same lines.
+For `apply`, values may be floats or arrays of shape (B, 1) for B parameter sets at once:
+everything there is elementwise, so that a network with leading batch dimension is mutated by the
+same lines. `in_time` gets floats and a `LineState` of one operating point.
 """
 
 from __future__ import annotations
@@ -136,10 +138,10 @@ class Effect:
     medium      "liquid", "gas" or "any"
     equation    in plain text
     source      author, year and equation or section
-    time_domain its counterpart for the method of characteristics
     parameters  (rig, place) -> tuple of Parameter
     places      rig -> tuple of Place
     apply       (network, line: LineState, values: name -> value, place) mutates the network
+    in_time     (line: parts.Line, state: LineState, values, place) mutates the line
     named       False for a passive network that stands in for physics without a name
     certain     no real line is without it: where something is missing at all, it is taken in
                 unless the data speak against it
@@ -150,10 +152,10 @@ class Effect:
     medium: str
     equation: str
     source: str
-    time_domain: str
     parameters: Callable[[object, Place], tuple[Parameter, ...]]
     places: Callable[[object], tuple[Place, ...]]
     apply: Callable[[object, LineState, Mapping[str, object], Place], None]
+    in_time: Callable[[object, LineState, Mapping[str, float], Place], None]
     certain: bool = False
     named: bool = True
 
@@ -216,7 +218,10 @@ def segment_at(lengths: np.ndarray, position) -> int:
 
 
 def on_line(network, position):
-    """`position` (m), held on the line, which a fit may have made a little shorter."""
+    """`position` (m), held on the line, which a fit may have made a little shorter.
+
+    `network` is a `Network` or a `Line`.
+    """
     return np.clip(position, 0.0, network.length)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rippletwin.effects.base import Effect, Parameter, load_place, normal
+from rippletwin.line.parts import Element
 
 
 def radiation_impedance(s, diameter, wave_speed, density, end_correction):
@@ -33,6 +34,27 @@ def _apply(network, line, values, place):
     )
 
 
+def _in_time(line, state, values, place):
+    line.load.append(radiation_element(state, values["end_correction"]))
+
+
+def radiation_element(state, end_correction) -> Element:
+    """Z_r = Zc l u/(1 + u/(4 l) + (1/(16 l^2) + l^2/3) u^2), u = s R/a, l = `end_correction`.
+
+    The rational function of second order that has the first three terms of `radiation_impedance`
+    in u = 0, l u - u^2/4 - (l u)^3/3; Re Z_r = Zc (kR)^2/4 over a square: passive.
+    """
+    delay = 0.5 * state.diameters[-1] / state.wave_speeds[-1]
+    characteristic = state.density * state.wave_speeds[-1] / state.area(-1)
+    bend = 1.0 / (16.0 * end_correction**2) + end_correction**2 / 3.0
+    return Element(
+        0.0,
+        "series",
+        (characteristic * end_correction * delay, 0.0),
+        (bend * delay**2, delay / (4.0 * end_correction), 1.0),
+    )
+
+
 EFFECT = Effect(
     name="end_radiation",
     element="load",
@@ -41,9 +63,9 @@ EFFECT = Effect(
     "delta = 0.613 R unflanged, 0.822 R flanged",
     source="Levine & Schwinger 1948, Phys. Rev. 73:383; Norris & Sheng 1989, "
     "J. Sound Vib. 135:85 (flanged)",
-    time_domain="the last pipe lengthened by delta, and a first-order loss at its end",
     parameters=lambda rig, place: (Parameter("end_correction", "1", normal(0.7, 0.1)),),
     places=lambda rig: load_place(rig) if rig.load.kind == "open" else (),
     apply=_apply,
+    in_time=_in_time,
     certain=True,
 )

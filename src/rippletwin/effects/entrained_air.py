@@ -28,6 +28,17 @@ def _apply(network, line, values, place):
         network.shunt[k] = network.shunt[k] + line.area(k) * added
 
 
+def _in_time(line, state, values, place):
+    # As compressible without delay as the oil itself: a slower wave.
+    added = air_compressibility(
+        values["gas_fraction"], values["polytropic_exponent"], state.mean_pressure
+    )
+    for k, speed in enumerate(state.wave_speeds):
+        line.pipes[k] = line.pipes[k].softened(
+            added * state.density * line.pipes[k].wave_speed ** 2
+        )
+
+
 EFFECT = Effect(
     name="entrained_air",
     element="line",
@@ -35,11 +46,11 @@ EFFECT = Effect(
     equation="Y' = A s (1/(rho a^2) + alpha (p_atm/p)^(1/n)/(n p))",
     source="Wylie & Streeter 1993, Fluid Transients in Systems, sec. 1.4; "
     "Merritt 1967, Hydraulic Control Systems, eq. 2-11",
-    time_domain="wave speed of each operating point from the same compressibility",
     parameters=lambda rig, place: (
         Parameter("gas_fraction", "1", lognormal(5e-3, 1.2)),
         Parameter("polytropic_exponent", "1", normal(1.2, 0.12)),
     ),
     places=line_place,
     apply=_apply,
+    in_time=_in_time,
 )

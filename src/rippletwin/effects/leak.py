@@ -14,15 +14,23 @@ from rippletwin.effects.base import (
     uniform,
 )
 from rippletwin.line.chain import Insert
+from rippletwin.line.parts import Element
 
 ATMOSPHERE = 1.01325e5  # Pa
 REFERENCE_PRESSURE = 1e7  # Pa, at which the conductance is stated
 
 
-def _apply(network, line, values, place):
+def leak_conductance(conductance, pressure_exponent, mean_pressure):
+    """dq/dp, m3/(Pa s), at `mean_pressure` (Pa) of a leak of `conductance` at 10 MPa."""
     # Spectra may come without a mean pressure: then as at the atmosphere.
-    relative = np.maximum(line.mean_pressure, ATMOSPHERE) / REFERENCE_PRESSURE
-    conductance = values["conductance"] * relative ** (-values["pressure_exponent"])
+    relative = np.maximum(mean_pressure, ATMOSPHERE) / REFERENCE_PRESSURE
+    return conductance * relative ** (-pressure_exponent)
+
+
+def _apply(network, line, values, place):
+    conductance = leak_conductance(
+        values["conductance"], values["pressure_exponent"], line.mean_pressure
+    )
     network.inserts.append(
         Insert(on_line(network, values["position"]), "shunt", conductance + 0.0 * network.s)
     )
@@ -40,6 +48,13 @@ def _parameters(rig, place):
     )
 
 
+def _in_time(line, state, values, place):
+    conductance = leak_conductance(
+        values["conductance"], values["pressure_exponent"], state.mean_pressure
+    )
+    line.inserts.append(Element(on_line(line, values["position"]), "shunt", (conductance,)))
+
+
 EFFECT = Effect(
     name="leak",
     element="position",
@@ -47,8 +62,8 @@ EFFECT = Effect(
     equation="q1 - q2 = G p, G = dq/dp = G_10MPa (p/10 MPa)^-m; "
     "m = 0 for a laminar gap, 1/2 for an orifice",
     source="Covas, Ramos & de Almeida 2005, J. Hydraul. Eng. 131:1106, eq. 7 (orifice leak)",
-    time_domain="outflow at a node, q = C p^(1-m)",
     parameters=_parameters,
     places=position_place,
     apply=_apply,
+    in_time=_in_time,
 )

@@ -12,6 +12,7 @@ from rippletwin.effects.base import (
     segment_at,
 )
 from rippletwin.line.chain import Insert
+from rippletwin.line.parts import capacitance
 
 
 def volume_admittance(s, volume, density, wave_speed):
@@ -25,17 +26,23 @@ def _apply(network, line, values, place):
     network.inserts.append(Insert(on_line(network, values["position"]), "shunt", admittance))
 
 
+def _in_time(line, state, values, place):
+    k = segment_at([pipe.length for pipe in line.pipes], values["position"])
+    compliance = volume_admittance(1.0, values["volume"], state.density, state.wave_speeds[k])
+    line.inserts.append(capacitance(on_line(line, values["position"]), compliance))
+
+
 EFFECT = Effect(
     name="line_volume",
     element="position",
     medium="any",
     equation="q1 - q2 = s V/(rho a^2) p",
     source="Wylie & Streeter 1993, sec. 12.5 (lumped capacitance)",
-    time_domain="dp/dt = (rho a^2/V)(q1 - q2) at a node, trapezoidal",
     parameters=lambda rig, place: (
         position_parameter(rig),
         Parameter("volume", "m3", lognormal(5e-5 * (rig.line[0].diameter / 0.02) ** 3, 1.2)),
     ),
     places=position_place,
     apply=_apply,
+    in_time=_in_time,
 )

@@ -6,6 +6,7 @@ import numpy as np
 
 from rippletwin.effects.base import Effect, Parameter, Place, lognormal, normal
 from rippletwin.line.chain import Insert
+from rippletwin.line.parts import Element, inertance
 
 
 def _places(rig):
@@ -39,6 +40,16 @@ def _parameters(rig, place):
     )
 
 
+def _in_time(line, state, values, place):
+    if place.form == "inertance":
+        line.inserts.append(inertance(line.length, values["inertance"]))
+        return
+    w = 2.0 * np.pi * values["natural_frequency"]
+    gain = values["gain"] / state.load_resistance
+    spool = (gain * w**2,), (1.0, 2.0 * values["damping_ratio"] * w, w**2)
+    line.inserts.append(Element(line.length, "shunt", *spool))
+
+
 EFFECT = Effect(
     name="load_dynamics",
     element="load",
@@ -47,9 +58,8 @@ EFFECT = Effect(
     "inertance: Z_load = R + s I",
     source="Merritt 1967, Hydraulic Control Systems, sec. 8-2 (spool on its spring, linearised); "
     "Johnston & Edge 1991, Proc. IMechE 205(I):89 (inertance)",
-    time_domain="opening x of the orifice as a second-order state driven by the load pressure; "
-    "inertance: dq/dt = (p - p_orifice)/I at the last node",
     parameters=_parameters,
     places=_places,
     apply=_apply,
+    in_time=_in_time,
 )

@@ -19,6 +19,7 @@ from rippletwin.effects.base import (
     position_parameter,
 )
 from rippletwin.line.chain import Insert
+from rippletwin.line.parts import Element
 
 RESONATORS = ((500.0, "first"), (1800.0, "second"))  # prior median frequency in Hz, name
 
@@ -56,6 +57,19 @@ def _parameters(rig, place):
     return tuple(parameters)
 
 
+def _in_time(line, state, values, place):
+    characteristic = state.density * state.wave_speeds[0] / state.area(0)
+    unit = 1.0 / characteristic if place.form == "shunt" else characteristic
+    position = on_line(line, values["position"])
+    rising = unit * values["rising"] / (2.0 * np.pi * 1000.0)
+    line.inserts.append(Element(position, place.form, (rising, unit * values["flat"])))
+    for _, name in RESONATORS:
+        w = 2.0 * np.pi * values[f"{name}_frequency"]
+        band = 2.0 * values[f"{name}_damping"] * w
+        peak = unit * values[f"{name}_peak"] * band
+        line.inserts.append(Element(position, place.form, (peak, 0.0), (1.0, band, w**2)))
+
+
 EFFECT = Effect(
     name="passive_network",
     element="position",
@@ -63,10 +77,9 @@ EFFECT = Effect(
     equation="Y Zc = g + c s/(2 pi 1 kHz) + sum_k h_k 2 zeta_k w_k s/(s^2 + 2 zeta_k w_k s "
     "+ w_k^2), or Z/Zc likewise",
     source="Foster 1924, Bell Syst. Tech. J. 3:259; Brune 1931, J. Math. Phys. 10:191 (passivity)",
-    time_domain="a node with a resistance, a capacitance and two resonators, one second-order "
-    "state each",
     parameters=_parameters,
     places=lambda rig: (Place("position", form="shunt"), Place("position", form="series")),
     apply=_apply,
+    in_time=_in_time,
     named=False,
 )

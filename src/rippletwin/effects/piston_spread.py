@@ -17,17 +17,21 @@ def half_sine(orders: np.ndarray) -> np.ndarray:
     return np.where(n == 1, -0.5j * np.pi, even)
 
 
-def _apply(network, line, values, place):
+def spread(orders: np.ndarray, values) -> np.ndarray:
+    """Harmonics (F,) that unequal pistons add per unit of mean flow, at shaft `orders` >= 1."""
     count = 2 * len([name for name in values if name.startswith("cosine")]) + 1
-    turn = np.asarray(line.orders, int) % count
+    turn = np.asarray(orders, int) % count
     amplitude = np.zeros(len(turn), complex)
     for m in range(1, count // 2 + 1):
         a = complex(values[f"cosine_{m}"], values[f"sine_{m}"])
         amplitude = (
             amplitude + np.where(turn == m, a, 0.0) + np.where(turn == count - m, np.conj(a), 0.0)
         )
-    added = line.mean_flow * half_sine(line.orders) * amplitude
-    network.source_flow = network.source_flow + np.where(turn == 0, 0.0, added)
+    return np.where(turn == 0, 0.0, half_sine(orders) * amplitude)
+
+
+def _apply(network, line, values, place):
+    network.source_flow = network.source_flow + line.mean_flow * spread(line.orders, values)
 
 
 def _parameters(rig, place):
@@ -39,6 +43,13 @@ def _parameters(rig, place):
     )
 
 
+def _in_time(line, state, values, place):
+    count = len(line.flow)
+    harmonics = np.zeros(count // 2 + 1, complex)
+    harmonics[1:] = state.mean_flow * spread(np.arange(1, len(harmonics)), values)
+    line.flow = line.flow + np.fft.irfft(0.5 * count * harmonics, count)
+
+
 EFFECT = Effect(
     name="piston_spread",
     element="source",
@@ -46,8 +57,8 @@ EFFECT = Effect(
     equation="Q_n += Q_0 h_n A_(n mod z), A_m = (1/z) sum_j a_j e^(-2 pi j m/z): piston j delivers "
     "1 + a_j times the mean, h_n the harmonics of a half sine; odd z",
     source="Ivantysyn & Ivantysynova 2001, Hydrostatic Pumps and Motors, sec. 3.2 (kinematic flow)",
-    time_domain="flow ripple plus the pistons' own half sines times a_j",
     parameters=_parameters,
     places=source_place,
     apply=_apply,
+    in_time=_in_time,
 )

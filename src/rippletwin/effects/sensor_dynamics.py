@@ -7,10 +7,18 @@ import numpy as np
 from rippletwin.effects.base import Effect, Parameter, lognormal, scale_sensor, sensor_places
 
 
+def resonance(s, natural_frequency, damping_ratio):
+    """w0^2/(s^2 + 2 zeta w0 s + w0^2), `natural_frequency` in Hz."""
+    w = 2.0 * np.pi * natural_frequency
+    return w**2 / (s**2 + 2.0 * damping_ratio * w * s + w**2)
+
+
 def _apply(network, line, values, place):
-    s, w = network.s, 2.0 * np.pi * values["natural_frequency"]
-    response = w**2 / (s**2 + 2.0 * values["damping_ratio"] * w * s + w**2)
-    scale_sensor(network, place.index, response)
+    scale_sensor(network, place.index, resonance(network.s, **values))
+
+
+def _in_time(line, state, values, place):
+    line.sensors.append((place.index, lambda s: resonance(s, **values)))
 
 
 EFFECT = Effect(
@@ -19,11 +27,11 @@ EFFECT = Effect(
     medium="any",
     equation="reading = w0^2/(s^2 + 2 zeta w0 s + w0^2) p",
     source="Holman 2011, Experimental Methods for Engineers, sec. 2.7 and 6.5",
-    time_domain="second-order state driven by the pressure, integrated exactly over a step",
     parameters=lambda rig, place: (
         Parameter("natural_frequency", "Hz", lognormal(5000.0, 0.7), (-1.0, 0.5)),
         Parameter("damping_ratio", "1", lognormal(0.2, 0.9)),
     ),
     places=sensor_places,
     apply=_apply,
+    in_time=_in_time,
 )

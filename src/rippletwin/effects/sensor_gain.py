@@ -9,14 +9,18 @@ def _apply(network, line, values, place):
     scale_sensor(network, place.index, 1.0 + values["gain_error"] + 0.0 * network.s)
 
 
+def _in_time(line, state, values, place):
+    line.sensors.append((place.index, lambda s: 1.0 + values["gain_error"] + 0.0 * s))
+
+
 EFFECT = Effect(
     name="sensor_gain",
     element="sensor",
     medium="any",
     equation="reading = (1 + g) p",
     source="JCGM 106:2012, sec. 5 (sensitivity error)",
-    time_domain="reading times (1 + g)",
     parameters=lambda rig, place: (Parameter("gain_error", "1", normal(0.0, 0.15)),),
     places=sensor_places,
     apply=_apply,
+    in_time=_in_time,
 )

@@ -14,6 +14,7 @@ from rippletwin.effects.base import (
     segment_at,
 )
 from rippletwin.line.chain import Insert
+from rippletwin.line.parts import Branch, Pipe
 
 
 def branch_admittance(s, length, diameter, wave_speed, density, viscosity):
@@ -41,13 +42,19 @@ def _apply(network, line, values, place):
     network.inserts.append(Insert(on_line(network, values["position"]), "shunt", admittance))
 
 
+def _in_time(line, state, values, place):
+    # A pipe of its own at a junction, its far end closed.
+    k = segment_at([pipe.length for pipe in line.pipes], values["position"])
+    pipe = Pipe(values["length"], values["diameter"], state.wave_speeds[k])
+    line.inserts.append(Branch(on_line(line, values["position"]), pipe))
+
+
 EFFECT = Effect(
     name="side_branch",
     element="position",
     medium="any",
     equation="q1 - q2 = Y p, Y = A_b/(rho a sqrt(1 + 2/r)) tanh(s l_b sqrt(1 + 2/r)/a)",
     source="Wylie & Streeter 1993, sec. 12.5 (branch); Zielke 1968 (loss, first order in 1/r)",
-    time_domain="one more pipe at a junction, its far end closed",
     parameters=lambda rig, place: (
         position_parameter(rig),
         Parameter("length", "m", lognormal(0.4, 0.8), (-1.2, 0.0, 1.2)),
@@ -55,4 +62,5 @@ EFFECT = Effect(
     ),
     places=position_place,
     apply=_apply,
+    in_time=_in_time,
 )

@@ -7,6 +7,7 @@ import numpy as np
 from rippletwin.effects.base import Effect, Parameter, Place, lognormal
 from rippletwin.effects.line_volume import volume_admittance
 from rippletwin.line.chain import Insert
+from rippletwin.line.parts import Element, inertance
 
 
 def _places(rig):
@@ -40,6 +41,13 @@ def _parameters(rig, place):
     return parameters
 
 
+def _in_time(line, state, values, place):
+    compliance = volume_admittance(1.0, values["volume"], state.density, state.wave_speeds[0])
+    line.source.append(Element(0.0, "shunt", (compliance, values["conductance"])))
+    if place.form == "volume and passage":
+        line.inserts.insert(0, inertance(0.0, values["inertance"]))
+
+
 EFFECT = Effect(
     name="source_impedance",
     element="source",
@@ -47,8 +55,8 @@ EFFECT = Effect(
     equation="q(0) = Q - (s V/(rho a^2) + G) p_pump, p_pump = p(0) + s I q(0)",
     source="Edge & Johnston 1990, Proc. IMechE 204(I):33 (source impedance of pumps, "
     "lumped volume and passage)",
-    time_domain="dp/dt = (rho a^2/V)(Q - G p - q) at the first node, and dq/dt = (p - p(0))/I",
     parameters=_parameters,
     places=_places,
     apply=_apply,
+    in_time=_in_time,
 )

@@ -32,17 +32,26 @@ def _apply(network, line, values, place):
     network.source_flow = flow
 
 
+def _in_time(line, state, values, place):
+    # q(angle + d) = q + d dq/dangle, to first order in both domains.
+    spectrum = np.fft.rfft(line.flow)
+    slope = np.fft.irfft(1j * np.arange(len(spectrum)) * spectrum, len(line.flow))
+    angle = 2.0 * np.pi * np.arange(len(line.flow)) / len(line.flow)
+    b = complex(values["cosine"], values["sine"])
+    line.flow = line.flow + (b * np.exp(1j * angle)).real * slope
+
+
 EFFECT = Effect(
     name="speed_fluctuation",
     element="source",
     medium="any",
     equation="Q_(k+1) += j k b X_k/2, Q_(k-1) += j k b* X_k/2, angle + Re(b e^(j angle))",
     source="Randall 2011, Vibration-based Condition Monitoring, sec. 3.3 (phase modulation)",
-    time_domain="flow ripple read at the modulated shaft angle",
     parameters=lambda rig, place: (
         Parameter("cosine", "rad", normal(0.0, 5e-3)),
         Parameter("sine", "rad", normal(0.0, 5e-3)),
     ),
     places=source_place,
     apply=_apply,
+    in_time=_in_time,
 )

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.special import ive
 
 from rippletwin.effects.base import Effect, line_place
+from rippletwin.line.weighting import conduction_terms
 
 
 def thermal_factor(s, viscosity, diameter, heat_capacity_ratio, prandtl):
@@ -25,6 +28,14 @@ def _apply(network, line, values, place):
         )
 
 
+def _in_time(line, state, values, place):
+    # The isothermal layer is a wall that yields with delay, a sum of exponentials.
+    for k, diameter in enumerate(state.diameters):
+        rate = 4.0 * state.viscosity / (state.prandtl * diameter**2)
+        terms = conduction_terms(rate, state.heat_capacity_ratio)
+        line.pipes[k] = replace(line.pipes[k], creep=(*line.pipes[k].creep, *terms))
+
+
 EFFECT = Effect(
     name="thermal_boundary_layer",
     element="line",
@@ -33,8 +44,8 @@ EFFECT = Effect(
     "no parameter beyond those of the gas",
     source="Kirchhoff 1868; Zwikker & Kosten 1949, Sound Absorbing Materials, ch. II; "
     "Tijdeman 1975, J. Sound Vib. 39:1, eq. 32",
-    time_domain="a second sum of exponentials, on dp/dt instead of dq/dt",
     parameters=lambda rig, place: (),
     places=line_place,
     apply=_apply,
+    in_time=_in_time,
 )

@@ -28,6 +28,10 @@ def _apply(network, line, values, place):
         )
 
 
+def _in_time(line, state, values, place):
+    line.friction = "unsteady"  # Zielke's weights as a sum of exponentials
+
+
 EFFECT = Effect(
     name="unsteady_friction",
     element="line",
@@ -35,9 +39,8 @@ EFFECT = Effect(
     equation="Z' = (rho/A) s I0(r)/I2(r), r = R sqrt(s/nu), instead of (rho/A)(s + 8 nu/R^2); "
     "no parameter beyond the fluid's viscosity",
     source="Zielke 1968, J. Basic Eng. 90:109, eq. 7; for a gas Kirchhoff 1868",
-    time_domain="weighting function as a sum of exponentials, "
-    "y_k <- exp(-n_k D) y_k + m_k (1 - exp(-n_k D))/(n_k D) dq, D = nu dt/R^2",
     parameters=lambda rig, place: (),
     places=line_place,
     apply=_apply,
+    in_time=_in_time,
 )

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from rippletwin.effects.base import Effect, Parameter, lognormal, segment_places
 
 
 def _apply(network, line, values, place):
     creep = values["compliance_ratio"] / (1.0 + network.s * values["retardation_time"])
     network.shunt[place.index] = network.shunt[place.index] * (1.0 + creep)
+
+
+def _in_time(line, state, values, place):
+    # A retarded strain at each node. Walls multiply, in the rare case of two on one segment.
+    pipe = line.pipes[place.index]
+    term = values["compliance_ratio"], values["retardation_time"]
+    line.pipes[place.index] = replace(pipe, creep=(*pipe.creep, term))
 
 
 EFFECT = Effect(
@@ -17,12 +26,11 @@ EFFECT = Effect(
     equation="Y' = A s/(rho a^2) (1 + kappa/(1 + s tau))",
     source="Franke & Seyler 1983, J. Hydraulic Res. 21:349; one Kelvin-Voigt element, "
     "Covas et al. 2005, J. Hydraulic Res. 43:56, eq. 10",
-    time_domain="retarded strain as one more state a node, "
-    "d eps/dt = (kappa p/(rho a^2) - eps)/tau, integrated exactly over a step",
     parameters=lambda rig, place: (
         Parameter("compliance_ratio", "1", lognormal(0.15, 1.0)),
         Parameter("retardation_time", "s", lognormal(3e-4, 1.3), (-1.0, 0.7)),
     ),
     places=segment_places,
     apply=_apply,
+    in_time=_in_time,
 )

@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+SHUNT, SERIES, BRANCH = range(3)  # kinds of a rung
+
 # Views of one pipe, indexed from 0: so the compiler knows that no index wraps, and vectorises.
 
 
@@ -30,6 +32,17 @@ def _remember(half_u, decay, gain, bend, flow, change, last_change, memory, know
 
 
 @njit(cache=True, error_model="numpy")
+def _creep(keep, follow, share, pressure, strain, lag):
+    """What the wall has already yielded: b_k <- E_k b_k + follow_k p, `lag` = sum share_k b_k."""
+    lag[:] = 0.0
+    for m in range(len(keep)):
+        e, g, c, b = keep[m], follow[m], share[m], strain[m]
+        for i in range(len(pressure)):
+            b[i] = e * b[i] + g * pressure[i]
+            lag[i] += c * b[i]
+
+
+@njit(cache=True, error_model="numpy")
 def _meet(b, pressure, flow, change, forward, backward, known):
     """Interior nodes between two ordinary cells."""
     over = 0.5 / b
@@ -42,27 +55,21 @@ def _meet(b, pressure, flow, change, forward, backward, known):
 
 
 @njit(cache=True, error_model="numpy")
-def _meet_viscoelastic(
-    b, creep, keep, phi, rate, strain, pressure, flow, change, forward, backward, known
-):
+def _meet_yielding(b, soft, lag, pressure, flow, change, forward, backward, known):
     """The same with a wall that creeps."""
-    half, over = 0.5 / (1.0 + creep * phi * rate), 0.5 / b
+    half, over = 0.5 / (1.0 + soft), 0.5 / b
     for i in range(1, len(flow) - 2):
-        bend = keep * strain[i] + (phi - keep) * pressure[i]
-        up = forward[i - 1] - known[i] + creep * rate * bend
-        down = backward[i + 1] + known[i] + creep * rate * bend
-        new = half * (up + down)
-        strain[i] = bend + (1.0 - phi) * new
-        pressure[i] = new
+        up, down = forward[i - 1] - known[i], backward[i + 1] + known[i]
+        pressure[i] = half * (up + down + 2.0 * lag[i])
         new = over * (up - down)
         change[i] = new - flow[i]
         flow[i] = new
 
 
 @njit(cache=True, error_model="numpy")
-def _leave(carried, give, pressure, flow, strain, known, forward, backward):
+def _leave(carried, soft, lag, pressure, flow, known, forward, backward):
     """Waves leaving every node, less half the losses of an ordinary cell."""
-    if give == 0.0:
+    if soft == 0.0:
         for i in range(len(flow)):
             wave = carried * flow[i] - known[i]
             forward[i] = pressure[i] + wave
@@ -70,26 +77,94 @@ def _leave(carried, give, pressure, flow, strain, known, forward, backward):
     else:
         for i in range(len(flow)):
             wave = carried * flow[i] - known[i]
-            still = pressure[i] - give * (pressure[i] - strain[i])
+            still = pressure[i] - (soft * pressure[i] - lag[i])
             forward[i] = still + wave
             backward[i] = still - wave
+
+
+@njit(cache=True, error_model="numpy")
+def _filter(coefficients, u, state):
+    """One step of a second-order section in transposed direct form II."""
+    b0, b1, b2, a1, a2 = coefficients
+    y = b0 * u + state[0]
+    state[0] = b1 * u - a1 * y + state[1]
+    state[1] = b2 * u - a2 * y
+
+
+@njit(cache=True, error_model="numpy")
+def _join(supply, slope, first, stop, kinds, filters, references, state, ends, kept, joint, load):
+    """Pressures at a junction whose rungs are `first` to `stop`, in order from the pump.
+
+    What comes from the pump's side is q = supply[0] - slope[0] p. A shunt takes b0 u + z of it,
+    a series element a pressure b0 u + z, u what differs from `references`; so each rung turns
+    the pair into that of its far side. What comes from the load's side, supply[1] - slope[1] p,
+    meets it there, and back on the way every rung's filter moves on. `ends` (2, pipes, 2) holds
+    supply and slope of the branches, which get their pressure in `joint` (pipes, 2).
+    Returns the pressures on the pump's and the load's side.
+    """
+    s, b = supply[0], slope[0]
+    for r in range(first, stop):
+        kept[r, 0], kept[r, 1] = s, b
+        kind = kinds[r, 0]
+        if kind == BRANCH:
+            s += ends[0, kinds[r, 1], 0]
+            b += ends[1, kinds[r, 1], 0]
+            continue
+        g, past = filters[r, 0], state[r, 0] - filters[r, 0] * references[r]
+        if kind == SHUNT:
+            s -= past
+            b += g
+        else:
+            s = (s - b * past) / (1.0 + b * g)
+            b = b / (1.0 + b * g)
+    s += supply[1]
+    b += slope[1]
+    law, coefficient, outside = load
+    p = s / b
+    if law == 1:
+        p = outside
+    elif law == 2:
+        # b x^2 + K x = excess with x = sqrt(p - p0)
+        excess = s - b * outside
+        size = abs(excess)
+        root = np.sqrt(coefficient**2 + 4.0 * b * size)
+        x = 2.0 * size / (coefficient + root)
+        p = outside + np.sign(excess) * x * x
+    far = p
+    for r in range(stop - 1, first - 1, -1):
+        kind, b0 = kinds[r, 0], filters[r, 0]
+        if kind == BRANCH:
+            joint[kinds[r, 1], 0] = p
+            continue
+        u = p - references[r]
+        if kind == SERIES:
+            past = state[r, 0] - b0 * references[r]
+            q = (kept[r, 0] - kept[r, 1] * (p + past)) / (1.0 + kept[r, 1] * b0)
+            p += b0 * q + past
+            u = q - references[r]
+        _filter(filters[r], u, state[r])
+    return p, far
 
 
 @njit(cache=True, error_model="numpy")
 def advance(
     source,
     nodes,
-    dt,
+    main,
     offsets,
     thetas,
     taps,
-    links,
     parameters,
     decays,
     gains,
     bends,
-    capacitance,
-    conductance,
+    keep,
+    follow,
+    share,
+    rungs,
+    kinds,
+    filters,
+    references,
     load,
     pressure,
     flow,
@@ -100,44 +175,31 @@ def advance(
     change,
     last_change,
     history,
-    shunt_flow,
+    state,
 ):
     """One period of `source` (M,); the state arrays are changed in place.
 
-    Returns pressure and flow (len(nodes), M).
+    Pipes 0 to `main` are the line, the rest branches. Returns pressure and flow (len(nodes), M).
     """
-    pipes, junctions, steps = len(thetas), len(capacitance), len(source)
-    kind, load_junction, coefficient, load_pressure, constant = load
-    unsteady = parameters[0, 2] > 0.0
+    pipes, steps = len(thetas), len(source)
+    law, coefficient, outside, constant, conductance = load
     seen_p, seen_q = np.empty((len(nodes), steps)), np.empty((len(nodes), steps))
-    known = np.zeros(
-        len(pressure)
-    )  # (u/2)(sum e_k y_k - G q - H dq): friction of the past at the new point
-    supply, slope = np.empty(junctions), np.empty(junctions)
-    joint, last_joint = np.empty(junctions), np.empty(junctions)
-    for k in range(pipes):
-        last_joint[links[k, 0]] = pressure[offsets[k]]
-        last_joint[links[k, 1]] = pressure[offsets[k + 1] - 1]
+    # (u/2)(sum e_k y_k - G q - H dq): friction of the past at the new point
+    known, lag = np.zeros(len(pressure)), np.zeros(len(pressure))
+    ends = np.zeros((2, pipes, 2))  # supply and slope that a pipe brings to the joint at each end
+    joint = np.empty((pipes, 2))
+    supply, slope, kept = np.empty(2), np.empty(2), np.empty((len(kinds), 2))
 
     for n in range(steps):
-        for j in range(junctions):
-            rigid = 2.0 * capacitance[j] / dt
-            supply[j] = rigid * last_joint[j] + shunt_flow[j]
-            slope[j] = conductance[j] + rigid
-        supply[0] += source[n]
-        supply[load_junction] -= constant
-
         for k in range(pipes):
             first, last = offsets[k], offsets[k + 1] - 1
             near, theta = last - 1, thetas[k]
-            zc, half_r, half_u, creep = parameters[k, :4]
-            keep, phi, rate = parameters[k, 4:]
+            zc, half_r, half_u, soft = parameters[k]
             gain = gains[k].sum()
             b = zc + half_r + half_u * gain
-            w = creep * phi * rate
 
             here = slice(first, last + 1)
-            if unsteady:
+            if half_u > 0.0:
                 _remember(
                     half_u,
                     decays[k],
@@ -156,76 +218,70 @@ def advance(
                 to_end += taps[k, age] * history[k, 0, age]
                 to_near += taps[k, age] * history[k, 1, age]
 
-            state = pressure[here], flow[here], change[here]
+            now = pressure[here], flow[here], change[here]
             waves = forward[here], backward[here], known[here]
-            if creep == 0.0:
-                _meet(b, *state, *waves)
+            if soft == 0.0:
+                _meet(b, *now, *waves)
             else:
-                _meet_viscoelastic(b, creep, keep, phi, rate, strain[here], *state, *waves)
+                _creep(keep[k], follow[k], share[k], pressure[here], strain[:, here], lag[here])
+                _meet_yielding(b, soft, lag[here], *now, *waves)
 
             # The node between an ordinary cell and the long one.
-            b_long, w_long = zc + theta * (half_r + half_u * gain), theta * w
-            bend = keep * strain[near] + (phi - keep) * pressure[near]
-            past = -creep * rate * bend
-            up = forward[near - 1] - known[near] - past
-            down = to_near + theta * (known[near] - past)
-            new = (b_long * up + b * down) / (b_long * (1.0 + w) + b * (1.0 + w_long))
-            strain[near] = bend + (1.0 - phi) * new
+            b_long, soft_long = zc + theta * (half_r + half_u * gain), theta * soft
+            up = forward[near - 1] - known[near] + lag[near]
+            down = to_near + theta * (known[near] + lag[near])
+            new = (b_long * up + b * down) / (b_long * (1.0 + soft) + b * (1.0 + soft_long))
             pressure[near] = new
-            new = (up - (1.0 + w) * new) / b
+            new = (up - (1.0 + soft) * new) / b
             change[near] = new - flow[near]
             flow[near] = new
 
             # What each end brings to its junction: q = +-(supply - slope p).
-            past = -creep * rate * (keep * strain[first] + (phi - keep) * pressure[first])
-            supply[links[k, 0]] += (backward[first + 1] + known[first] - past) / b
-            slope[links[k, 0]] += (1.0 + w) / b
-            past = -creep * rate * (keep * strain[last] + (phi - keep) * pressure[last])
-            supply[links[k, 1]] += (to_end - theta * (known[last] + past)) / b_long
-            slope[links[k, 1]] += (1.0 + w_long) / b_long
+            ends[0, k, 0] = (backward[first + 1] + known[first] + lag[first]) / b
+            ends[1, k, 0] = (1.0 + soft) / b
+            ends[0, k, 1] = (to_end - theta * (known[last] - lag[last])) / b_long
+            ends[1, k, 1] = (1.0 + soft_long) / b_long
 
-        for j in range(junctions):
-            joint[j] = supply[j] / slope[j]
-            if j == load_junction:
-                if kind == 1:
-                    joint[j] = load_pressure
-                elif kind == 2:
-                    # slope x^2 + K x = excess with x = sqrt(p - p0)
-                    excess = supply[j] - slope[j] * load_pressure
-                    size = abs(excess)
-                    root = np.sqrt(coefficient**2 + 4.0 * slope[j] * size)
-                    x = 2.0 * size / (coefficient + root)
-                    joint[j] = load_pressure + np.sign(excess) * x * x
-            rigid = 2.0 * capacitance[j] / dt
-            shunt_flow[j] = rigid * (joint[j] - last_joint[j]) - shunt_flow[j]
-            last_joint[j] = joint[j]
+        for j in range(main + 1):
+            supply[:], slope[:] = 0.0, 0.0
+            if j == 0:
+                supply[0] = source[n]
+            else:
+                supply[0], slope[0] = ends[0, j - 1, 1], ends[1, j - 1, 1]
+            if j == main:
+                supply[1], slope[1] = -constant, conductance
+            else:
+                supply[1], slope[1] = ends[0, j, 0], ends[1, j, 0]
+            beyond = (law if j == main else 0, coefficient, outside)
+            span = rungs[j], rungs[j + 1], kinds, filters, references, state
+            before, after = _join(supply, slope, *span, ends, kept, joint, beyond)
+            if j > 0:
+                joint[j - 1, 1] = before
+            if j < main:
+                joint[j, 0] = after
+        for k in range(main, pipes):
+            joint[k, 1] = ends[0, k, 1] / ends[1, k, 1]  # closed
 
         for k in range(pipes):
             first, last = offsets[k], offsets[k + 1] - 1
             near, theta = last - 1, thetas[k]
-            zc, half_r, half_u, creep = parameters[k, :4]
-            keep, phi, rate = parameters[k, 4:]
+            zc, half_r, half_u, soft = parameters[k]
             gain = gains[k].sum()
             b = zc + half_r + half_u * gain
-            w = creep * phi * rate
-            b_long, w_long = zc + theta * (half_r + half_u * gain), theta * w
+            b_long, soft_long = zc + theta * (half_r + half_u * gain), theta * soft
 
-            bend = keep * strain[first] + (phi - keep) * pressure[first]
-            arriving = backward[first + 1] + known[first] + creep * rate * bend
-            pressure[first] = joint[links[k, 0]]
-            strain[first] = bend + (1.0 - phi) * pressure[first]
-            new = ((1.0 + w) * pressure[first] - arriving) / b
+            arriving = backward[first + 1] + known[first] + lag[first]
+            pressure[first] = joint[k, 0]
+            new = ((1.0 + soft) * pressure[first] - arriving) / b
             change[first] = new - flow[first]
             flow[first] = new
 
             to_end = 0.0
             for age in range(4):
                 to_end += taps[k, age] * history[k, 0, age]
-            bend = keep * strain[last] + (phi - keep) * pressure[last]
-            arriving = to_end - theta * (known[last] - creep * rate * bend)
-            pressure[last] = joint[links[k, 1]]
-            strain[last] = bend + (1.0 - phi) * pressure[last]
-            new = (arriving - (1.0 + w_long) * pressure[last]) / b_long
+            arriving = to_end - theta * (known[last] - lag[last])
+            pressure[last] = joint[k, 1]
+            new = (arriving - (1.0 + soft_long) * pressure[last]) / b_long
             change[last] = new - flow[last]
             flow[last] = new
 
@@ -234,10 +290,10 @@ def advance(
             here = slice(first, last + 1)
             _leave(
                 zc - total,
-                creep * rate,
+                soft,
+                lag[here],
                 pressure[here],
                 flow[here],
-                strain[here],
                 known[here],
                 forward[here],
                 backward[here],
@@ -248,7 +304,7 @@ def advance(
                 history[k, 1, age] = history[k, 1, age - 1]
             for side, i in ((0, near), (1, last)):
                 wave, loss = zc * flow[i], theta * (known[i] + total * flow[i])
-                give = theta * creep * rate * (pressure[i] - strain[i])
+                give = theta * (soft * pressure[i] - lag[i])
                 sign = 1.0 if side == 0 else -1.0
                 history[k, side, 0] = pressure[i] + sign * (wave - loss) - give
 
