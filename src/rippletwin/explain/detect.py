@@ -15,6 +15,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from rippletwin.explain import residuals
+from rippletwin.explain.describe import posterior_of
 from rippletwin.explain.fit import Fit
 from rippletwin.explain.posterior import FLOOR, Posterior
 
@@ -183,9 +184,7 @@ def interior_test(observations: Sequence, fit: Fit) -> list[np.ndarray]:
 
 
 def _posterior(fit: Fit, observations: Sequence) -> Posterior:
-    posterior = Posterior(fit.twin, observations, None, fit.source_free)
-    posterior.floor, posterior.source_sd = FLOOR, fit.source_sd
-    return posterior
+    return posterior_of(fit, observations, FLOOR)
 
 
 def _whitened(fit: Fit, observations: Sequence):

@@ -206,7 +206,7 @@ def immittance(e) -> Figure | None:
             low, high = np.min(part(law)), np.max(part(law))
             room = max(high - low, 0.3 * np.max(np.abs(law)))
             ax.set_ylim(low - 0.6 * room, high + 0.6 * room)
-            ax.set_ylabel(f"{title} part / {m.unit}")
+            ax.set_ylabel(f"{title} / {m.unit}")
         column[0].set_title(f"{m.quantity},\n{m.where}", loc="left")
         column[0].legend()
         column[-1].set_xlabel("frequency / Hz")
