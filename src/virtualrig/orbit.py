@@ -7,6 +7,7 @@ wanders over seconds, and `march` run with a varying speed shows what the shortc
 (docs/virtualrig.md).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,19 +45,19 @@ class Orbit:
 class Bench:
     """A rig ready to run: its tables, and a state that is kept from one run to the next.
 
-    `flow` (M,), m3/s over one revolution, takes the pump's place where it is given; `refine`
-    divides the time step.
+    `flow` takes the pump's place where it is given: (M,), m3/s over one revolution, or a function
+    of the speed in r/min that returns it. `refine` divides the time step.
     """
 
     def __init__(
         self,
         rig: Rig,
         faults: tuple[str, ...] = (),
-        flow: np.ndarray | None = None,
+        flow: np.ndarray | Callable[[float], np.ndarray] | None = None,
         refine: int = 1,
     ):
         self.rig, self.refine = rig, refine
-        self.flow = np.zeros(1) if flow is None else np.asarray(flow, dtype=float)
+        self.flow = np.zeros(1) if flow is None else flow
         self.largest_step = largest_step(rig.network)
         self.nodes = node_table(rig.network)
         self.sensors = sensor_rows(rig.network)
@@ -72,7 +73,7 @@ class Bench:
         load_pressure: float,
         valve: float | None = None,
         tolerance: float = 20.0,
-        most: int = 80,
+        most: int = 200,
     ) -> Orbit:
         """Run until no pressure changes by more than `tolerance` Pa from one revolution to the
         next.
@@ -85,9 +86,11 @@ class Bench:
         every = int(np.ceil(period / RECORDS / self.largest_step)) * self.refine
         steps = every * RECORDS
         cut = line(self.rig.network, period / steps)
+        given = self.flow(speed_rpm) if callable(self.flow) else self.flow
+        given = np.asarray(given, dtype=float)
         flow = 0.97 * self.rig.pump.displacement * speed_rpm / 60
         if not len(self.chambers):
-            flow = self.flow.mean()
+            flow = given.mean()
         if self.state is None:
             pistons = len(self.chambers)
             self.state = still(self.rig.network, cut, load_pressure, flow, pistons)
@@ -98,14 +101,16 @@ class Bench:
         before = np.inf
         for revolution in range(1, most + 1):
             pressure, outlet, nodal, newton = stepper.run(
-                cut, self.nodes, self.chambers, self.ports, self.flow, crank, self.state,
+                cut, self.nodes, self.chambers, self.ports, given, crank, self.state,
                 0, steps, every, period / steps, self.sensors,
             )  # fmt: skip
             if newton > pump.MOST_NEWTON_STEPS:
                 raise RuntimeError("the pump's chambers did not converge; refine the time step")
             residual = np.abs(pressure - before).max()
             before = pressure
-            adjusting = valve is None and revolution <= _REVOLUTIONS_OF_ADJUSTING
+            # a given flow tells the valve at once
+            adjusting = valve is None and len(self.chambers) > 0
+            adjusting &= revolution <= _REVOLUTIONS_OF_ADJUSTING
             if adjusting:
                 load[stepper.ORIFICE] = self._valve(outlet.mean(), load_pressure)
             elif residual < tolerance:

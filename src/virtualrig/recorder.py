@@ -1,5 +1,6 @@
 """Recordings of a rig as a data logger sees them: wandering speed, sensors, noise, a fixed rate."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,14 +37,23 @@ class Take:
     orbit: Orbit
 
 
-def record(rig: Rig, point: Point, rng: np.random.Generator) -> Take:
-    """One recording of `rig` at `point`. Its first sample falls at a random crank angle."""
+def record(
+    rig: Rig,
+    point: Point,
+    rng: np.random.Generator,
+    flow: Callable[[float], np.ndarray] | None = None,
+    tolerance: float = 20.0,
+) -> Take:
+    """One recording of `rig` at `point`. Its first sample falls at a random crank angle.
+
+    `flow` and `tolerance` as in `Bench` and `Bench.settle`.
+    """
     set_speed = point.speed_rpm * (1 + rig.speed_error * rng.standard_normal())
     set_pressure = point.load_pressure * (1 + rig.load_pressure_error * rng.standard_normal())
     count = round(point.seconds * SAMPLING_RATE_HZ)
     speed = set_speed * (1 + wander(count, rig.wander, rig.correlation_s, rng))
     turns = rng.uniform() + np.concatenate([[0.0], np.cumsum(speed[:-1])]) / 60 / SAMPLING_RATE_HZ
-    orbits = family(Bench(rig, point.faults), speed, set_pressure)
+    orbits = family(Bench(rig, point.faults, flow), speed, set_pressure, tolerance)
     pressure = follow(orbits, rig.sensing, speed, turns)
     pressure += rig.noise * rng.standard_normal(pressure.shape)
     return Take(pressure, turns, orbits[len(orbits) // 2])
@@ -74,17 +84,18 @@ def wander(
     return values - values.mean()
 
 
-def family(bench: Bench, speed: np.ndarray, load_pressure: float) -> list[Orbit]:
+def family(bench: Bench, speed: np.ndarray, load_pressure: float, tolerance: float) -> list[Orbit]:
     """Orbits at the mean of `speed` (r/min) and, where it wanders, at its extremes.
 
     The valve is set once, at the mean.
     """
-    middle = bench.settle(speed.mean(), load_pressure)
+    middle = bench.settle(speed.mean(), load_pressure, tolerance=tolerance)
     reach = np.abs(speed - speed.mean()).max()
     if reach < 1e-6 * speed.mean():
         return [middle]
     low, high = (
-        bench.settle(speed.mean() + side * reach, load_pressure, middle.valve) for side in (-1, 1)
+        bench.settle(speed.mean() + side * reach, load_pressure, middle.valve, tolerance)
+        for side in (-1, 1)
     )
     return [low, middle, high]
 

@@ -1,0 +1,132 @@
+"""The results as a page."""
+
+import numpy as np
+
+from concealed import summary
+
+
+def markdown(rows: list[dict], origin: dict) -> str:
+    """The page of all rows; `origin` says where the cases come from (commit, number, numerics)."""
+    return "\n".join(
+        [
+            "# What `rippletwin explain` finds when the effect is concealed",
+            "",
+            f"{len(rows)} cases drawn from commit `{origin['commit'][:12]}` and number "
+            f"{origin['number']}. Shares with exact 95 % intervals. docs/concealed.md says how.",
+            "",
+            *_table(
+                ("score", "target", "found"),
+                [(what, target, str(found)) for what, target, found in summary.scores(rows)],
+            ),
+            "## Beside simpler methods",
+            "",
+            *_table(
+                ("method", "false alarms", "right effect, plain singles", "misnamed, outside"),
+                [tuple(map(str, row)) for row in summary.compared(rows)],
+            ),
+            "Recalibrating alone names nothing; its alarm is a misfit above 5 % after calibration.",
+            "",
+            "## Power: single effects by the change they make in the ripple",
+            "",
+            *_table(
+                ("change", "alarm", "right effect"),
+                [(_span(a, b), str(c), str(d)) for a, b, c, d in summary.power(rows)],
+            ),
+            "![power](figures/power.png)",
+            "",
+            "## Stated probabilities",
+            "",
+            *_table(
+                ("stated", "mean stated", "right"),
+                [(_span(a, b), f"{m:.2f}", str(r)) for a, b, m, r in summary.reliability(rows)],
+            ),
+            f"Brier score {summary.brier(rows):.3f}.",
+            "",
+            "## Line parameters of cases with an effect",
+            "",
+            *_table(
+                ("quantity", "twin", "mean error", "rms error", "within two deviations"),
+                [
+                    (q, which, f"{mean:+.2%}", f"{rms:.2%}", str(within))
+                    for q, which, mean, rms, within in summary.biases(rows)
+                ],
+            ),
+            "## Misfits",
+            "",
+            *_misfits(rows),
+            "![misfits](figures/misfit.png)",
+            "",
+            "## Every case",
+            "",
+            *_cases(rows),
+            "## Failures",
+            "",
+            *_failures(rows),
+            "## Numerics",
+            "",
+            origin["numerics"],
+            "",
+        ]
+    )
+
+
+def _misfits(rows: list[dict]) -> list[str]:
+    def median(name: str, kinds: tuple[str, ...]) -> str:
+        values = [row[name] for row in rows if row["kind"] in kinds]
+        return f"{np.median(values):.2%}" if values else "-"
+
+    names = ("misfit_nominal", "misfit_calibrated", "swallowed", "misfit_corrected")
+    names += ("held_out_before", "held_out_after")
+    groups = {
+        "no effect": ("none", "off"),
+        "single effects": ("single", "indistinguishable"),
+        "pairs": ("pair",),
+        "outside the library": ("outside",),
+    }
+    return [
+        "Medians. Swallowed: 1 - (misfit after calibration)/(misfit with nominal values).",
+        "",
+        *_table(
+            ("cases", "nominal", "calibrated", "swallowed", "corrected", "held out, calibrated",
+             "held out, corrected"),
+            [(g, *(median(name, kinds) for name in names)) for g, kinds in groups.items()],
+        ),
+    ]  # fmt: skip
+
+
+def _cases(rows: list[dict]) -> list[str]:
+    return _table(
+        ("case", "kind", "truth", "change", "nominal", "calibrated", "swallowed", "corrected",
+         "verdict", "said"),
+        [
+            (
+                str(row["case"]), row["kind"], row["effects"] or "-", f"{row['change']:.1%}",
+                f"{row['misfit_nominal']:.1%}", f"{row['misfit_calibrated']:.2%}",
+                f"{row['swallowed']:.0%}", f"{row['misfit_corrected']:.2%}", row["verdict"],
+                row["said"] or "-",
+            )
+            for row in rows
+        ],
+    )  # fmt: skip
+
+
+def _failures(rows: list[dict]) -> list[str]:
+    lines = []
+    for row in rows:
+        what = summary.failed(row)
+        if what is not None:
+            lines += [
+                f"* **Case {row['case']}: {what}.** True: {row['effects'] or 'no effect'} "
+                f"(change {row['change']:.1%}, {row['points']} points, {row['sensors']} sensors, "
+                f"noise {row['noise']:.0f} Pa). It said ({row['verdict']}): {row['sentence']}"
+            ]
+    return [*(lines or ["None."]), ""]
+
+
+def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:
+    lines = [head, ("---",) * len(head), *rows]
+    return ["| " + " | ".join(cells) + " |" for cells in lines] + [""]
+
+
+def _span(low: float, high: float) -> str:
+    return f"{low:.0%} to {high:.0%}" if np.isfinite(high) else f"over {low:.0%}"

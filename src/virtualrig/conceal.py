@@ -1,0 +1,87 @@
+"""A drawn case recorded: the folder that the tool is given, and the truth that it is not."""
+
+from dataclasses import replace
+from functools import cache, partial
+from pathlib import Path
+
+import numpy as np
+
+from virtualrig.draw import Drawn
+from virtualrig.folder import (
+    listed,
+    prepare,
+    ripple_name,
+    write_recording,
+    write_ripple,
+    write_sheet,
+)
+from virtualrig.orbit import Bench
+from virtualrig.pump import Pump
+from virtualrig.recorder import Point, record, sense
+from virtualrig.rig import Rig, build
+from virtualrig.source import constant_pressure_flow
+
+NUMERICS = {"frequency": 4000.0, "points": 6.0, "modes": 8}
+"""Coarser than a rig's own: the pump's stiff chambers are outside the line here and sensors are
+noisier than the mesh is wrong, as `virtualrig.exact` checks before any case is drawn."""
+
+SETTLED = 0.01
+"""Pressures are periodic when they change by less than this share of the noise in a revolution."""
+
+_ROWS = 1536  # of a nominal flow ripple
+
+
+def conceal(drawn: Drawn, folder: Path, rng: np.random.Generator) -> dict:
+    """Record a drawn case into `folder` (new or empty); returns its truth.
+
+    The truth gains `change`: the norm of what its effects change in the sensors' ripple at the
+    first operating point, over the norm of the ripple.
+    """
+    prepare(folder, None)
+    rig = build(drawn.sheet, drawn.seal | {"numerics": NUMERICS})
+    entries = []
+    for point in drawn.points:
+        take = record(rig, point, rng, driving(rig, point), SETTLED * rig.noise)
+        write_recording(folder / "recordings" / f"{point.label}.h5", take)
+        write_ripple(folder / ripple_name(point), *nominal_flow(drawn.sheet, point))
+        entries.append(listed(point, with_ripple=True))
+    write_sheet(folder, drawn.sheet, entries)
+    return drawn.truth | {"change": _change(drawn, rig)}
+
+
+def driving(rig: Rig, point: Point):
+    """Function of the speed in r/min: the true pump's flow (SAMPLES,), which drives the line."""
+    return cache(
+        partial(
+            constant_pressure_flow,
+            rig.pump,
+            rig.network.density,
+            pressure=point.load_pressure,
+            ripple=rig.ripple,
+        )
+    )
+
+
+def nominal_flow(sheet: dict, point: Point) -> tuple[np.ndarray, np.ndarray]:
+    """Crank angle in degrees and flow in m3/s of the sheet's pump, one revolution."""
+    flow = constant_pressure_flow(
+        Pump(**sheet["pump"]), sheet["fluid"]["density"], point.speed_rpm, point.load_pressure
+    )
+    # resampled by its spectrum: taking every twelfth sample would fold what lies above
+    spectrum = np.fft.rfft(flow)[: _ROWS // 2 + 1] * (_ROWS / len(flow))
+    spectrum[-1] = 0.0
+    return 360 * np.arange(_ROWS) / _ROWS, np.fft.irfft(spectrum, n=_ROWS)
+
+
+def _change(drawn: Drawn, rig: Rig) -> float:
+    if not drawn.seal["effects"]:
+        return 0.0
+    plain = build(drawn.sheet, drawn.seal | {"numerics": NUMERICS, "effects": []})
+    point = replace(drawn.points[0], seconds=0.0)
+    ripples = []
+    for each in (rig, plain):
+        bench = Bench(each, flow=driving(each, point))
+        orbit = bench.settle(point.speed_rpm, point.load_pressure, tolerance=SETTLED * rig.noise)
+        sensed = sense(orbit, each.sensing)
+        ripples.append(sensed - sensed.mean(axis=1, keepdims=True))
+    return float(np.linalg.norm(ripples[0] - ripples[1]) / np.linalg.norm(ripples[1]))
