@@ -22,6 +22,7 @@ from twin_made import flow_ripple, paper_rig
 from workflow_copy import RIG
 
 SPEED, PRESSURE, SAMPLES = 1000 / 60, 9.5e6, 1024
+TITLES = [f"<!-- {state} -->" for state in ("H", "S", "C1", "C2", "S+C1")]  # in an SVG
 
 
 @pytest.fixture(autouse=True)
@@ -29,6 +30,16 @@ def one_thread():
     before = torch.get_num_threads()
     yield
     torch.set_num_threads(before)
+
+
+def sheet(folder):
+    """rig.yaml of a case whose recordings nobody reads."""
+    folder = folder / "case"
+    folder.mkdir(exist_ok=True)
+    (folder / "rig.yaml").write_text(RIG)
+    for recording in yaml.safe_load(RIG)["recordings"]:
+        (folder / recording["file"]).write_text("time_s,p1\n")
+    return folder / "rig.yaml"
 
 
 def predictions(path, truth, said):
@@ -167,9 +178,7 @@ def test_flow_sensor_by_either_method_finds_the_flow(tmp_path):
 
 def test_a_compound_fault_is_both_faults_at_once(tmp_path):
     """The state S+C1 against the pump model with both leaks given by hand; it is neither alone."""
-    (tmp_path / "case").mkdir()
-    rig = yaml.safe_load(RIG) | {"recordings": []}
-    (tmp_path / "case" / "rig.yaml").write_text(yaml.safe_dump(rig))
+    rig = yaml.safe_load(RIG)
     store.save(
         xr.Dataset(
             {"signal": ("time", np.zeros(SAMPLES))},
@@ -188,7 +197,7 @@ def test_a_compound_fault_is_both_faults_at_once(tmp_path):
         {"flow": tmp_path / "fault.zarr"},
         {"state": "S+C1"},
         {"leak_area": [2e-7, 3e-7], "pipe_length": 5.0},
-        rig=tmp_path / "case" / "rig.yaml",
+        rig=sheet(tmp_path),
         recordings=tmp_path / "recorded.zarr",
     )
     flow = store.load(tmp_path / "fault.zarr").source_flow.values
@@ -196,3 +205,36 @@ def test_a_compound_fault_is_both_faults_at_once(tmp_path):
     ripple = np.std(flow)
     for alone in (Slipper(2e-7), Cylinder(3e-7)):
         assert np.std(flow - by_hand(alone)) > 0.02 * ripple
+
+
+def test_compound_ripples_stand_below_their_parts(tmp_path):
+    """The picture of S+C1 has three panels, the single faults first; that of a dataset's own
+    states has one each and no more."""
+    rng = np.random.default_rng(0)
+    for name, states in (("own", ["H", "S", "C1", "C2"]), ("compound", ["S+C1"])):
+        signal = rng.standard_normal((len(states), 1, SAMPLES))
+        store.save(
+            xr.Dataset(
+                {"signal": (("state", "channel", "time"), signal, {"units": "Pa"})},
+                coords={"state": states, "channel": ["p1"]},
+                attrs={"speed_hz": SPEED},
+            ),
+            tmp_path / f"{name}.zarr",
+        )
+    for name, titles in (("own", ["H", "S", "C1", "C2"]), ("compound", ["S", "C1", "S+C1"])):
+        names = "ripple", "ripple_svg", "sst", "sst_svg"
+        files = dict(zip(names, ("r.png", "r.svg", "s.png", "s.svg"), strict=True))
+        run_script(
+            "plot_seeds",
+            tmp_path,
+            {key: tmp_path / f"{name}_{file}" for key, file in files.items()},
+            {"dataset": f"{name}/CFD-P"},
+            {"min_frequency_hz": 12, "max_frequency_hz": 1500, "voices": 8, "k": 1.0},
+            rig=sheet(tmp_path),
+            seeds=tmp_path / f"{name}.zarr",
+            reference=tmp_path / "own.zarr",
+        )
+        svg = (tmp_path / f"{name}_r.svg").read_text()
+        assert [line.strip() for line in svg.splitlines() if line.strip() in TITLES] == [
+            f"<!-- {title} -->" for title in titles
+        ]

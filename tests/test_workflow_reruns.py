@@ -11,6 +11,11 @@ from workflow_copy import make, planned, snakemake
 TESTED_AGAIN = {
     "evaluate",
     "evaluate_compound",
+    "attention",
+    "attention_table",
+    "claims",
+    "plot_attention",
+    "plot_ranks",
     "report",
     "report_compound",
     "report_cost",
@@ -61,7 +66,7 @@ def test_sst_key_reruns_image_networks_only(workflow):
     """An SST key leaves networks on time windows alone."""
     edit(workflow / "config/config.yaml", "voices: 32", "voices: 24")
     rules, text = planned(workflow)
-    assert rules == IMAGES_AGAIN | {"plot_seeds"}
+    assert rules == IMAGES_AGAIN | {"plot_seeds", "compare_sst"}
     assert "cnn2d_7_2.pt" in text and "cnn1d_341_100.pt" not in text
 
 
@@ -91,7 +96,7 @@ def test_pump_in_rig_yaml_reruns_faults(workflow):
 def test_library_file_reruns_what_imports_it(workflow):
     """imaging.py is imported by the scripts that make images, and by no other."""
     edit(workflow / "src/rippletwin/imaging.py", "COLUMNS = 256", "COLUMNS = 128")
-    assert planned(workflow)[0] == IMAGES_AGAIN | {"plot_seeds"}
+    assert planned(workflow)[0] == IMAGES_AGAIN | {"plot_seeds", "compare_sst"}
 
 
 def test_effect_file_reruns_calibration(workflow):

@@ -1,9 +1,13 @@
-"""The simulated revolution of every state, and its synchrosqueezed image at the first channel."""
+"""The simulated revolution of every state, and its synchrosqueezed image at the first channel.
+
+Compound faults are shown below the single faults that they consist of.
+"""
 
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 
 from job import start
 from rippletwin import store
@@ -13,8 +17,11 @@ from rippletwin.imaging import SstSettings, amplitude_scale, image_axes, sst_ima
 
 tell = start(snakemake)
 pistons = load_case(Path(snakemake.input.rig).parent, states=()).rig.pump["pistons"]
-dataset = snakemake.wildcards.dataset
-seeds = store.load(snakemake.input.seeds)
+dataset = snakemake.wildcards.dataset.rpartition("/")[2]
+seeds, reference = store.load(snakemake.input.seeds), store.load(snakemake.input.reference)
+together = {fault for state in seeds.state.values if "+" in state for fault in state.split("+")}
+parts = [state for state in reference.state.values if state in together]
+seeds = xr.concat([reference.sel(state=parts), seeds], "state", combine_attrs="override")
 states = [str(state) for state in seeds.state.values]
 signals = seeds.signal.isel(channel=0).values
 signals = signals - signals.mean(axis=-1, keepdims=True)
@@ -34,7 +41,6 @@ settings = SstSettings(
     voices=params.voices,
     k=params.k,
 )
-reference = store.load(snakemake.input.reference)
 healthy = reference.signal.sel(state="H").isel(channel=[0]).values[None]
 healthy = healthy - healthy.mean(axis=-1, keepdims=True)
 settings = replace(settings, scale=amplitude_scale(np.tile(healthy, 2), rate, settings))

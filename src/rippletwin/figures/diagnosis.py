@@ -57,7 +57,7 @@ def accuracy(
             ax.errorbar(
                 mean, rows, xerr=spread, fmt="D", ms=4, color=style.ALARM, label="paper", zorder=3
             )
-        ax.set_title(dataset)
+        ax.set_title(dataset, fontsize=8)
         ax.set_xlim(0, 105)
     axes[0, 0].set_yticks(rows, architectures)
     axes[0, 0].invert_yaxis()
