@@ -119,11 +119,15 @@ def feature_positions(network: Classifier, count: int, axis: int) -> np.ndarray:
 def _spread(network: Classifier, count: int, points: int, axis: int, cyclic: bool) -> np.ndarray:
     """(points, count) linear interpolation from the features' positions to the input's."""
     positions = feature_positions(network, count, axis)
-    each = np.eye(count)
+    jump = positions[1] - positions[0] if count > 1 else 1.0
     images = np.arange(points) + (points * np.array([[-1], [0], [1]]) if cyclic else [[0]])
     seen = (images >= positions[0]) & (images <= positions[-1])
     seen[len(images) // 2] |= ~seen.any(0)  # beyond the outermost feature its value holds
     weights = np.zeros((points, count))
     for at, counts in zip(images, seen):
-        weights += counts[:, None] * np.stack([np.interp(at, positions, e) for e in each], 1)
+        place = np.clip((at - positions[0]) / jump, 0, count - 1)
+        below = np.minimum(place.astype(int), max(count - 2, 0))
+        above = np.minimum(below + 1, count - 1)
+        np.add.at(weights, (np.arange(points), below), counts * (1 - place + below))
+        np.add.at(weights, (np.arange(points), above), counts * (place - below))
     return weights / seen.sum(0)[:, None]

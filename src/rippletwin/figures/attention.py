@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from rippletwin.figures import style
 from rippletwin.figures.diagnosis import ORDERS, order_ticks
 
+TOP = 3.0  # the same in every figure, so that figures compare; few peaks lie beyond
 _BAR = dict(color=style.ALARM, lw=3, solid_capstyle="butt")
 _SEEN = [patheffects.withStroke(linewidth=2.2, foreground="black")]  # a line seen on any heat
 
@@ -40,7 +41,7 @@ def windows(
     for ax, network, row in _each(axes):
         mesh = ax.imshow(
             heat[network, row][None], extent=(0, 360, -reach, reach), aspect="auto",
-            cmap=_colours(), **_limits(heat),
+            cmap=_colours(), vmin=0, vmax=TOP,
         )  # fmt: skip
         ax.plot(angle, ripple[row], color="white", lw=0.9, path_effects=_SEEN)
         if region is not None and region[row].any():
@@ -77,7 +78,7 @@ def images(
     for ax, network, row in _each(axes):
         mesh = ax.imshow(
             heat[network, row], origin="lower", extent=(0, 2, rows[0], rows[-1]), aspect="auto",
-            cmap=_colours(), **_limits(heat),
+            cmap=_colours(), vmin=0, vmax=TOP,
         )  # fmt: skip
         levels = low + (high - low) * np.array([0.08, 0.25, 0.6])
         ax.contour(times, rows, pictures[row], levels, colors="white", linewidths=(0.4, 0.7, 1.0))
@@ -168,11 +169,6 @@ def _each(axes: np.ndarray):
 
 def _colours():
     return mpl.colormaps[style.SEQUENTIAL].with_extremes(bad="0.8")  # grey: no attention
-
-
-def _limits(heat: np.ndarray) -> dict[str, float]:
-    """Colour limits of all panels alike; a few peaks may lie beyond."""
-    return dict(vmin=0, vmax=max(2.0, float(np.nanpercentile(heat, 99)))) if heat.size else {}
 
 
 def _key(fig: Figure, axes: np.ndarray, mesh) -> None:
