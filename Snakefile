@@ -27,6 +27,7 @@ include: "workflow/rules/train.smk"
 include: "workflow/rules/evaluate.smk"
 include: "workflow/rules/compound.smk"
 include: "workflow/rules/report.smk"
+include: "workflow/rules/concealed.smk"
 include: "workflow/rules/attention.smk"
 
 

@@ -6,13 +6,19 @@ from concealed import summary
 
 
 def markdown(rows: list[dict], origin: dict) -> str:
-    """The page of all rows; `origin` says where the cases come from (commit, number, numerics)."""
+    """The page of all rows.
+
+    `origin` says where the cases come from: commit, number, not_committed (whether the tool was
+    changed since), checks (of the numerics: truth, error and allowed error in Pa).
+    """
+    changed = ", the tool having changes that are not committed" if origin["not_committed"] else ""
     return "\n".join(
         [
             "# What `rippletwin explain` finds when the effect is concealed",
             "",
             f"{len(rows)} cases drawn from commit `{origin['commit'][:12]}` and number "
-            f"{origin['number']}. Shares with exact 95 % intervals. docs/concealed.md says how.",
+            f"{origin['number']}{changed}. Shares with exact 95 % intervals. docs/concealed.md "
+            "says how.",
             "",
             *_table(
                 ("score", "target", "found"),
@@ -64,8 +70,13 @@ def markdown(rows: list[dict], origin: dict) -> str:
             *_failures(rows),
             "## Numerics",
             "",
-            origin["numerics"],
-            "",
+            *_table(
+                ("checked against", "error, Pa rms", "allowed, Pa rms"),
+                [
+                    (c["truth"], f"{c['error']:.0f}", f"{c['allowed']:.0f}")
+                    for c in origin["checks"]
+                ],
+            ),
         ]
     )
 

@@ -144,7 +144,12 @@ def covered(effect: dict, claim: dict) -> list[bool]:
 
 
 def bias(true: list[dict], rows: list[dict]) -> list[dict]:
-    """Relative error and error in stated standard deviations of each delay and impedance."""
+    """Relative error and error in stated standard deviations of each delay and impedance.
+
+    Empty where `rows` is: the tool gave no twin.
+    """
+    if not rows:
+        return []
     return [
         {
             "quantity": quantity,

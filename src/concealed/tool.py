@@ -7,6 +7,7 @@ explain`, and baselines.json.
 import json
 import sys
 import time
+import traceback
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -23,14 +24,41 @@ from rippletwin.report import segment_table
 
 
 def main(case_folder: str, out: str, processes: int = 1) -> None:
-    """Explain one case and write what was found."""
+    """Explain one case and write what was found; a tool that fails has said nothing."""
     started = time.perf_counter()
-    case = load_case(case_folder, states={"healthy"})
-    explanation = explain(case, processes)
-    write(explanation, out)
-    seconds = time.perf_counter() - started
-    path = Path(out) / "baselines.json"
-    path.write_text(json.dumps(baselines(explanation) | {"seconds": seconds}, indent=1) + "\n")
+    out = Path(out)
+    try:
+        explanation = explain(load_case(case_folder, states={"healthy"}), processes)
+        write(explanation, out)
+        seconds, found = time.perf_counter() - started, baselines(explanation)
+    except Exception as error:  # whatever it is: one case must not end the trial
+        traceback.print_exc()
+        (out / "verdict.json").write_text(json.dumps(crash(error)))
+        seconds, found = time.perf_counter() - started, NOTHING
+    (out / "baselines.json").write_text(json.dumps(found | {"seconds": seconds}, indent=1) + "\n")
+
+
+NOTHING = {
+    "nominal": float("nan"),
+    "calibrated": float("nan"),
+    "corrected": float("nan"),
+    "segments": {"calibrated": [], "corrected": []},
+    "bic": None,
+    "sparse": None,
+}
+
+
+def crash(error: Exception) -> dict:
+    """What stands for the verdict where there is none."""
+    nothing = {"in_sample": float("nan"), "held_out": float("nan")}
+    return {
+        "verdict": "crashed",
+        "mismatch": {"present": None, "where": None},
+        "effects": [],
+        "equivalents": [],
+        "fit": {"before": nothing, "after": nothing},
+        "sentence": f"It ended with an error: {error!r}",
+    }
 
 
 def baselines(explanation) -> dict:

@@ -1,12 +1,20 @@
-"""`virtualrig record`: a case folder of recordings made on the virtual test bench."""
+"""The virtual test bench's command line: virtualrig record | check | conceal.
+
+`record` makes a case folder of recordings; `check` tries the numerics and `conceal` makes a case
+whose effect is drawn at random, its truth sealed (docs/concealed.md).
+"""
 
 import argparse
+import json
 import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from virtualrig.conceal import conceal
+from virtualrig.draw import draw, generator
+from virtualrig.exact import checks
 from virtualrig.folder import (
     listed,
     prepare,
@@ -18,6 +26,7 @@ from virtualrig.folder import (
 )
 from virtualrig.recorder import Point, nominal_ripple, record
 from virtualrig.rig import SEAL, SHEET, RigError, read_rig, read_yaml
+from virtualrig.seal import new_key, seal
 
 _STATES = tuple(
     Point(f"{state}_1000_95", 1000.0, 9.5e6, 9.6, state)
@@ -35,7 +44,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     options = _parser().parse_args(arguments)
     try:
-        _record(options)
+        options.run(options)
     except RigError as error:
         print(f"virtualrig: {error}", file=sys.stderr)
         return 2
@@ -46,7 +55,9 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="virtualrig", description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="virtualrig", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     commands = parser.add_subparsers(dest="command", required=True)
     make = commands.add_parser("record", help="record operating points into a new case folder")
     make.add_argument("--out", type=Path, required=True, help="case folder to write (new or empty)")
@@ -63,6 +74,20 @@ def _parser() -> argparse.ArgumentParser:
         help="add flow ripples that the sheet's pump gives on the sheet's line",
     )
     make.add_argument("--true-flow", type=Path, help="folder for the true outlet flow (sealed)")
+    make.set_defaults(run=_record)
+    check = commands.add_parser("check", help="numerics of concealed cases against exact solutions")
+    check.add_argument("--out", type=Path, required=True, help="JSON file to write")
+    check.set_defaults(run=_check)
+    hide = commands.add_parser("conceal", help="record one case drawn at random and seal its truth")
+    hide.add_argument("--case", type=int, required=True, help="which of the cases, from 0")
+    hide.add_argument("--out", type=Path, required=True, help="case folder to write (new or empty)")
+    hide.add_argument("--seal", type=Path, required=True, help="sealed truth to write")
+    hide.add_argument("--key", type=Path, required=True, help="key of the seal to write")
+    hide.set_defaults(run=_conceal)
+    for command in (check, hide):
+        command.add_argument("--commit", required=True, help="hash of the tool that is to be tried")
+        command.add_argument("--number", type=int, required=True, help="number of the trial")
+        command.add_argument("--cases", type=int, required=True, help="how many cases it has")
     return parser
 
 
@@ -97,3 +122,29 @@ def _record(options: argparse.Namespace) -> None:
             write_ripple(options.out / ripple_name(point), *nominal_ripple(known, point))
     entries = [listed(point, options.flow_ripple and not point.faults) for point in points]
     write_sheet(options.out, known, entries)
+
+
+def _check(options: argparse.Namespace) -> None:
+    found = checks(options.cases, options.commit, options.number)
+    options.out.write_text(json.dumps([vars(check) for check in found], indent=1) + "\n")
+    for check in found:
+        print(f"virtualrig: {check}", file=sys.stderr)
+    wrong = [str(check) for check in found if not check.passed]
+    if wrong:
+        options.out.unlink()
+        raise RigError(f"the numerics are not good enough: {'; '.join(wrong)}")
+
+
+def _conceal(options: argparse.Namespace) -> None:
+    for path, name in ((options.seal, "--seal"), (options.key, "--key")):
+        if path.resolve().is_relative_to(options.out.resolve()):
+            raise RigError(f"{name} {path}: lies in the case folder; keep the truth out of it")
+    if not 0 <= options.case < options.cases:
+        raise RigError(f"--case {options.case}: there are {options.cases} cases, from 0")
+    trial = (options.commit, options.number)
+    drawn = draw(options.cases, *trial, options.case)
+    truth = conceal(drawn, options.out, generator(*trial, "recording", options.case))
+    key = new_key()
+    options.seal.write_text(json.dumps(seal(truth, key)) + "\n")
+    options.key.write_bytes(key)
+    options.key.chmod(0o400)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from virtualrig.draw_effects import AT_LEAST, INDISTINGUISHABLE, LIBRARY, OUTSIDE, Bare, Concealed
+from virtualrig.draw_effects import INDISTINGUISHABLE, LIBRARY, OUTSIDE, Bare, Concealed
 from virtualrig.pump import Pump
 from virtualrig.recorder import Point
 from virtualrig.source import constant_pressure_flow
@@ -47,13 +47,13 @@ class Drawn:
     truth: dict
 
 
-def generator(commit: str, number: int, *path: int | str) -> np.random.Generator:
+def generator(commit: str, number: int | str, *path: int | str) -> np.random.Generator:
     """Random numbers of one purpose: seeded by a hash of commit, number and purpose."""
     text = ":".join(map(str, (commit, number, *path)))
     return np.random.default_rng(list(hashlib.sha256(text.encode()).digest()))
 
 
-def kinds(count: int, commit: str, number: int) -> list[tuple[str, int]]:
+def kinds(count: int, commit: str, number: int | str) -> list[tuple[str, int]]:
     """Kind of each case and its running number among its kind, in an order that says nothing.
 
     Shares are those of MIX to the nearest case (largest remainders). Raises ValueError for no case.
@@ -70,7 +70,7 @@ def kinds(count: int, commit: str, number: int) -> list[tuple[str, int]]:
     return [listed[k] for k in order]
 
 
-def draw(count: int, commit: str, number: int, index: int) -> Drawn:
+def draw(count: int, commit: str, number: int | str, index: int) -> Drawn:
     """Case `index` of `count`."""
     kind, running = kinds(count, commit, number)[index]
     rng = generator(commit, number, "case", index)
@@ -173,12 +173,12 @@ def _sheet(rng: np.random.Generator) -> dict:
         },
         "pump": {
             "pistons": int(rng.choice([7, 9, 9, 9])),
-            "piston_diameter": _rounded(rng.uniform(0.014, 0.019)),
-            "pitch_radius": _rounded(rng.uniform(0.028, 0.038)),
+            "piston_diameter": _rounded(rng.uniform(0.010, 0.014)),
+            "pitch_radius": _rounded(rng.uniform(0.022, 0.030)),
             "swash_angle_deg": _rounded(rng.uniform(12.0, 18.0)),
-            "dead_volume": _rounded(rng.uniform(2e-6, 6e-6)),
+            "dead_volume": _rounded(rng.uniform(0.7e-6, 2e-6)),
             "bulk_modulus": _rounded(rng.uniform(1.1e9, 1.5e9)),
-            "port_area": _rounded(rng.uniform(0.8e-4, 1.4e-4)),
+            "port_area": _rounded(rng.uniform(0.4e-4, 0.8e-4)),
             "port_opening_deg": _rounded(rng.uniform(10.0, 25.0)),
             "port_overlap_deg": _rounded(rng.uniform(1.0, 4.0)),
             "discharge_coefficient": 0.65,
@@ -308,6 +308,3 @@ def difference(flow: np.ndarray, other: np.ndarray, pistons: int, point: Point) 
 
 def _rounded(value: float) -> float:
     return float(f"{value:.4g}")
-
-
-__all__ = ["AT_LEAST", "Drawn", "draw", "generator", "kinds"]

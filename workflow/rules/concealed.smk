@@ -1,0 +1,182 @@
+# How often `explain` is right when the effect is hidden: snakemake --cores 2 concealed
+import subprocess
+
+CONCEALED = f"{RESULTS}/concealed"
+HIDDEN = [f"{n:03d}" for n in range(config["concealed"]["cases"])]
+
+
+def git(*arguments):
+    """What git says of the tool that is tried."""
+    command = ["git", "-C", str(ROOT), *arguments]
+    try:
+        return subprocess.run(
+            command, check=True, capture_output=True, text=True
+        ).stdout.strip()
+    except (OSError, subprocess.CalledProcessError) as error:
+        raise WorkflowError(
+            "concealed: its cases follow from the tool's commit; run it in a git checkout"
+        ) from error
+
+
+def tool_commit(wildcards):
+    """Hash of the tool's source in the commit: nobody can pick the cases that follow from it."""
+    return git("rev-parse", "HEAD:src/rippletwin")
+
+
+def not_committed(wildcards):
+    """Whether the tool that runs differs from that commit, which the page then says."""
+    return git("status", "--porcelain", "src/rippletwin") != ""
+
+
+wildcard_constraints:
+    hidden="[0-9]{3}",
+
+
+rule concealed_numerics:
+    input:
+        source=virtualrig(),
+    output:
+        f"{CONCEALED}/numerics.json",
+    log:
+        f"{RESULTS}/logs/concealed_numerics.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/concealed_numerics.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        commit=tool_commit,
+        number=config["concealed"]["number"],
+        cases=config["concealed"]["cases"],
+    shell:
+        "virtualrig check --commit {params.commit} --number {params.number}"
+        " --cases {params.cases} --out {output} > {log} 2>&1"
+
+
+rule conceal:
+    input:
+        numerics=rules.concealed_numerics.output,
+        source=virtualrig(),
+    output:
+        case=directory(f"{CONCEALED}/cases/{{hidden}}"),
+        seal=f"{CONCEALED}/seals/{{hidden}}.json",
+        key=f"{CONCEALED}/keys/{{hidden}}",
+    log:
+        f"{RESULTS}/logs/conceal/{{hidden}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/conceal/{{hidden}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        commit=tool_commit,
+        number=config["concealed"]["number"],
+        cases=config["concealed"]["cases"],
+        case=lambda wildcards: int(wildcards.hidden),
+    shell:
+        "virtualrig conceal --commit {params.commit} --number {params.number}"
+        " --cases {params.cases} --case {params.case} --out {output.case}"
+        " --seal {output.seal} --key {output.key} > {log} 2>&1"
+
+
+# The tool may open its own source, the case and where it writes: neither seals nor keys.
+rule explain_concealed:
+    input:
+        case=rules.conceal.output.case,
+        source=library(SOURCE / "concealed" / "tool.py"),
+        jail=library(SOURCE / "concealed" / "jail.py"),
+    output:
+        verdict=f"{CONCEALED}/explained/{{hidden}}/verdict.json",
+        baselines=f"{CONCEALED}/explained/{{hidden}}/baselines.json",
+    log:
+        f"{RESULTS}/logs/explain_concealed/{{hidden}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/explain_concealed/{{hidden}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=2000,
+    params:
+        out=subpath(output.verdict, parent=True),
+        cache=f"{CONCEALED}/cache",
+    shell:
+        "(mkdir -p {params.out} {params.cache};"
+        " NUMBA_CACHE_DIR=$PWD/{params.cache} TMPDIR={params.out}"
+        " python -m concealed.jail --read {input.case} --write {params.out} --write {params.cache}"
+        " -- python -m concealed.tool {input.case} {params.out}) > {log} 2>&1"
+
+
+rule commit_verdicts:
+    input:
+        seals=expand(rules.conceal.output.seal, hidden=HIDDEN),
+        verdicts=expand(rules.explain_concealed.output.verdict, hidden=HIDDEN),
+        baselines=expand(rules.explain_concealed.output.baselines, hidden=HIDDEN),
+        source=library("commit_verdicts.py"),
+    output:
+        f"{CONCEALED}/commitments.json",
+    log:
+        f"{RESULTS}/logs/commit_verdicts.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/commit_verdicts.tsv"
+    threads: 1
+    resources:
+        mem_mb=500,
+    script:
+        "../scripts/commit_verdicts.py"
+
+
+rule score_concealed:
+    input:
+        commitments=rules.commit_verdicts.output,
+        seals=expand(rules.conceal.output.seal, hidden=HIDDEN),
+        keys=expand(rules.conceal.output.key, hidden=HIDDEN),
+        verdicts=expand(rules.explain_concealed.output.verdict, hidden=HIDDEN),
+        baselines=expand(rules.explain_concealed.output.baselines, hidden=HIDDEN),
+        source=library("score_concealed.py"),
+    output:
+        rows=f"{CONCEALED}/rows.json",
+    log:
+        f"{RESULTS}/logs/score_concealed.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/score_concealed.tsv"
+    threads: 1
+    resources:
+        mem_mb=500,
+    script:
+        "../scripts/score_concealed.py"
+
+
+rule report_concealed:
+    input:
+        rows=rules.score_concealed.output.rows,
+        numerics=rules.concealed_numerics.output,
+        source=library("report_concealed.py"),
+    output:
+        page=report(
+            f"{CONCEALED}/report.md",
+            category="concealed",
+            caption="../report/concealed.rst",
+        ),
+        figures=report(
+            directory(f"{CONCEALED}/figures"),
+            patterns=["{name}.png"],
+            category="concealed",
+            caption="../report/concealed.rst",
+        ),
+    log:
+        f"{RESULTS}/logs/report_concealed.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/report_concealed.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        commit=tool_commit,
+        not_committed=not_committed,
+        number=config["concealed"]["number"],
+    script:
+        "../scripts/report_concealed.py"
+
+
+rule concealed:
+    input:
+        rules.report_concealed.output,
