@@ -17,8 +17,8 @@ from rippletwin.figures import style
 from rippletwin.figures.diagnosis import ORDERS, order_ticks
 
 TOP = 3.0  # the same in every figure, so that figures compare; few peaks lie beyond
-_BAR = dict(color=style.ALARM, lw=3, solid_capstyle="butt")
-_SEEN = [patheffects.withStroke(linewidth=2.2, foreground="black")]  # a line seen on any heat
+_BAR = dict(color=style.ALARM, lw=0)
+_SEEN = [patheffects.withStroke(linewidth=1.5, foreground="black")]  # a line seen on any heat
 
 
 def windows(
@@ -43,9 +43,9 @@ def windows(
             heat[network, row][None], extent=(0, 360, -reach, reach), aspect="auto",
             cmap=_colours(), vmin=0, vmax=TOP,
         )  # fmt: skip
-        ax.plot(angle, ripple[row], color="white", lw=0.9, path_effects=_SEEN)
-        if region is not None and region[row].any():
-            ax.plot(angle, np.where(region[row], -reach, np.nan), **_BAR, clip_on=False)
+        ax.plot(angle, ripple[row], color="white", lw=0.6, path_effects=_SEEN)
+        if region is not None:
+            ax.fill_between(angle, -reach, -0.87 * reach, where=region[row], step="mid", **_BAR)
         ax.set_title(titles[network][row], fontsize=7)
         ax.set(xlim=(0, 360), ylim=(-reach, reach), xticks=(0, 120, 240, 360))
     fig.supxlabel("crank angle / degrees", fontsize=9)
@@ -83,7 +83,7 @@ def images(
         levels = low + (high - low) * np.array([0.08, 0.25, 0.6])
         ax.contour(times, rows, pictures[row], levels, colors="white", linewidths=(0.4, 0.7, 1.0))
         if region is not None:
-            ax.plot(np.full(len(rows), 0), np.where(region[row], rows, np.nan), **_BAR)
+            ax.fill_betweenx(rows, 0, 0.12, where=region[row], step="mid", **_BAR)
         ax.set_title(titles[network][row], fontsize=7)
         order_ticks(ax, frequency_hz, shaft_hz, pistons)
         ax.tick_params(labelsize=6)
