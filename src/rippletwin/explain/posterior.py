@@ -8,10 +8,11 @@ sensors, and the error of a nominal source, relative and along the prediction h,
 sigma is the part that differs from harmonic to harmonic, tau the part that is smooth in frequency,
 as a wrong bulk modulus or port timing makes it. Between frequencies f and f' of recordings o and p
 
-    K = (1 + f f'/f0^2) exp(-(f - f')^2/(2 l^2)) (1/2 + 1/2 [o = p]),     f0 = l = 1 kHz:
+    K = [1 + (1 + f f'/f0^2) exp(-(f - f')^2/(2 l^2))] (1/2 + 1/2 [o = p]),     f0 = l = 1 kHz:
 
-it grows with frequency, for an error of timing is one of phase, and half of it is common to all
-operating points, for it is the same pump that is modelled wrongly. A smooth error is what an effect
+a part is the same at all frequencies, for the ripple's size may be wrong, a part grows with
+frequency, for an error of timing is one of phase, and half of both is common to all operating
+points, for it is the same pump that is modelled wrongly. A smooth error is what an effect
 at the pump, friction or a hose may look like; without it their standard deviations would be several
 times too small, and an effect at the pump would be named where only the ripple is wrong.
 
@@ -46,7 +47,7 @@ SMOOTH_SDS = np.array([0.01, 0.03, 0.1])  # the same for tau
 CORRELATION_HZ = 1000.0  # l and f0
 LEAST = 0.01  # of the strongest harmonic: smaller ones are uncertain by more than their own share
 PRODUCTS = 0.2  # lambda
-KEPT = 3e-3  # of the kernel's largest eigenvalue
+KEPT = 1e-3  # of the kernel's largest eigenvalue
 
 
 class Posterior:
@@ -277,7 +278,7 @@ class Metric:
 def smooth_basis(frequency_hz: np.ndarray, recording: np.ndarray) -> np.ndarray:
     """Basis (J, N) of errors smooth in frequency, basis.T @ basis = K; recording (N,) numbers."""
     f = np.asarray(frequency_hz, float) / CORRELATION_HZ
-    kernel = (1.0 + np.outer(f, f)) * np.exp(-0.5 * np.subtract.outer(f, f) ** 2)
+    kernel = 1.0 + (1.0 + np.outer(f, f)) * np.exp(-0.5 * np.subtract.outer(f, f) ** 2)
     kernel = kernel * (0.5 + 0.5 * np.equal.outer(recording, recording))
     values, vectors = np.linalg.eigh(kernel)
     kept = values > KEPT * np.max(values, initial=0.0)
