@@ -93,24 +93,29 @@ def drift(early: Sequence, late: Sequence, delay: float) -> tuple[float, str]:
     for a, b in zip(early, late):
         if a.orders is None:
             continue
-        orders = np.asarray(a.orders, float)
-        power = np.mean(np.abs(a.values) ** 2, axis=0)
-        variance = np.einsum("fss->sf", a.covariance + b.covariance).real
-        speed = abs(a.speed_hz / b.speed_hz - 1.0)
-        phase = 2 * np.pi * a.frequency_hz * 10.0 * delay * speed
-        variance = variance + ((0.5 * FLOOR) ** 2 + phase**2) * power
-        match = np.sum(np.conj(a.values) * b.values / variance, axis=0)
-        # The angle: first coarsely, from the strongest order, then refined by the phase slope.
-        grid = np.linspace(-np.pi, np.pi, 4001) / np.gcd.reduce(np.asarray(a.orders, int))
-        angle = grid[np.argmax((np.exp(-1j * np.outer(grid, orders)) @ match).real)]
-        for _ in range(3):
-            turned = match * np.exp(-1j * angle * orders)
-            angle += np.sum(orders * turned.imag) / max(np.sum(orders**2 * np.abs(turned)), 1e-300)
-        difference = b.values * np.exp(-1j * angle * orders) - a.values
-        statistic = 2.0 * np.sum(np.abs(difference) ** 2 / variance)
+        gap, variance = difference(a, b, delay)
+        statistic = 2.0 * np.sum(np.abs(gap) ** 2 / variance)
         p = chi2.sf(statistic, 2 * a.values.size - 1)
         worst = min(worst, (min(1.0, float(p) * len(early)), a.label))
     return worst
+
+
+def difference(a, b, delay: float) -> tuple[np.ndarray, np.ndarray]:
+    """b less a (S, F), their shaft angle aligned, and the variance that `drift` allows for."""
+    orders = np.asarray(a.orders, float)
+    power = np.mean(np.abs(a.values) ** 2, axis=0)
+    variance = np.einsum("fss->sf", a.covariance + b.covariance).real
+    speed = abs(a.speed_hz / b.speed_hz - 1.0)
+    phase = 2 * np.pi * a.frequency_hz * 10.0 * delay * speed
+    variance = variance + ((0.5 * FLOOR) ** 2 + phase**2) * power
+    match = np.sum(np.conj(a.values) * b.values / variance, axis=0)
+    # The angle: first coarsely, from the strongest order, then refined by the phase slope.
+    grid = np.linspace(-np.pi, np.pi, 4001) / np.gcd.reduce(np.asarray(a.orders, int))
+    angle = grid[np.argmax((np.exp(-1j * np.outer(grid, orders)) @ match).real)]
+    for _ in range(3):
+        turned = match * np.exp(-1j * angle * orders)
+        angle += np.sum(orders * turned.imag) / max(np.sum(orders**2 * np.abs(turned)), 1e-300)
+    return b.values * np.exp(-1j * angle * orders) - a.values, variance
 
 
 def p_value(gain: float, tried: int) -> float:
