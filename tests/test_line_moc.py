@@ -16,6 +16,7 @@ from line_rig import (
     ripple,
     samples,
 )
+from rippletwin.effects.side_branch import branch_admittance
 from rippletwin.line.balance import balance_orifice
 from rippletwin.line.chain import Insert
 from rippletwin.line.moc import simulate, steps_a_period
@@ -167,10 +168,11 @@ def short_line(steps, friction="unsteady", pipes=SHORT, inserts=(), source=0.0):
 
 
 def in_the_chain(insert, s):
-    """The same for the frequency domain; a branch by its own input impedance."""
+    """The same for the frequency domain."""
     if isinstance(insert, Branch):
-        branch = network(s, [insert.pipe], "unsteady", load=("closed", None))
-        return Insert(insert.position, "shunt", 1 / branch.input_impedance())
+        pipe = insert.pipe
+        y = branch_admittance(s, pipe.length, pipe.diameter, pipe.wave_speed, DENSITY, VISCOSITY)
+        return Insert(insert.position, "shunt", y)
     return Insert(insert.position, insert.kind, insert.immittance(s))
 
 

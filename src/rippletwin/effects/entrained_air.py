@@ -33,10 +33,8 @@ def _in_time(line, state, values, place):
     added = air_compressibility(
         values["gas_fraction"], values["polytropic_exponent"], state.mean_pressure
     )
-    for k, speed in enumerate(state.wave_speeds):
-        line.pipes[k] = line.pipes[k].softened(
-            added * state.density * line.pipes[k].wave_speed ** 2
-        )
+    for k, pipe in enumerate(line.pipes):
+        line.pipes[k] = pipe.softened(added * state.density * pipe.wave_speed**2)
 
 
 EFFECT = Effect(

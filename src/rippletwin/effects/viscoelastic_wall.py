@@ -13,7 +13,7 @@ def _apply(network, line, values, place):
 
 
 def _in_time(line, state, values, place):
-    # A retarded strain at each node. Walls multiply, in the rare case of two on one segment.
+    # One more retarded strain at each node.
     pipe = line.pipes[place.index]
     term = values["compliance_ratio"], values["retardation_time"]
     line.pipes[place.index] = replace(pipe, creep=(*pipe.creep, term))

@@ -17,6 +17,7 @@ from rippletwin.line.segment import series_impedance, shunt_admittance
 
 SHORTEST = 3  # cells
 TOUCH = 1e-9  # m: closer than this is the same place
+BRANCH_STEADY = 8.0 - 3.0  # s I0/I2 = s (1 + 2/r + 3/r^2 ...): without the 3, first order in 1/r
 
 
 class Grid:
@@ -81,7 +82,9 @@ class Grid:
         terms = max(len(pipe.creep) for pipe in self.pipes)
         self.keep, self.follow, self.share = np.zeros((3, len(self.pipes), terms))
         for k, pipe in enumerate(self.pipes):
-            friction = line.friction if k < self.main else "unsteady"
+            friction, steady = line.friction, 8.0
+            if k >= self.main:
+                friction, steady = "unsteady", BRANCH_STEADY
             area, radius = 0.25 * np.pi * pipe.diameter**2, 0.5 * pipe.diameter
             inertance = line.density / area * pipe.wave_speed * self.dt
             rate = line.viscosity / radius**2
@@ -96,7 +99,7 @@ class Grid:
             rows.append(
                 (
                     line.density * pipe.wave_speed / area,
-                    0.0 if friction == "none" else 0.5 * inertance * 8.0 * rate,
+                    0.0 if friction == "none" else 0.5 * inertance * steady * rate,
                     0.5 * inertance * 4.0 * rate if friction == "unsteady" else 0.0,
                     soft,
                 )

@@ -61,7 +61,10 @@ class Element:
 
 @dataclass(frozen=True)
 class Branch:
-    """A `pipe` with its far end closed, at `position` (m); it has friction by Zielke's law."""
+    """A `pipe` with its far end closed, at `position` (m).
+
+    Its friction is the boundary layer to first order, Z' = (rho/A) s (1 + 2/r), r = R sqrt(s/nu).
+    """
 
     position: float
     pipe: Pipe
