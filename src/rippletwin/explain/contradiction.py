@@ -26,6 +26,7 @@ NOISELESS = 1e-20  # variance over power; single precision leaves 1e-14
 GROWTH = 0.25  # of the mean pressure: well above any sensor's gain error
 CHANGED = 0.15  # of the ripple, between parts or repeats of one state: more than drift by degrees
 TEMPERATURE = 0.005  # relative wave speed between repeats: two kelvin of oil
+POOR = 5.0 * GOOD  # model error that no explanation of sound data leaves
 PASSAGES = 3.0  # of the line that a wave makes before it has died away
 PLATEAU = 8.0  # times as many samples in the outermost 2 % of the range as in the next
 PLATEAU_SHARE = 0.03  # of all samples
@@ -161,11 +162,11 @@ def wiring(base_twin, observations: Sequence, search: Search) -> str:
 
     Each exchange of two sensors and each turned sign is undone and the paper's line fitted; it is
     believed where that is better, by the evidence an effect must add, than the best explanation of
-    the data as they are. Not asked where the search found a good fit: costs a few fits of the line.
+    the data as they are. Not asked where the search found a fair fit: it costs some fits.
     """
     count = len(base_twin.rig.sensors)
     pressures = all(o.kind != "input_impedance" for o in observations)
-    if search.best.floor <= GOOD or count < 2 or not pressures:
+    if search.best.floor <= POOR or count < 2 or not pressures:
         return ""
     tried = {}
     names = [s.name for s in base_twin.rig.sensors]

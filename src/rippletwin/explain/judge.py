@@ -75,18 +75,40 @@ def needed_over(best: Fit, search: Search) -> float:
 
 def equivalents(search: Search) -> tuple[tuple[str, ...], ...]:
     """Classes of effect names whose evidence is too close to the best explanation's."""
-    best = search.best
-    if best.hypothesis[-1][0].certain:
-        return ()  # known to be there; what could do its work besides is no rival
-    own = set(best.names)
-    rest = own - {best.names[-1]} if len(own) > 1 else set()
-    close = {best.names[-1]}
-    for fit in search.rivals:
-        if best.evidence - fit.evidence < EQUIVALENT and len(fit.names) == len(best.names):
-            different = set(fit.names) - rest
-            if len(different) == 1:
-                close |= different
+    close = {name for _, name in _newest(search)}
     return (tuple(sorted(close)),) if len(close) > 1 else ()
+
+
+def places(search: Search) -> tuple[tuple[str, ...], ...]:
+    """Classes of places at which the newest effect does alike, as of two sensors' gains of which
+    only the ratio is seen: "name at place" each. The effect has a name all the same."""
+    own = search.best.names[-1] if search.best.hypothesis else ""
+    close = {f"{own} at {fit.hypothesis[-1][1]}" for fit, name in _newest(search) if name == own}
+    return (tuple(sorted(close)),) if len(close) > 1 else ()
+
+
+def rivals(search: Search) -> list[Fit]:
+    """Fits as good as the best explanation that differ from it in their newest effect."""
+    return [fit for fit, _ in _newest(search) if fit.hypothesis != search.best.hypothesis]
+
+
+def _newest(search: Search) -> list[tuple[Fit, str]]:
+    """The best explanation and what is within EQUIVALENT of it, each with the effect that differs.
+
+    What no line is without is known to be there; what could do its work besides is no rival.
+    """
+    best = search.best
+    if not best.hypothesis or best.hypothesis[-1][0].certain:
+        return []
+    kept, found = set(best.hypothesis[:-1]), [(best, best.names[-1])]
+    for fit in search.rivals:
+        close = best.evidence - fit.evidence < EQUIVALENT
+        if not close or len(fit.names) != len(best.names) or fit.hypothesis == best.hypothesis:
+            continue
+        different = [effect.name for effect, place in fit.hypothesis if (effect, place) not in kept]
+        if len(different) == 1:
+            found.append((fit, different[0]))
+    return found
 
 
 def probabilities(search: Search, accepted: Fit) -> dict[str, float]:

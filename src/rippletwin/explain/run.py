@@ -10,7 +10,7 @@ import numpy as np
 from rippletwin.case import Case
 from rippletwin.effects import candidates
 from rippletwin.errors import InputError
-from rippletwin.explain import detect, locate
+from rippletwin.explain import contradiction, detect, locate
 from rippletwin.explain.fit import Fit, prepare
 from rippletwin.explain.judge import ADEQUATE, Judgement, judge
 from rippletwin.explain.search import GOOD, Search, Workers, extended, search, workers
@@ -71,7 +71,8 @@ def explain(
             late.append(second)
         else:
             observations.append(observe(recording, case.rig, HIGHEST_HZ))
-    return explain_observations(case.rig, observations, early, late, processes, progress)
+    reason = contradiction.find(case.rig, case.healthy, observations, early, late)
+    return explain_observations(case.rig, observations, early, late, processes, progress, reason)
 
 
 def explain_observations(
@@ -81,14 +82,23 @@ def explain_observations(
     late: Sequence = (),
     processes: int = 2,
     progress: Callable[[str, int, int], None] | None = None,
+    reason: str = "",
 ) -> Explanation:
-    """Explain observations; `early` and `late` are those of the two halves of periodic ones."""
+    """Explain observations; `early` and `late` are those of the two halves of periodic ones.
+
+    `reason` says why the data contradict themselves, where they do; then nothing is searched for.
+    """
     data = prepare(observations, rig, HIGHEST_HZ if observations[0].orders is not None else None)
     early, late = prepare(early, rig, HIGHEST_HZ), prepare(late, rig, HIGHEST_HZ)
     base = Twin(rig, data)
     with workers(base, data, processes) as pool:
-        found = search(pool, progress)
-        found.others = _others(pool, found)
+        if reason:
+            fit = pool.fit([{"hypothesis": ()}])[0]
+            found = Search(fit, [], fit)
+        else:
+            found = search(pool, progress)
+            found.others = _others(pool, found)
+            reason = contradiction.wiring(base, data, found)
         single = _alone(pool, found.base)
         alarms = detect.Alarms(
             found.base.floor,
@@ -100,7 +110,8 @@ def explain_observations(
         held = late if len(data) == 1 and late else None
         blind = locate.blind(pool, found)
         validation = validate(pool, found.base, explanation, held)
-    judgement = judge(found, alarms, validation if explanation.hypothesis else None)
+    checked = validation if explanation.hypothesis else None
+    judgement = judge(found, alarms, checked, reason)
     lines = shaft_lines(judgement.accepted.twin, observations, HIGHEST_HZ)
     return Explanation(
         rig, tuple(data), alarms, found, judgement, validation, tuple(single), lines, tuple(blind)

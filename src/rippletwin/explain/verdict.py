@@ -8,9 +8,20 @@ from pathlib import Path
 
 import numpy as np
 
-from rippletwin.explain import detect
-from rippletwin.explain.judge import intervals, join, probabilities, span
+from rippletwin.explain import detect, locate, next_recording
+from rippletwin.explain.describe import is_passive, missing
+from rippletwin.explain.judge import (
+    between,
+    intervals,
+    join,
+    places,
+    probabilities,
+    rivals,
+    span,
+)
 from rippletwin.explain.run import Explanation
+
+WIDE = 0.15  # of the line: a position less well known asks for one more sensor
 
 CHANCE = {
     "consistent": "The recordings are what the twin predicts within the data sheet's tolerances.",
@@ -59,6 +70,8 @@ def verdict(explanation: Explanation) -> dict:
         if kind in ("consistent", "calibration_only"):
             kind = "named"
         present = True
+    alike = places(e.search) if kind in ("named", "ambiguous") else ()
+    next_words = _next_recording(e, alike)
     result = {
         "verdict": kind,
         "mismatch": {
@@ -67,11 +80,13 @@ def verdict(explanation: Explanation) -> dict:
             "where": _where(e, found) if present else None,
         },
         "effects": effects,
-        "equivalents": [list(names) for names in judgement.equivalents],
-        "next_recording": None,
+        "equivalents": [list(names) for names in (*judgement.equivalents, *alike)],
+        "next_recording": next_words,
         "fit": _fit(e),
         "sentence": "",
     }
+    if kind == "unexplained" and found and not found[-1]["effect"].named:
+        result["stand_in"] = _stand_in(e, found[-1])
     result["sentence"] = sentence(e, result, found, base)
     return result
 
@@ -79,17 +94,55 @@ def verdict(explanation: Explanation) -> dict:
 def _where(e: Explanation, found: list[dict]) -> dict:
     base = e.search.base
     element, position = "line", [0.0, float(e.rig.length)]
+    located = locate.locate(base, e.observations)
     if not found and e.shaft is not None and e.shaft.name is not None:
         element, position = "source", [0.0, 0.0]
-    if found:
+    elif found:
         spans = [span(e.rig, f["effect"], f["place"], f["parameters"]) for f in found]
         element, position = spans[0]
-    return {
+    elif located is not None:
+        element, position = located.element, list(located.position)
+        if element == "position":
+            element = between(e.rig, *position)
+    where = {
         "element": element,
         "position_m": position,
         "bands_hz": detect.bands(base, e.observations),
         "crank_angle_deg": detect.crank_angles(base, e.observations),
         "conditions": detect.conditions(base, e.observations),
+    }
+    if located is not None:
+        where["one_element_free"] = located.gains
+    if e.blind:
+        where["source_informed_and_free"] = locate.side_by_side(e.search, e.blind)
+    return where
+
+
+def _next_recording(e: Explanation, alike: tuple) -> str | None:
+    """What to record to tell rivals apart, or to narrow where a nameless network sits."""
+    kind, accepted = e.judgement.verdict, e.judgement.accepted
+    if kind == "ambiguous" or alike:
+        proposal = next_recording.propose(accepted, rivals(e.search), e.observations)
+        return None if proposal is None else str(proposal)
+    if kind == "unexplained" and accepted.hypothesis:
+        effect, place = accepted.hypothesis[-1]
+        if effect.named:
+            return None
+        low, high = intervals(accepted)[-1]["parameters"]["position"]["ci95"]
+        if high - low > WIDE * e.rig.length:
+            proposal = next_recording.place_sensor(accepted, e.observations, place.form, low, high)
+            return None if proposal is None else str(proposal)
+    return None
+
+
+def _stand_in(e: Explanation, entry: dict) -> dict:
+    """The nameless network that the corrected twin has."""
+    found = missing(e.judgement.accepted, e.observations)
+    return {
+        "form": f"{entry['place'].form} one-port",
+        "passive": is_passive(e.judgement.accepted),
+        "parameters": entry["parameters"],
+        "follows": None if found is None else found.words,
     }
 
 
@@ -142,12 +195,19 @@ def sentence(e: Explanation, result: dict, found: list[dict], base) -> str:
             + (f"; it is seen at the {_place(e, found[0])}" if found else "")
             + "."
         ]
-        if found and not found[0]["effect"].named:
+        if "stand_in" in result:
             words.append(
-                f"A passive network there stands in for it: misfit on unseen data {before:.1%} to "
-                f"{after:.1%}."
+                f"A {result['stand_in']['form']}, {_passive(result)}, stands in for it: misfit on "
+                f"unseen data {before:.1%} to {after:.1%}. What is missing goes "
+                f"{result['stand_in']['follows']}."
             )
-    elif kind == "bad_data":
+    if kind in ("named", "ambiguous", "unexplained") and result["next_recording"]:
+        words.append(f"Next: {result['next_recording']}.")
+    if kind in ("named", "ambiguous") and found:
+        if places(e.search):
+            words.append("Its place cannot be told: see equivalents.")
+        words.append(_without_source(e))
+    if kind == "bad_data":
         words = [f"The data contradict themselves: {e.judgement.reason}."]
     if e.shaft is not None and e.shaft.name is not None:
         words.append(
@@ -163,6 +223,21 @@ def sentence(e: Explanation, result: dict, found: list[dict], base) -> str:
     if e.judgement.accepted.hypothesis and pulled[0] > detect.PULL:
         words.append(f"Check {pulled[1]}: {pulled[0]:.1f} standard deviations from the data sheet.")
     return " ".join(word for word in words if word)
+
+
+def _passive(result: dict) -> str:
+    return "passive" if result["stand_in"]["passive"] else "not passive"
+
+
+def _without_source(e: Explanation) -> str:
+    """What a fit that knows nothing of the source says of the accepted effects."""
+    label = " + ".join(f"{f.name}, {place}" for f, place in e.judgement.accepted.hypothesis)
+    for row in locate.side_by_side(e.search, e.blind):
+        if row["effects"] == label:
+            if row["source_free"] > 0.2 * row["informed"]:
+                return "It stands in a fit that is blind to the source too."
+            return "Blind to the source it is not seen: it acts at the pump or only there is known."
+    return ""
 
 
 def _place(e: Explanation, entry: dict) -> str:

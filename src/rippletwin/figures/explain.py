@@ -114,10 +114,12 @@ def residuals(e) -> Figure:
     return fig
 
 
-def evidence(e) -> Figure:
+def evidence(e) -> Figure | None:
     """Log evidence that each explanation adds to the base, with the threshold; beside it what
-    survives in a fit that is blind to the source."""
+    survives in a fit that is blind to the source. None where nothing was searched for."""
     search = e.search
+    if not search.singles:
+        return None
     shown = {_label(f): f for f in reversed(search.singles[:12])}
     if len(search.best.hypothesis) > 1:
         shown[_label(search.best)] = search.best
