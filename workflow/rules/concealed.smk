@@ -2,6 +2,7 @@
 import subprocess
 
 CONCEALED = f"{RESULTS}/concealed"
+TOOL = SOURCE / "concealed" / "tool.py"
 HIDDEN = [f"{n:03d}" for n in range(config["concealed"]["cases"])]
 
 
@@ -83,8 +84,9 @@ rule conceal:
 rule explain_concealed:
     input:
         case=rules.conceal.output.case,
-        source=library(SOURCE / "concealed" / "tool.py"),
-        jail=library(SOURCE / "concealed" / "jail.py"),
+        tool=os.path.relpath(TOOL),
+        jail=os.path.relpath(TOOL.with_name("jail.py")),
+        source=library(TOOL),
     output:
         verdict=f"{CONCEALED}/explained/{{hidden}}/verdict.json",
         baselines=f"{CONCEALED}/explained/{{hidden}}/baselines.json",
