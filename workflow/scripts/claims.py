@@ -20,8 +20,13 @@ compared.to_csv(paths.comparisons, index=False)
 Path(paths.page).write_text(claims.markdown(judged, compared))
 
 groups = {
-    claim: (
-        [f"{row.better} − {row.worse}, {row.dataset}" for row in rows.itertuples()],
+    claim.split(":")[0]: (
+        [
+            f"{row.dataset}: {row.better} − {row.worse}"
+            if claim != claims.CALIBRATION
+            else f"{row.better}: {row.dataset} − {row.worse}"
+            for row in rows.itertuples()
+        ],
         rows[["difference", "low", "high"]].to_numpy(),
     )
     for claim, rows in compared[compared.score == claims.EITHER].groupby("claim", sort=False)

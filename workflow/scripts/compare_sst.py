@@ -15,7 +15,7 @@ from rippletwin.imaging import SstSettings, amplitude_scale, image_axes, sst_ima
 from rippletwin.similarity import image_similarity
 
 WINDOWS = 8  # of each recording, two revolutions each
-PICTURE = 256  # pixels a side of what is drawn; numbers are those of the networks' images
+PICTURE = 128  # pixels a side of what is drawn; numbers are those of the networks' images
 NAMES = {"CFD-P": "uncalibrated", "CFD-MOC-P": "calibrated", "CFD-MOC-P+": "corrected"}
 
 tell = start(snakemake)
@@ -77,6 +77,15 @@ for state in states:
 table = pd.DataFrame(rows)
 table.to_csv(snakemake.output.table, index=False)
 frequency_hz, _ = image_axes(large, 2 / recorded.speed_hz)
-figure = diagnosis.sst(pictures, frequency_hz, recorded.speed_hz, pistons, 1 + len(simulated))
+amplitudes = {title: np.log(picture) / settings.k for title, picture in pictures.items()}
+figure = diagnosis.sst(
+    amplitudes,
+    frequency_hz,
+    recorded.speed_hz,
+    pistons,
+    columns=1 + len(simulated),
+    label="amplitude over the largest of the healthy recording",
+    top=1.0,
+)
 save(figure, snakemake.output.png, snakemake.output.svg)
 tell(", ".join(f"{title} {rows.similarity.mean():.2f}" for title, rows in table.groupby("source")))

@@ -121,7 +121,7 @@ def ranks(groups: Mapping[str, tuple[Sequence[str], np.ndarray, np.ndarray, np.n
     handles = {}
     for ax in axes.flat:
         handles |= {label: handle for handle, label in zip(*ax.get_legend_handles_labels())}
-    fig.legend(handles.values(), handles, loc="outside lower center", ncols=4, fontsize=7)
+    fig.legend(handles.values(), handles, loc="outside upper center", ncols=4, fontsize=7)
     return fig
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
 
 from rippletwin.figures import style
@@ -73,31 +74,34 @@ def sst(
     shaft_hz: float,
     pistons: int,
     columns: int = 4,
+    label: str = "image value",
+    top: float | None = None,
 ) -> Figure:
     """SST images side by side, `columns` a row: name -> (size, size), lowest frequency in the first
     row.
 
     frequency_hz (size,) is the (logarithmic) axis of the rows; ticks are multiples of the shaft
-    and the pumping frequency. Time runs over two revolutions.
+    and the pumping frequency. Time runs over two revolutions. `top` ends the colour scale, which is
+    then of square roots, so that weak ridges show beside strong ones.
     """
     columns = min(columns, len(images))
     rows = -(-len(images) // columns)
     fig, axes = style.figure(rows, columns, height=2.4, sharex=True, sharey=True)
     for ax in axes.flat[len(images) :]:
         ax.set_visible(False)
-    top = max(float(np.max(image)) for image in images.values())
     low = min(float(np.min(image)) for image in images.values())
+    norm = PowerNorm(0.5 if top else 1, low, top or max(np.max(image) for image in images.values()))
     log_axis = np.log(frequency_hz)
     for ax, (name, image) in zip(axes.flat, images.items()):
         mesh = ax.imshow(
-            image, origin="lower", aspect="auto", cmap=style.SEQUENTIAL, vmin=low, vmax=top,
+            image, origin="lower", aspect="auto", cmap=style.SEQUENTIAL, norm=norm,
             extent=(0, 2, log_axis[0], log_axis[-1]),
         )  # fmt: skip
         ax.set_title(name)
         order_ticks(ax, frequency_hz, shaft_hz, pistons)
     fig.supxlabel("revolutions", fontsize=9)
     fig.supylabel(ORDERS, fontsize=9)
-    fig.colorbar(mesh, ax=axes, label="image value", shrink=0.8)
+    fig.colorbar(mesh, ax=axes, label=label, shrink=0.8, extend="max" if top else "neither")
     return fig
 
 
