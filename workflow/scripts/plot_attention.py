@@ -30,12 +30,15 @@ called = [
     [f"called {name}: {share:.0%}" for name, share in zip(cell.called.values, cell.called_share)]
     for cell in cells
 ]
-aligned = [
-    [""]
-    + [
-        f"{share:.0%} on the fault's {region:.0%}"
-        for share, region in zip(cell.attended[0].values, cell.region.values)
-    ]
+
+
+def aligned(share, region):
+    """Title of a simulated fault's panel."""
+    return "no attention" if np.isnan(share) else f"{share:.0%} on the fault's {region:.0%}"
+
+
+shares = [
+    ["", *(aligned(*both) for both in zip(cell.attended[0].values, cell.region.values))]
     for cell in cells
 ]
 
@@ -54,6 +57,6 @@ def draw(states, variable, titles, region=None):
     return attention.windows(networks, states, signal / scale, heat, titles, label, region)
 
 
-save(draw(simulated, "simulated", aligned, regions), output.simulated, output.simulated_svg)
+save(draw(simulated, "simulated", shares, regions), output.simulated, output.simulated_svg)
 save(draw(recorded, "recorded", called), output.recorded, output.recorded_svg)
 tell(f"{len(networks)} networks")

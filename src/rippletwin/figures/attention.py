@@ -45,7 +45,8 @@ def windows(
         )  # fmt: skip
         ax.plot(angle, ripple[row], color="white", lw=0.6, path_effects=_SEEN)
         if region is not None:
-            ax.fill_between(angle, -reach, -0.87 * reach, where=region[row], step="mid", **_BAR)
+            stretches = _stretches(region[row], 0, 360 / len(angle))
+            ax.broken_barh(stretches, (-reach, 0.13 * reach), **_BAR)
         ax.set_title(titles[network][row], fontsize=7)
         ax.set(xlim=(0, 360), ylim=(-reach, reach), xticks=(0, 120, 240, 360))
     fig.supxlabel("crank angle / degrees", fontsize=9)
@@ -73,21 +74,24 @@ def images(
     """
     fig, axes = _panels(networks, states, height=1.7)
     rows = np.log(frequency_hz)
+    pixel = (rows[-1] - rows[0]) / (len(rows) - 1)
+    bottom, top = rows[0] - pixel / 2, rows[-1] + pixel / 2
     times = (np.arange(pictures.shape[-1]) + 0.5) * 2 / pictures.shape[-1]
     low, high = pictures.min(), pictures.max()
     for ax, network, row in _each(axes):
         mesh = ax.imshow(
-            heat[network, row], origin="lower", extent=(0, 2, rows[0], rows[-1]), aspect="auto",
+            heat[network, row], origin="lower", extent=(0, 2, bottom, top), aspect="auto",
             cmap=_colours(), vmin=0, vmax=TOP,
         )  # fmt: skip
         levels = low + (high - low) * np.array([0.08, 0.25, 0.6])
         ax.contour(times, rows, pictures[row], levels, colors="white", linewidths=(0.4, 0.7, 1.0))
         if region is not None:
-            ax.fill_betweenx(rows, 0, 0.12, where=region[row], step="mid", **_BAR)
+            for start, height in _stretches(region[row], bottom, pixel):
+                ax.barh(start, 0.12, height, align="edge", **_BAR)
         ax.set_title(titles[network][row], fontsize=7)
         order_ticks(ax, frequency_hz, shaft_hz, pistons)
         ax.tick_params(labelsize=6)
-        ax.set(xlim=(0, 2), ylim=(rows[0], rows[-1]), xticks=(0, 1, 2))
+        ax.set(xlim=(0, 2), ylim=(bottom, top), xticks=(0, 1, 2))
     fig.supxlabel("revolutions", fontsize=9)
     fig.supylabel(ORDERS, fontsize=9)
     _key(fig, axes, mesh)
@@ -165,6 +169,12 @@ def _panels(networks: Sequence[str], states: Sequence[str], height: float):
 
 def _each(axes: np.ndarray):
     return ((ax, network, row) for (row, network), ax in np.ndenumerate(axes))
+
+
+def _stretches(inside: np.ndarray, origin: float, step: float) -> list[tuple[float, float]]:
+    """(start, length) of each run of True, the first element reaching from origin to a step on."""
+    edges = np.flatnonzero(np.diff(np.pad(inside.astype(int), 1)))
+    return [(origin + a * step, (b - a) * step) for a, b in zip(edges[::2], edges[1::2])]
 
 
 def _colours():
