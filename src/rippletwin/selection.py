@@ -154,8 +154,9 @@ def answer(ranks: pd.DataFrame) -> str:
     if judged.empty:
         return "Too few networks, or no order among their accuracies: no rank correlation to judge."
     with_it, better = judged.rho > 0, judged.chosen_accuracy > judged["mean"]
+    sure = with_it & (judged.p < 0.05)
     return (
         f"Of {len(judged)} rankings of networks by alignment, {with_it.sum()} go with accuracy "
-        f"more than against it, {(with_it & (judged.p < 0.05)).sum()} of them beyond chance (p < 0.05); "
+        f"more than against it, {sure.sum()} of them beyond chance (p < 0.05); "
         f"choosing by alignment beats the mean network in {better.sum()} of them."
     )
