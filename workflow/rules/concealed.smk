@@ -130,7 +130,7 @@ rule score_concealed:
     input:
         commitments=rules.commit_verdicts.output,
         seals=expand(rules.conceal.output.seal, hidden=HIDDEN),
-        keys=expand(rules.conceal.output.key, hidden=HIDDEN),
+        seal_keys=expand(rules.conceal.output.key, hidden=HIDDEN),
         verdicts=expand(rules.explain_concealed.output.verdict, hidden=HIDDEN),
         baselines=expand(rules.explain_concealed.output.baselines, hidden=HIDDEN),
         source=library("score_concealed.py"),

@@ -23,7 +23,7 @@ def read(path: str) -> dict:
 
 rows = []
 for case, (seal, key, verdict, baselines) in enumerate(
-    zip(paths.seals, paths.keys, paths.verdicts, paths.baselines, strict=True)
+    zip(paths.seals, paths.seal_keys, paths.verdicts, paths.baselines, strict=True)
 ):
     truth = open_seal(read(seal), Path(key).read_bytes())
     rows.append({"case": case} | score(truth, read(verdict), read(baselines)))
