@@ -132,7 +132,8 @@ def ranks(groups: Mapping[str, tuple[Sequence[str], np.ndarray, np.ndarray, np.n
 def claims(groups: Mapping[str, tuple[Sequence[str], np.ndarray]]) -> Figure:
     """Differences that claims predict to be positive: claim -> labels, (n, 3) difference, ends of
     its 95 % interval (NaN where unknown), per cent of the windows."""
-    counts = [len(labels) for labels, _ in groups.values()]
+    groups = groups or {"nothing to compare": ([], np.empty((0, 3)))}
+    counts = [max(1, len(labels)) for labels, _ in groups.values()]
     fig = Figure(figsize=(style.COLUMN, 1.2 + 0.17 * sum(counts) + 0.35 * len(counts)))
     axes = fig.subplots(len(groups), 1, squeeze=False, sharex=True, height_ratios=counts)[:, 0]
     for ax, (claim, (labels, values)) in zip(axes, groups.items()):
@@ -148,7 +149,7 @@ def claims(groups: Mapping[str, tuple[Sequence[str], np.ndarray]]) -> Figure:
         ax.axvline(0, color="black", lw=0.8)
         ax.set_title(claim, loc="left")
         ax.set_yticks(rows, labels, fontsize=6)
-        ax.set_ylim(len(rows) - 0.5, -0.5)
+        ax.set_ylim(max(1, len(rows)) - 0.5, -0.5)
     axes[-1].set_xlabel("difference of accuracy / % of the windows, 95 % interval over seeds")
     handles, names = axes[0].get_legend_handles_labels()
     fig.legend(handles, names, loc="outside upper right", ncols=3)
