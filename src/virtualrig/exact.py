@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ive
 
-from virtualrig.conceal import NUMERICS, SETTLED, driving
+from virtualrig.conceal import NUMERICS, REFINE, SETTLED, driving
 from virtualrig.draw import HIGHEST_HZ, Drawn, draw
 from virtualrig.orbit import Bench, Orbit
 from virtualrig.rig import Rig, build
@@ -19,7 +19,7 @@ ALLOWED = 0.1
 """Of the noise: the largest error at any sensor, rms below HIGHEST_HZ."""
 
 SMALL = 1e-3
-FINER = {"frequency": 10000.0, "points": 10.0, "modes": 14}
+FINER = {"frequency": 8000.0, "points": 9.0, "modes": 14}
 
 
 @dataclass(frozen=True)
@@ -57,11 +57,12 @@ def against_matrices(drawn: Drawn, friction: str) -> Check:
     small = flow.mean() + SMALL * (flow - flow.mean())
     valve = flow.mean() / np.sqrt(point.load_pressure)
     noise = rig.noise
-    orbit = Bench(rig, flow=small).settle(
+    orbit = Bench(rig, flow=small, refine=REFINE).settle(
         point.speed_rpm, point.load_pressure, valve, SMALL * SETTLED * noise
     )
     orders = _orders(point.speed_rpm)
-    drive = 2 * np.fft.rfft(small)[orders] / len(small)
+    # harmonics of the straight lines that the bench draws between the samples
+    drive = 2 * np.fft.rfft(small)[orders] / len(small) * np.sinc(orders / len(small)) ** 2
     truth = transfer_matrix(rig, drive, orders * point.speed_rpm / 60, orbit, friction)
     error = _rms(_harmonics(orbit, orders) - truth) / SMALL
     return Check(f"exact solution, {friction} friction", float(error.max()), ALLOWED * noise)
@@ -106,9 +107,9 @@ def against_finer(drawn: Drawn) -> Check:
     """A drawn rig, whatever it conceals, at full ripple on a finer mesh and with smaller steps."""
     point, orders = drawn.points[0], _orders(drawn.points[0].speed_rpm)
     found = []
-    for numerics in (NUMERICS, FINER):
+    for numerics, refine in ((NUMERICS, REFINE), (FINER, 2 * REFINE)):
         rig = build(drawn.sheet, drawn.seal | {"numerics": numerics})
-        orbit = Bench(rig, flow=driving(rig, point)).settle(
+        orbit = Bench(rig, flow=driving(rig, point), refine=refine).settle(
             point.speed_rpm, point.load_pressure, tolerance=SETTLED * rig.noise
         )
         found.append(_harmonics(orbit, orders))

@@ -43,17 +43,18 @@ def record(
     rng: np.random.Generator,
     flow: Callable[[float], np.ndarray] | None = None,
     tolerance: float = 20.0,
+    refine: int = 1,
 ) -> Take:
     """One recording of `rig` at `point`. Its first sample falls at a random crank angle.
 
-    `flow` and `tolerance` as in `Bench` and `Bench.settle`.
+    `flow`, `refine` and `tolerance` as in `Bench` and `Bench.settle`.
     """
     set_speed = point.speed_rpm * (1 + rig.speed_error * rng.standard_normal())
     set_pressure = point.load_pressure * (1 + rig.load_pressure_error * rng.standard_normal())
     count = round(point.seconds * SAMPLING_RATE_HZ)
     speed = set_speed * (1 + wander(count, rig.wander, rig.correlation_s, rng))
     turns = rng.uniform() + np.concatenate([[0.0], np.cumsum(speed[:-1])]) / 60 / SAMPLING_RATE_HZ
-    orbits = family(Bench(rig, point.faults, flow), speed, set_pressure, tolerance)
+    orbits = family(Bench(rig, point.faults, flow, refine), speed, set_pressure, tolerance)
     pressure = follow(orbits, rig.sensing, speed, turns)
     pressure += rig.noise * rng.standard_normal(pressure.shape)
     return Take(pressure, turns, orbits[len(orbits) // 2])
