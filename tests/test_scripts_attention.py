@@ -10,7 +10,7 @@ from rippletwin import store
 from rippletwin.networks import CLASSES, build
 from run_script import run_script
 
-POINTS = 768
+POINTS = 3072
 NETWORKS = ("cnn1d_341_100", "cnn1d_150_50", "cnn1d_3_1")
 
 
