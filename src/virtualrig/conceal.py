@@ -24,8 +24,8 @@ from virtualrig.source import constant_pressure_flow
 NUMERICS = {"frequency": 7000.0, "points": 8.0, "modes": 10}
 REFINE = 2
 """Of a drawn rig: wrong by less than a tenth of its noise, as `virtualrig.exact` checks before any
-case is drawn. Ripples are stronger and noise is weaker here than on the built-in rig; the stable time
-step is what is wrong most, hence half of it."""
+case is drawn. Ripples are stronger and noise is weaker here than on the built-in rig; the stable
+time step is what is wrong most, hence half of it."""
 
 SETTLED = 0.01
 """Pressures are periodic when they change by less than this share of the noise in a revolution."""
