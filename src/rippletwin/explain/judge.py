@@ -58,7 +58,9 @@ def judge(
         calibrated = {"pull", "disagreement"} & set(alarms.ringing)
         return Judgement("calibration_only" if calibrated else "consistent", best)
     if best.floor > ADEQUATE or (validation is not None and not validation.holds):
-        return Judgement("unexplained", best)
+        # Without a name it is modelled all the same, by whatever describes the data best.
+        stands_in = other is not None and other.evidence > best.evidence
+        return Judgement("unexplained", other if stands_in else best)
     classes = equivalents(search)
     return Judgement("ambiguous" if classes else "named", best, classes)
 
