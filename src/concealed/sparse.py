@@ -49,11 +49,11 @@ def pick(base, candidates, observations) -> dict | None:
 def _atoms(base, effect, place, likelihood, residual):
     """Changes of the residual, one a combination of the effect's scanned parameters."""
     twin = base.twin.with_(effects=((effect, place),))
-    count = len(base.twin.theta)
     other = Likelihood(twin, likelihood.observations)
     other.floor, other.source_sd = likelihood.floor, likelihood.source_sd
     scans = [
-        p.scan if len(p.scan) > 1 else (LITTLE[p.prior.kind],) for p in twin.parameters[count:]
+        p.scan if len(p.scan) > 1 else (LITTLE[p.prior.kind],)
+        for p in effect.parameters(base.twin.rig, place)
     ]
     for values in product(*scans):
         moved = other.residual(np.concatenate([base.twin.theta, values]))

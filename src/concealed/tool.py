@@ -30,11 +30,12 @@ def main(case_folder: str, out: str, processes: int = 1) -> None:
     try:
         explanation = explain(load_case(case_folder, states={"healthy"}), processes)
         write(explanation, out)
-        seconds, found = time.perf_counter() - started, baselines(explanation)
+        seconds = time.perf_counter() - started
     except Exception as error:  # whatever it is: one case must not end the trial
         traceback.print_exc()
         (out / "verdict.json").write_text(json.dumps(crash(error)))
-        seconds, found = time.perf_counter() - started, NOTHING
+        seconds, explanation = time.perf_counter() - started, None
+    found = NOTHING if explanation is None else baselines(explanation)
     (out / "baselines.json").write_text(json.dumps(found | {"seconds": seconds}, indent=1) + "\n")
 
 
