@@ -15,8 +15,8 @@ from itertools import combinations
 
 import numpy as np
 
-from rippletwin.explain.detect import SIGNIFICANCE, difference, drift
-from rippletwin.explain.fit import fit_hypothesis, select
+from rippletwin.explain.detect import SIGNIFICANCE, common, difference, drift
+from rippletwin.explain.fit import fit_hypothesis
 from rippletwin.explain.search import ACCEPT, GOOD, Search
 
 DEAD = 3e-3  # of the other sensors' ripple: no node of a line is as deep at every harmonic
@@ -119,6 +119,7 @@ def two_states(early, late, delay: float) -> str:
     """Halves of one recording that differ by far more than noise."""
     if early.orders is None or drift([early], [late], delay)[0] > SIGNIFICANCE:
         return ""
+    early, late = common(early, late)
     relative = _relative(*difference(early, late, delay), early)
     if relative < CHANGED:
         return ""
@@ -137,9 +138,7 @@ def incompatible(observations: Sequence, delay: float) -> str:
         x, y = periodic[a], periodic[b]
         if abs(x.speed_hz / y.speed_hz - 1) > 0.005 or not _near(x.load_pressure, y.load_pressure):
             continue
-        x, y = _common(x, y)
-        if x.values.shape != y.values.shape:
-            continue
+        x, y = common(x, y)
         phase = 2 * np.pi * x.frequency_hz * PASSAGES * delay * TEMPERATURE
         gap, variance = difference(x, y, delay)
         power = np.sum(np.abs(x.values) ** 2, axis=0)
@@ -227,9 +226,3 @@ def _relative(gap: np.ndarray, variance: np.ndarray, o) -> float:
 
 def _near(a: float | None, b: float | None) -> bool:
     return a == b or (a is not None and b is not None and abs(a / b - 1) < 0.01)
-
-
-def _common(a, b) -> tuple:
-    """Both observations at the orders they share."""
-    shared = np.intersect1d(a.orders, b.orders)
-    return select(a, np.isin(a.orders, shared)), select(b, np.isin(b.orders, shared))

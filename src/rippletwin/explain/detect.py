@@ -16,7 +16,7 @@ from scipy.stats import chi2
 
 from rippletwin.explain import residuals
 from rippletwin.explain.describe import posterior_of
-from rippletwin.explain.fit import Fit
+from rippletwin.explain.fit import Fit, select
 from rippletwin.explain.posterior import FLOOR, Posterior
 
 MISFIT = 3.0 * FLOOR  # relative model error above which a fit is bad
@@ -93,11 +93,20 @@ def drift(early: Sequence, late: Sequence, delay: float) -> tuple[float, str]:
     for a, b in zip(early, late):
         if a.orders is None:
             continue
+        a, b = common(a, b)
         gap, variance = difference(a, b, delay)
         statistic = 2.0 * np.sum(np.abs(gap) ** 2 / variance)
         p = chi2.sf(statistic, 2 * a.values.size - 1)
         worst = min(worst, (min(1.0, float(p) * len(early)), a.label))
     return worst
+
+
+def common(a, b) -> tuple:
+    """Two periodic observations at the orders that both have."""
+    return tuple(
+        select(x, np.isin(np.asarray(x.orders), np.asarray(other.orders)))
+        for x, other in ((a, b), (b, a))
+    )
 
 
 def difference(a, b, delay: float) -> tuple[np.ndarray, np.ndarray]:
