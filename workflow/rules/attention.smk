@@ -1,22 +1,4 @@
 # Trained networks -> what they look at, whether that tells which to choose, the paper's claims.
-def probes_of(wildcards):
-    """Simulated states without noise, as a network takes them."""
-    if domain_of(wildcards.architecture) == "image":
-        return f"{RESULTS}/images/{wildcards.dataset}/probe.zarr"
-    return f"{RESULTS}/samples/{wildcards.dataset}/probex1.zarr"
-
-
-def of_domain(domain):
-    """The configured networks on time windows, or on images."""
-    return [name for name in config["architectures"] if domain_of(name) == domain]
-
-
-def pressures():
-    """The simulated pressures to hold against the recorded one, from worst to best."""
-    known = ["CFD-P", "CFD-MOC-P", "CFD-MOC-P+"]
-    return [dataset for dataset in known if dataset in config["datasets"]]
-
-
 rule probe:
     input:
         signals=f"{RESULTS}/seeds/{{dataset}}.zarr",
@@ -218,21 +200,3 @@ rule compare_sst:
         sst=config["sst"],
     script:
         "../scripts/compare_sst.py"
-
-
-def attention_targets():
-    """What a whole run makes of this stage with the configured datasets and networks."""
-    wanted = [rules.claims.output]
-    if simulated():
-        wanted += [
-            rules.attention_table.output,
-            rules.plot_ranks.output,
-            expand(
-                rules.plot_attention.output,
-                dataset=simulated(),
-                domain=[name for name in ("time", "image") if of_domain(name)],
-            ),
-        ]
-    if pressures():
-        wanted.append(rules.compare_sst.output)
-    return wanted

@@ -192,6 +192,71 @@ def urgency_of(wildcards):
     return 20 - SLOWEST.index(architecture) if architecture in SLOWEST else 10
 
 
+# ---- attention -------------------------------------------------------------------------------
+
+
+def probes_of(wildcards):
+    """Simulated states without noise, as a network takes them."""
+    if domain_of(wildcards.architecture) == "image":
+        return f"{RESULTS}/images/{wildcards.dataset}/probe.zarr"
+    return f"{RESULTS}/samples/{wildcards.dataset}/probex1.zarr"
+
+
+def of_domain(domain):
+    """The configured networks on time windows, or on images."""
+    return [name for name in config["architectures"] if domain_of(name) == domain]
+
+
+def pressures():
+    """The simulated pressures to hold against the recorded one, from worst to best."""
+    known = ["CFD-P", "CFD-MOC-P", "CFD-MOC-P+"]
+    return [dataset for dataset in known if dataset in config["datasets"]]
+
+
+def attention_targets():
+    """What a whole run makes of this stage with the configured datasets and networks."""
+    wanted = [rules.claims.output]
+    if simulated():
+        wanted += [
+            rules.attention_table.output,
+            rules.plot_ranks.output,
+            expand(
+                rules.plot_attention.output,
+                dataset=simulated(),
+                domain=[name for name in ("time", "image") if of_domain(name)],
+            ),
+        ]
+    if pressures():
+        wanted.append(rules.compare_sst.output)
+    return wanted
+
+
+# ---- concealed cases --------------------------------------------------------------------------
+
+
+def git(*arguments):
+    """What git says of the tool that is tried."""
+    command = ["git", "-C", str(ROOT), *arguments]
+    try:
+        return subprocess.run(
+            command, check=True, capture_output=True, text=True
+        ).stdout.strip()
+    except (OSError, subprocess.CalledProcessError) as error:
+        raise WorkflowError(
+            "concealed: its cases follow from the tool's commit; run it in a git checkout"
+        ) from error
+
+
+def tool_commit(wildcards):
+    """Hash of the tool's source in the commit: nobody can pick the cases that follow from it."""
+    return git("rev-parse", "HEAD:src/rippletwin")
+
+
+def not_committed(wildcards):
+    """Whether the tool that runs differs from that commit, which the page then says."""
+    return git("status", "--porcelain", "src/rippletwin") != ""
+
+
 # ---- what a script imports ------------------------------------------------------------------
 
 

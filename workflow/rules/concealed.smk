@@ -1,32 +1,7 @@
 # How often `explain` is right when the effect is hidden: snakemake --cores 2 concealed
-import subprocess
-
 CONCEALED = f"{RESULTS}/concealed"
 TOOL = SOURCE / "concealed" / "tool.py"
 HIDDEN = [f"{n:03d}" for n in range(config["concealed"]["cases"])]
-
-
-def git(*arguments):
-    """What git says of the tool that is tried."""
-    command = ["git", "-C", str(ROOT), *arguments]
-    try:
-        return subprocess.run(
-            command, check=True, capture_output=True, text=True
-        ).stdout.strip()
-    except (OSError, subprocess.CalledProcessError) as error:
-        raise WorkflowError(
-            "concealed: its cases follow from the tool's commit; run it in a git checkout"
-        ) from error
-
-
-def tool_commit(wildcards):
-    """Hash of the tool's source in the commit: nobody can pick the cases that follow from it."""
-    return git("rev-parse", "HEAD:src/rippletwin")
-
-
-def not_committed(wildcards):
-    """Whether the tool that runs differs from that commit, which the page then says."""
-    return git("status", "--porcelain", "src/rippletwin") != ""
 
 
 wildcard_constraints:
