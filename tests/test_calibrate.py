@@ -13,6 +13,7 @@ from rippletwin.calibrate import calibrate
 from rippletwin.case import Load
 from rippletwin.forward import flow_harmonics
 from rippletwin.line import moc
+from rippletwin.line.parts import End, Line, Pipe
 from rippletwin.pareto import calibrate_pareto
 from rippletwin.twin import Twin
 from twin_made import (
@@ -84,20 +85,17 @@ def test_a_recording_made_by_the_method_of_characteristics():
     turn = np.exp(2j * np.pi * np.outer(k, np.arange(768) / 768))  # one piston's turn
     flow = (flow_harmonics(o.flow_ripple, 9 * k) @ turn).real
     mean = float(np.mean(flow))
-    pipes = [moc.Pipe(s.length, s.diameter, s.wave_speed) for s in true_line]
-    end = moc.End("orifice", coefficient=mean / np.sqrt(o.load_pressure))
-    transient = moc.simulate(
-        pipes,
+    line = Line(
+        [Pipe(s.length, s.diameter, s.wave_speed) for s in true_line],
         flow,
         1.0 / (9 * o.speed_hz),
-        end,
+        End("orifice", coefficient=mean / np.sqrt(o.load_pressure)),
         density=870.0,
         viscosity=3.2e-5,
         friction="steady",
         positions=[s.position for s in rig.sensors],
-        periods=120,
-        tolerance=1e-5,
     )
+    transient = moc.simulate(line, periods=120, tolerance=1e-5)
     values = transient.harmonics(o.orders // 9)
     data = [noisy(o, values, 8.0, np.random.default_rng(0))]
     result = calibrate(Twin(rig, data), data)
