@@ -169,7 +169,7 @@ def test_log_likelihood_is_that_of_the_whole_covariance_matrix():
     kernel = (1 + np.outer(f, f) / 1e6) * np.exp(-0.5 * np.subtract.outer(f, f) ** 2 / 1e6)
     kernel += 1.0
     kernel *= 0.5 + 0.5 * (recording[:, None] == recording)
-    source = 0.03**2 * np.eye(len(f)) + 0.1**2 * kernel + 0.05**2
+    source = 0.03**2 * np.eye(len(f)) + 0.1**2 * kernel
     scale = [source_scale(posterior.forward.source[part]) for part in posterior.forward.slices]
     h = (prediction * np.concatenate(scale)).ravel()
     sensors = len(prediction)

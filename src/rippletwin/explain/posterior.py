@@ -3,7 +3,7 @@
 The model of the errors is noise with a covariance C, a relative model error delta common to all
 sensors, and the error of a nominal source, relative and along the prediction h, in two parts:
 
-    E[e e^H] = C + (delta^2 m + lambda^2 n) I + (sigma^2 I + tau^2 K + zeta^2) o g h (g h)^H
+    E[e e^H] = C + (delta^2 m + lambda^2 n) I + (sigma^2 I + tau^2 K) o g h (g h)^H
 
 sigma is the part that differs from harmonic to harmonic, tau the part that is smooth in frequency,
 as a wrong bulk modulus or port timing makes it. Between frequencies f and f' of recordings o and p
@@ -14,8 +14,7 @@ a part is the same at all frequencies, for the ripple's size may be wrong, a par
 frequency, for an error of timing is one of phase, and half of both is common to all operating
 points, for it is the same pump that is modelled wrongly. A smooth error is what an effect
 at the pump, friction or a hose may look like; without it their standard deviations would be several
-times too small, and an effect at the pump would be named where only the ripple is wrong. zeta is
-the ripple's size as a whole, which the line's bore and the load would otherwise be bent to.
+times too small, and an effect at the pump would be named where only the ripple is wrong.
 
 g >= 1 is the size of the nominal ripple about a harmonic over that of the harmonic itself: where
 two parts of the ripple cancel, or 40 dB below the strongest harmonic, a few per cent of the parts
@@ -45,7 +44,6 @@ FLOORS = np.geomspace(FLOOR, 1.5, 9)
 SOURCE_SDS = np.array([0.003, 0.01, 0.03, 0.1])
 """sigma is one of these, the last being the largest that is put down to the ripple."""
 SMOOTH_SDS = np.array([0.01, 0.03, 0.1])  # the same for tau
-SIZE_SD = 0.05  # zeta
 CORRELATION_HZ = 1000.0  # l and f0
 LEAST = 0.01  # of the strongest harmonic: smaller ones are uncertain by more than their own share
 PRODUCTS = 0.2  # lambda
@@ -92,8 +90,9 @@ class Posterior:
         for o, part in zip(data, self.forward.slices):
             if o.source == "nominal":
                 self._scale[part] = source_scale(self.forward.source[part])
-        smooth = smooth_basis(self.forward.frequency_hz[nominal], self.forward.recording[nominal])
-        self._basis = self._scale[nominal] * np.vstack([smooth, np.ones(np.sum(nominal))])
+        self._basis = self._scale[nominal] * smooth_basis(
+            self.forward.frequency_hz[nominal], self.forward.recording[nominal]
+        )
         self.count = 2 * (self.values.size - int(np.sum(self._free)))
         self._pressures = all(o.kind != "input_impedance" for o in data)
 
@@ -121,10 +120,6 @@ class Posterior:
         metric = self._metric(prediction[(0,) * (prediction.ndim - 2)])
         return metric.apply(self._rotated - self._rotate(prediction)), metric.log_determinant
 
-    def _spreads(self, smooth_sd: float) -> np.ndarray:
-        """Standard deviations (J,) of the coefficients of the smooth error and of the size."""
-        return np.append(np.full(len(self._basis) - 1, smooth_sd), SIZE_SD if smooth_sd else 0.0)
-
     def _metric(self, prediction: np.ndarray) -> Metric:
         """Whitening by the covariance that a prediction (S, F) implies."""
         sd = np.sqrt(self._variances + self._products + self.floor**2 * self.power)
@@ -133,7 +128,7 @@ class Posterior:
             sd,
             np.where(self._known, 0.0, np.where(self._free, np.inf, self.source_sd * self._scale)),
             self._nominal,
-            self._spreads(self.smooth_sd)[:, None] * self._basis,
+            self.smooth_sd * self._basis,
         )
 
     def estimate_errors(self, prediction: np.ndarray, theta: np.ndarray) -> None:
@@ -174,13 +169,12 @@ class Posterior:
                     optimize=["einsum_path", (0, 1), (0, 1)],
                 )  # fmt: skip
                 share = (cross[:, self._nominal] * gain) @ self._basis.T  # (G, D, J)
-                spread = np.stack([self._spreads(tau) for tau in taus])[
-                    :, None, None
-                ]  # (T, 1, 1, J)
-                grown = spread[..., None] * gram * spread[..., None, :]
-                root = np.linalg.cholesky(np.eye(len(self._basis)) + grown)
-                both = np.stack([share.real, share.imag], axis=-1) * spread[..., None]
-                cost -= scale * np.sum(np.linalg.solve(root, both) ** 2, axis=(-2, -1))
+                root = np.linalg.cholesky(
+                    np.eye(len(self._basis)) + taus[:, None, None, None, None] ** 2 * gram
+                )
+                both = np.stack([share.real, share.imag], axis=-1)
+                solved = np.linalg.solve(root, np.broadcast_to(both, (len(taus), *both.shape)))
+                cost -= scale * taus[:, None, None] ** 2 * np.sum(solved**2, axis=(-2, -1))
                 cost += 2 * np.sum(np.log(np.diagonal(root, axis1=-2, axis2=-1)), axis=-1)
             smooth, source, best = np.unravel_index(np.argmin(cost), cost.shape)
             self.floor = float(floors[best])
@@ -214,8 +208,8 @@ class Posterior:
         """Most likely source (F,) relative to the prediction's, given whitened residuals."""
         pull = np.sum(np.conj(self._rotate(prediction)) * metric.adjoint(whitened), axis=0)
         error = (self.source_sd * self._scale) ** 2 * pull
-        share = self._spreads(self.smooth_sd) ** 2 * (self._basis @ pull[self._nominal])
-        error[self._nominal] += self._basis.T @ share
+        smooth = self._basis.T @ (self._basis @ pull[self._nominal])
+        error[self._nominal] += self.smooth_sd**2 * smooth
         return np.where(
             self._free, self._amplitude(prediction), 1.0 + np.where(self._known, 0.0, error)
         )
