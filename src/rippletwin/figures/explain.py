@@ -127,7 +127,8 @@ def evidence(e) -> Figure | None:
         shown["no name: " + _label(search.others[0])] = search.others[0]
     gains = [search.gain(f) for f in shown.values()]
     places = np.arange(len(shown))
-    fig, axes = style.figure(1, 1, height=0.9 + 0.24 * len(shown))
+    lines = sum(1 + name.count(" + ") for name in shown)
+    fig, axes = style.figure(1, 1, height=0.9 + 0.24 * lines)
     ax = axes[0, 0]
     colours = [style.CORRECTED if g > ACCEPT else style.NEUTRAL for g in gains]
     ax.barh(places, gains, color=colours, height=0.6, label="source as stated")
@@ -142,7 +143,8 @@ def evidence(e) -> Figure | None:
     ticks = [t for t in (-1000, -100, -10, 0, 10, 100, 1000, 10000) if _within(t, gains, unseen)]
     ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
     ax.minorticks_off()
-    ax.set_yticks(places, list(shown))
+    # One effect a line: three in a row leave no room for the bars.
+    ax.set_yticks(places, [name.replace(" + ", "\n+ ") for name in shown])
     ax.set_xlabel("log evidence over the calibrated line")
     fig.legend(loc="outside upper right", ncols=3)
     return fig
