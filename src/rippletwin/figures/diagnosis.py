@@ -97,7 +97,7 @@ def sst(
             image, origin="lower", aspect="auto", cmap=style.SEQUENTIAL, norm=norm,
             extent=(0, 2, log_axis[0], log_axis[-1]),
         )  # fmt: skip
-        ax.set_title(name)
+        ax.set_title(name, fontsize=7)
         order_ticks(ax, frequency_hz, shaft_hz, pistons)
     fig.supxlabel("revolutions", fontsize=9)
     fig.supylabel(ORDERS, fontsize=9)
