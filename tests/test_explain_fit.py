@@ -9,7 +9,7 @@ from explain_made import POINTS, make
 from rippletwin.effects import EFFECTS, Place
 from rippletwin.explain.detect import drift, interior_test, pull
 from rippletwin.explain.fit import fit_hypothesis, refine
-from rippletwin.explain.locate import profile
+from rippletwin.explain.locate import locate
 from rippletwin.explain.posterior import FLOOR, Posterior, source_scale
 from rippletwin.explain.search import ACCEPT, Workers, scan, search
 from rippletwin.explain.validate import validate
@@ -117,7 +117,7 @@ def test_profile_peaks_at_the_leak():
     """The scan of free corrections about the base fit peaks within 0.3 m of the true leak."""
     bench, observations, _ = make(np.random.default_rng(7), LEAK, TRUTH)
     base = fit_hypothesis(Twin(bench, observations), (), observations)
-    found = profile(base, observations)
+    found = locate(base, observations).profile
     kind, low, high = found.interval()
     assert kind == "shunt"
     assert low - 0.3 < 5.0 < high + 0.3

@@ -50,7 +50,7 @@ def test_the_free_element_is_the_segment_with_the_hose(hose):
     base, observations, _, truth = hose
     start = [truth.theta[truth.index[p.name]] for p in base.parameters]
     bare = refine(base, (), observations, [start])
-    gains = locate.elements(bare, observations)
+    gains = locate.locate(bare, observations).gains
     assert max(gains, key=gains.get) in ("segment 2, shunt", "segment 2, series")
     assert gains["source"] < gains["segment 2, shunt"]
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rippletwin.effects.passive_network import one_port
 from rippletwin.explain.fit import Fit
 from rippletwin.explain.posterior import Posterior
 from rippletwin.forward import Forward, reflection
@@ -250,8 +251,6 @@ def is_passive(fit: Fit, which: int = -1) -> bool:
     Re Y(s) >= 0 for Re s >= 0 (Brune 1931, J. Math. Phys. 10:191): looked at along the imaginary
     axis and a grid of the right half-plane up to 100 kHz. Raises ValueError for a named effect.
     """
-    from rippletwin.effects.passive_network import one_port
-
     effect, _, values = fit.twin.effect_values(fit.twin.theta)[which]
     if effect.named:
         raise ValueError(f"{effect.name} is no nameless network")

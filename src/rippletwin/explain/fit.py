@@ -54,7 +54,7 @@ class Fit:
     objective    minus the log posterior there
     evidence     Laplace's log evidence, comparable between hypotheses on the same data
     covariance   (P, P) of theta
-    floor, source_sd   estimated relative errors
+    floor, source_sd, smooth_sd   estimated relative errors (see `Posterior`)
     source_free  which of the two likelihoods
     """
 
@@ -65,6 +65,7 @@ class Fit:
     covariance: np.ndarray = field(repr=False)
     floor: float
     source_sd: float
+    smooth_sd: float
     source_free: bool = False
 
     @property
@@ -76,6 +77,11 @@ class Fit:
     def names(self) -> tuple[str, ...]:
         """Names of the effects."""
         return tuple(effect.name for effect, _ in self.hypothesis)
+
+    @property
+    def label(self) -> str:
+        """Effects and places in words; "" of the paper's line."""
+        return " + ".join(f"{effect.name}, {place}" for effect, place in self.hypothesis)
 
 
 def prepare(observations: Sequence, rig, highest_hz: float | None = None) -> list:
@@ -241,6 +247,7 @@ def conclude(posterior: Posterior, hypothesis: Hypothesis, theta: np.ndarray) ->
         np.linalg.inv(hessian),
         posterior.floor,
         posterior.source_sd,
+        posterior.smooth_sd,
         posterior.source_free,
     )
 

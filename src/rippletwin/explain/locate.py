@@ -50,13 +50,8 @@ class Profile:
         return kind, float(inside[0] - half), float(inside[-1] + half)
 
 
-def profile(fit: Fit, observations: Sequence, places: int = PLACES) -> Profile | None:
-    """The profile about a fit; None without two sensors."""
-    scan = _Scan.about(fit, observations)
-    if scan is None:
-        return None
-    length = scan.network.length
-    position = (np.arange(places) + 0.5) / places * length
+def _profile(scan: _Scan) -> Profile:
+    position = (np.arange(PLACES) + 0.5) / PLACES * scan.network.length
     found = {
         kind: np.array([scan.weigh(scan.at(kind, x)) for x in position])
         for kind in ("shunt", "series")
@@ -66,21 +61,18 @@ def profile(fit: Fit, observations: Sequence, places: int = PLACES) -> Profile |
     return Profile(position, {kind: pairs[:, 0] for kind, pairs in found.items()}, left)
 
 
-def elements(fit: Fit, observations: Sequence) -> dict[str, float]:
+def _elements(scan: _Scan, rig) -> dict[str, float]:
     """Log evidence gained by one free correction a frequency of each element of the rig.
 
     "source", "load" (admittance beside it), "segment k, series" and "segment k, shunt" (the whole
-    segment's impedance or admittance per metre) and "sensor NAME". Empty without two sensors.
+    segment's impedance or admittance per metre) and "sensor NAME".
     """
-    scan = _Scan.about(fit, observations)
-    if scan is None:
-        return {}
     gains = {"source": scan.gain(scan.prediction * STRENGTH)}
-    for k in range(len(fit.twin.rig.line)):
+    for k in range(len(rig.line)):
         for kind in ("series", "shunt"):
             gains[f"segment {k + 1}, {kind}"] = scan.gain(scan.along(kind, k))
     gains["load"] = scan.gain(scan.at("shunt", scan.network.length))
-    for k, sensor in enumerate(fit.twin.rig.sensors):
+    for k, sensor in enumerate(rig.sensors):
         row = np.zeros_like(scan.prediction)
         row[k] = STRENGTH * scan.prediction[k]
         gains[f"sensor {sensor.name}"] = scan.gain(row)
@@ -95,12 +87,14 @@ class Located:
     position   interval (m from the pump)
     kind       "shunt", "series", or "" for source and sensors
     gains      of every element, and of the best "position"
+    profile    of every position
     """
 
     element: str
     position: tuple[float, float]
     kind: str
     gains: dict[str, float]
+    profile: Profile
 
 
 def locate(fit: Fit, observations: Sequence) -> Located | None:
@@ -108,18 +102,20 @@ def locate(fit: Fit, observations: Sequence) -> Located | None:
 
     One place is preferred to the whole segment about it unless that is clearly better.
     """
-    gains, scan = elements(fit, observations), profile(fit, observations)
-    if scan is None:
-        return None
-    kind, low, high = scan.interval()
-    drop = 3.0 * max(scan.left, 1.0)
-    gains["position"] = float(np.max(scan.gain[kind]))
-    best = max(gains, key=gains.get)
     rig = fit.twin.rig
+    if len(rig.sensors) < 2 or any(o.kind == "input_impedance" for o in observations):
+        return None
+    scan = _Scan(fit, observations)
+    gains, profile = _elements(scan, rig), _profile(scan)
+    kind, low, high = profile.interval()
+    drop = 3.0 * max(profile.left, 1.0)
+    gains["position"] = float(np.max(profile.gain[kind]))
+    best = max(gains, key=gains.get)
     if gains["position"] > gains[best] - drop:
-        return Located("position", (max(low, 0.0), min(high, float(rig.length))), kind, gains)
+        ends = max(low, 0.0), min(high, float(rig.length))
+        return Located("position", ends, kind, gains, profile)
     element, _, kind = best.partition(", ")
-    return Located(element, extent(rig, element), kind, gains)
+    return Located(element, extent(rig, element), kind, gains, profile)
 
 
 def extent(rig, element: str) -> tuple[float, float]:
@@ -141,12 +137,6 @@ class _Scan:
     A correction is the change (S, F) of the prediction that it makes at STRENGTH: it acts on its
     own frequency alone, so one column a frequency is all there is.
     """
-
-    @classmethod
-    def about(cls, fit: Fit, observations: Sequence) -> _Scan | None:
-        if len(fit.twin.rig.sensors) < 2 or any(o.kind == "input_impedance" for o in observations):
-            return None
-        return cls(fit, observations)
 
     def __init__(self, fit: Fit, observations: Sequence):
         self.posterior = posterior_of(fit, observations, FLOOR)
@@ -188,7 +178,7 @@ class _Scan:
 def compared(search) -> list[Fit]:
     """The fits worth a second look without the source: base, best and the best single effects."""
     fits = [search.base, search.best, *search.singles[:COMPARED], *search.others[:1]]
-    return list({_label(f): f for f in fits}.values())
+    return list({f.label: f for f in fits}.values())
 
 
 def blind(pool, search) -> list[Fit]:
@@ -208,8 +198,8 @@ def blind(pool, search) -> list[Fit]:
 
 def side_by_side(search, blind_fits: Sequence[Fit]) -> list[dict]:
     """Log evidence over the base with the source's ripple known as stated, and blind to it."""
-    informed = {_label(f): f.evidence for f in compared(search)}
-    unseen = {_label(f): f.evidence for f in blind_fits}
+    informed = {f.label: f.evidence for f in compared(search)}
+    unseen = {f.label: f.evidence for f in blind_fits}
     return [
         {
             "effects": label,
@@ -219,10 +209,6 @@ def side_by_side(search, blind_fits: Sequence[Fit]) -> list[dict]:
         for label in informed
         if label and label in unseen
     ]
-
-
-def _label(fit: Fit) -> str:
-    return " + ".join(f"{effect.name}, {place}" for effect, place in fit.hypothesis)
 
 
 def _gain(residual: np.ndarray, jacobian: np.ndarray, columns: np.ndarray) -> tuple[float, float]:

@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rippletwin.case import FlowRipple, Load, Rig, Sensor
+from rippletwin.effects import EFFECTS, Place
 from rippletwin.explain.fit import Fit
 from rippletwin.explain.posterior import FLOOR, Posterior
 from rippletwin.spectra import Observation
@@ -75,8 +76,6 @@ def place_sensor(fit: Fit, observations: Sequence, kind: str, low: float, high: 
     where no sensor can be added. The figure is the log evidence between the two, seen at the same
     operating point.
     """
-    from rippletwin.effects import EFFECTS, Place
-
     effect = EFFECTS["passive_network"]
     place = Place("position", form=kind)
     if (effect, place) not in fit.hypothesis:
@@ -116,7 +115,7 @@ def loss(accepted: Fit, rival: Fit, rig: Rig, observation: Observation) -> float
     posterior = Posterior(twin, [replace(observation, values=values, covariance=covariance)])
     posterior.floor = max(accepted.floor, FLOOR)
     posterior.source_sd = rival.source_sd
-    posterior.smooth_sd = getattr(rival, "smooth_sd", 0.0)
+    posterior.smooth_sd = rival.smooth_sd
     r, jacobian = posterior.linearise(twin.theta, posterior.predict(twin.theta))
     count = 2 * values.size
     r = r[:count]

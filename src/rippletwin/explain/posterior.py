@@ -100,11 +100,6 @@ class Posterior:
         """Predictions of all observations side by side, (S, F)."""
         return np.concatenate(self.forward(theta), axis=1)
 
-    def residual(self, theta: np.ndarray, prediction: np.ndarray) -> np.ndarray:
-        """Whitened residuals (2 S F,) of unit variance, then theta where it has a prior."""
-        r = self.whitened(prediction)[0]
-        return np.concatenate([_real(r).ravel(), theta[self.prior]])
-
     def objective(self, theta: np.ndarray, prediction: np.ndarray) -> float:
         """Minus the log posterior at the present errors, but for a constant."""
         r, log_determinant = self.whitened(prediction)
@@ -120,12 +115,15 @@ class Posterior:
         metric = self._metric(prediction[(0,) * (prediction.ndim - 2)])
         return metric.apply(self._rotated - self._rotate(prediction)), metric.log_determinant
 
+    def _variance(self, floor) -> np.ndarray:
+        """Of the readings, (..., S, F), but for the source's share."""
+        return self._variances + self._products + floor**2 * self.power
+
     def _metric(self, prediction: np.ndarray) -> Metric:
         """Whitening by the covariance that a prediction (S, F) implies."""
-        sd = np.sqrt(self._variances + self._products + self.floor**2 * self.power)
         return Metric(
             self._rotate(prediction),
-            sd,
+            np.sqrt(self._variance(self.floor)),
             np.where(self._known, 0.0, np.where(self._free, np.inf, self.source_sd * self._scale)),
             self._nominal,
             self.smooth_sd * self._basis,
@@ -149,9 +147,7 @@ class Posterior:
         sds = SOURCE_SDS if any_nominal else SOURCE_SDS[:1]
         taus = SMOOTH_SDS if any_nominal else np.zeros(1)
         for _ in range(2):
-            weight = 1.0 / (
-                self._variances + self._products + floors[:, None, None] ** 2 * self.power
-            )
+            weight = 1.0 / self._variance(floors[:, None, None])
             square = np.sum(squares * weight, axis=1)  # (D, F)
             cross = np.sum(inner * weight, axis=1)
             size = np.maximum(np.sum(sizes * weight, axis=1), 1e-300)
@@ -185,7 +181,11 @@ class Posterior:
         self.floor = min(self.floor, self.most)
 
     def linearise(self, theta: np.ndarray, prediction: np.ndarray):
-        """Residual (N,) and its Jacobian (N, P) at the present errors, their covariance held."""
+        """Residual (N,) and its Jacobian (N, P) at the present errors, their covariance held.
+
+        Of the N residuals 2 S F are the whitened ones, of unit variance; theta follows where it
+        has a prior.
+        """
         if self._pressures:
             slopes = self.forward.derivatives(theta)
         else:
@@ -215,7 +215,7 @@ class Posterior:
         )
 
     def _amplitude(self, prediction: np.ndarray) -> np.ndarray:
-        weight = 1.0 / (self._variances + self.floor**2 * self.power)
+        weight = 1.0 / self._variance(self.floor)
         h = self._rotate(prediction)
         return np.sum(weight * np.conj(h) * self._rotated, 0) / np.maximum(
             np.sum(weight * np.abs(h) ** 2, 0), 1e-300

@@ -28,7 +28,7 @@ class Explanation:
 
     observations are as fitted; single holds the base fitted to each of them alone, shaft what the
     shaft orders say that are no multiples of the pistons' number, blind the fits that know nothing
-    of the source (`rippletwin.explain.locate.compared`).
+    of the source (`rippletwin.explain.locate.compared`), located where the base lacks something.
     """
 
     rig: object
@@ -40,6 +40,7 @@ class Explanation:
     single: tuple[Fit, ...]
     shaft: ShaftLines | None = None
     blind: tuple[Fit, ...] = ()
+    located: locate.Located | None = None
 
     @property
     def twin(self) -> Twin:
@@ -112,9 +113,17 @@ def explain_observations(
         validation = validate(pool, found.base, explanation, held)
     checked = validation if explanation.hypothesis else None
     judgement = judge(found, alarms, checked, reason)
-    lines = shaft_lines(judgement.accepted.twin, observations, HIGHEST_HZ)
     return Explanation(
-        rig, tuple(data), alarms, found, judgement, validation, tuple(single), lines, tuple(blind)
+        rig=rig,
+        observations=tuple(data),
+        alarms=alarms,
+        search=found,
+        judgement=judgement,
+        validation=validation,
+        single=tuple(single),
+        shaft=shaft_lines(judgement.accepted.twin, observations, HIGHEST_HZ),
+        blind=tuple(blind),
+        located=locate.locate(found.base, data),
     )
 
 

@@ -94,7 +94,7 @@ def verdict(explanation: Explanation) -> dict:
 def _where(e: Explanation, found: list[dict]) -> dict:
     base = e.search.base
     element, position = "line", [0.0, float(e.rig.length)]
-    located = locate.locate(base, e.observations)
+    located = e.located
     if not found and e.shaft is not None and e.shaft.name is not None:
         element, position = "source", [0.0, 0.0]
     elif found:
@@ -231,9 +231,8 @@ def _passive(result: dict) -> str:
 
 def _without_source(e: Explanation) -> str:
     """What a fit that knows nothing of the source says of the accepted effects."""
-    label = " + ".join(f"{f.name}, {place}" for f, place in e.judgement.accepted.hypothesis)
     for row in locate.side_by_side(e.search, e.blind):
-        if row["effects"] == label:
+        if row["effects"] == e.judgement.accepted.label:
             if row["source_free"] > 0.2 * row["informed"]:
                 return "It stands in a fit that is blind to the source too."
             return "Blind to the source it is not seen: it acts at the pump or only there is known."

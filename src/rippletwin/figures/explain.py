@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from rippletwin.explain.describe import missing, posterior_of
 from rippletwin.explain.detect import residual_map
 from rippletwin.explain.judge import intervals
-from rippletwin.explain.locate import elements, profile, side_by_side
+from rippletwin.explain.locate import side_by_side
 from rippletwin.explain.search import ACCEPT
 from rippletwin.figures import style
 
@@ -120,11 +120,11 @@ def evidence(e) -> Figure | None:
     search = e.search
     if not search.singles:
         return None
-    shown = {_label(f): f for f in reversed(search.singles[:12])}
+    shown = {f.label: f for f in reversed(search.singles[:12])}
     if len(search.best.hypothesis) > 1:
-        shown[_label(search.best)] = search.best
+        shown[search.best.label] = search.best
     if search.others:
-        shown["no name: " + _label(search.others[0])] = search.others[0]
+        shown["no name: " + search.others[0].label] = search.others[0]
     gains = [search.gain(f) for f in shown.values()]
     places = np.arange(len(shown))
     lines = sum(1 + name.count(" + ") for name in shown)
@@ -133,7 +133,7 @@ def evidence(e) -> Figure | None:
     colours = [style.CORRECTED if g > ACCEPT else style.NEUTRAL for g in gains]
     ax.barh(places, gains, color=colours, height=0.6, label="source as stated")
     unseen = {row["effects"]: row["source_free"] for row in side_by_side(search, e.blind)}
-    points = [(k, unseen[_label(f)]) for k, f in enumerate(shown.values()) if _label(f) in unseen]
+    points = [(k, unseen[f.label]) for k, f in enumerate(shown.values()) if f.label in unseen]
     if points:
         k, g = np.array(points).T
         ax.plot(g, k, "D", ms=5, color=style.MEASURED, mfc="white", label="blind to the source")
@@ -152,10 +152,10 @@ def evidence(e) -> Figure | None:
 
 def along(e) -> Figure | None:
     """Log evidence gained by one free correction at each place of the line, and of each element."""
-    scan = profile(e.search.base, e.observations)
-    if scan is None:
+    if e.located is None:
         return None
-    gains = elements(e.search.base, e.observations)
+    scan = e.located.profile
+    gains = {name: gain for name, gain in e.located.gains.items() if name != "position"}
     fig, axes = style.figure(1, 2, height=2.8, sharey=True, width_ratios=(2.2, 1))
     ax = axes[0, 0]
     for kind, ls, colour in (("shunt", "-", style.CALIBRATED), ("series", "--", style.NOMINAL)):
@@ -215,10 +215,6 @@ def immittance(e) -> Figure | None:
         column[0].legend()
         column[-1].set_xlabel("frequency / Hz")
     return fig
-
-
-def _label(fit) -> str:
-    return " + ".join(f"{effect.name}, {place}" for effect, place in fit.hypothesis)
 
 
 def _within(tick: float, gains, unseen) -> bool:
