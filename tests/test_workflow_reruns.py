@@ -58,7 +58,7 @@ def test_nothing_runs_after_a_finished_run(workflow):
 
 def test_training_key_reruns_training_only(workflow):
     """learning_rate reaches no rule before `train`, but that needs its temporary inputs again."""
-    edit(workflow / "config/config.yaml", "learning_rate: 0.006", "learning_rate: 0.002")
+    edit(workflow / "config/config.yaml", "learning_rate: 0.003", "learning_rate: 0.002")
     assert planned(workflow)[0] == TIME_AGAIN | IMAGES_AGAIN
 
 
