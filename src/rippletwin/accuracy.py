@@ -138,14 +138,6 @@ def accuracy_table(rows: pd.DataFrame, paper: pd.DataFrame, column: str = "accur
     return "\n".join(lines) + "\n"
 
 
-def confusion_table(counts: np.ndarray) -> str:
-    """Markdown of one (3, 4) confusion matrix: true states down, predicted classes across."""
-    lines = ["| true \\ predicted | " + " | ".join(CLASSES) + " |", "|---|" + "---|" * len(CLASSES)]
-    for state, row in zip(TRUE_STATES, counts):
-        lines.append(f"| {state} | " + " | ".join(str(n) for n in row) + " |")
-    return "\n".join(lines) + "\n"
-
-
 def cost_table(rows: pd.DataFrame, column: str = "accuracy") -> str:
     """Markdown of what the left-out physics cost: each dataset beside the corrected twin's.
 

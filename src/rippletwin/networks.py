@@ -12,6 +12,7 @@ which the CPU kernels of torch are up to twice as fast in channels-last order.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import torch
@@ -62,6 +63,18 @@ def build(name: str, channels: int, classes: int = len(CLASSES)) -> Classifier:
     """
     architecture = ARCHITECTURES[name]
     return Classifier(architecture, channels, classes).to(memory_format=torch.channels_last)
+
+
+def restored(name: str, channels: int, weights: Iterable[dict]) -> Iterator[Classifier]:
+    """Trained networks of an architecture, one for each of `weights` (their state dictionaries).
+
+    name, channels : as for ``build``. Raises KeyError for an unknown name, RuntimeError for weights
+    of another architecture.
+    """
+    for state in weights:
+        network = build(name, channels)
+        network.load_state_dict(state)
+        yield network
 
 
 class Classifier(nn.Module):

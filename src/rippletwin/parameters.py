@@ -60,8 +60,3 @@ def coordinates(parameters: Sequence[Parameter], by_name: Mapping[str, float]) -
             for p in parameters
         ]
     )
-
-
-def has_prior(parameters: Sequence[Parameter]) -> np.ndarray:
-    """(P,) bool: which parameters have a prior."""
-    return np.array([not p.flat for p in parameters], dtype=bool)

@@ -19,7 +19,7 @@ ALLOWED = 0.1
 """Of the noise: the largest error at any sensor, rms below HIGHEST_HZ."""
 
 SMALL = 1e-3
-FINER = {"frequency": 8000.0, "points": 9.0, "modes": 14}
+FINER = {"frequency": 8000.0, "points": 9.0, "degree": 8, "modes": 14}
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import xarray as xr
 from job import start
 from rippletwin import store
 from rippletwin.attention import alignment, attention, density, fault_region
-from rippletwin.networks import CLASSES, build
+from rippletwin.networks import CLASSES, restored
 from rippletwin.training import predict
 
 WINDOWS = 16  # of each recording, for the mean heat
@@ -33,9 +33,8 @@ for name in recorded_states:
     windows.append(recorded.signal.values[at])
 
 attended, blind = [], []
-for seed, weights in enumerate(torch.load(snakemake.input.weights)):
-    network = build(snakemake.wildcards.architecture, channels=x["H"].shape[1])
-    network.load_state_dict(weights)
+trained, channels = torch.load(snakemake.input.weights), x["H"].shape[1]
+for seed, network in enumerate(restored(snakemake.wildcards.architecture, channels, trained)):
     shares = [
         alignment(attention(network, x[fault], CLASSES.index(fault)), regions[fault])[0]
         for fault in faults

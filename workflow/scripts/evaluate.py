@@ -7,7 +7,7 @@ import torch
 from job import start
 from rippletwin import store
 from rippletwin.dataset import split_by_time
-from rippletwin.networks import CLASSES, build
+from rippletwin.networks import CLASSES, restored
 from rippletwin.training import predict
 
 tell = start(snakemake)
@@ -19,9 +19,8 @@ if snakemake.wildcards.dataset == "experimental":
 x, truth = recorded.signal.values[kept], recorded.state.values[kept]
 
 tables = []
-for seed, weights in enumerate(torch.load(snakemake.input.weights)):
-    network = build(snakemake.wildcards.architecture, channels=x.shape[1])
-    network.load_state_dict(weights)
+trained = torch.load(snakemake.input.weights)
+for seed, network in enumerate(restored(snakemake.wildcards.architecture, x.shape[1], trained)):
     predicted, probability = predict(network, x)
     table = pd.DataFrame(probability, columns=[f"p_{name}" for name in CLASSES]).round(5)
     table.insert(0, "predicted", np.array(CLASSES)[predicted])

@@ -6,7 +6,7 @@ import torch
 
 from job import start
 from rippletwin import store
-from rippletwin.networks import CLASSES, build
+from rippletwin.networks import CLASSES, restored
 from rippletwin.training import predict
 
 tell = start(snakemake)
@@ -15,9 +15,8 @@ samples = store.load(snakemake.input.samples)
 x, faults = samples.signal.values, np.array(samples.label.attrs["classes"])[samples.label.values]
 
 tables = []
-for seed, weights in enumerate(torch.load(snakemake.input.weights)):
-    network = build(snakemake.wildcards.architecture, channels=x.shape[1])
-    network.load_state_dict(weights)
+trained = torch.load(snakemake.input.weights)
+for seed, network in enumerate(restored(snakemake.wildcards.architecture, x.shape[1], trained)):
     predicted, _ = predict(network, x)
     tables.append(
         pd.DataFrame({"seed": seed, "recording": faults, "predicted": np.array(CLASSES)[predicted]})

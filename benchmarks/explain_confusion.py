@@ -1,0 +1,131 @@
+"""Which effects can be told apart on a rig: the confusion matrix, and what it costs to take one for
+another.
+
+    python benchmarks/explain_confusion.py CASE [--out FILE.md] [--processes 2]
+
+For every effect of the library in turn, the healthy recordings of CASE are replaced by what a twin
+with that effect would give: line and load off by their stated uncertainty, the effect's parameters
+at their prior medians, sensor noise as recorded, and a ripple that is wrong by SOURCE smoothly in
+frequency. Every effect at every place is then fitted, the line refitted with each. A cell is the
+log evidence of the best place of the column's effect less that of the true effect at its best
+place: at 0 the two cannot be told apart, below -3 the true one is twenty times as probable.
+
+The recordings come from the same equations as the twin: this shows what the data can tell, not
+whether the equations are right.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from rippletwin.case import load_case
+from rippletwin.explain.fit import prepare
+from rippletwin.explain.posterior import smooth_basis
+from rippletwin.explain.run import HIGHEST_HZ
+from rippletwin.explain.search import library, polish, workers
+from rippletwin.misfit import relative_misfit
+from rippletwin.spectra import observe
+from rippletwin.twin import Twin
+
+SOURCE = 0.02
+ALIKE = 3.0  # log evidence: twenty to one
+
+
+def truths(rig, observations) -> list:
+    """Each effect once: in the line's second segment or at its first place."""
+    chosen = {}
+    for effect, place in library(rig, observations):
+        if effect.name not in chosen or place.element == "segment 2":
+            chosen[effect.name] = (effect, place)
+    return list(chosen.values())
+
+
+def recorded(rig, observations, effect, rng):
+    """(observations of a twin with the effect, its share of the ripple)."""
+    twin = Twin(rig, observations, effects=(effect,))
+    own = f"{effect[0].name}@{effect[1]}."
+    theta = rng.normal(size=len(twin.theta)).clip(-2, 2)
+    for k, p in enumerate(twin.parameters):
+        if p.flat or p.name.startswith(own):
+            theta[k] = 0.0
+    with_effect = twin.with_(theta=theta).predict(observations)
+    bare = Twin(rig, observations)
+    kept = [theta[twin.index[p.name]] for p in bare.parameters]
+    without = bare.with_(theta=np.array(kept)).predict(observations)
+    made = []
+    for o, h in zip(observations, with_effect):
+        basis = smooth_basis(o.frequency_hz, np.zeros(len(o.frequency_hz)))
+        wrong = 1.0 + SOURCE * (_complex(rng, len(basis)) @ basis)
+        root = np.linalg.cholesky(o.covariance + 1e-12 * np.eye(len(h)))
+        noise = np.einsum("fst,tf->sf", root, _complex(rng, *h.shape))
+        made.append(replace(o, values=wrong * h + noise))
+    share = relative_misfit(np.concatenate(with_effect, 1), np.concatenate(without, 1))
+    return made, share
+
+
+def _complex(rng, *shape) -> np.ndarray:
+    return (rng.normal(size=(*shape, 2)) @ np.array([1, 1j])) / np.sqrt(2)
+
+
+def best_of_each(rig, observations, processes: int) -> dict[str, tuple[float, str]]:
+    """Name -> (log evidence over the paper's line, place) of each effect at its best place."""
+    found = library(rig, observations)
+    with workers(Twin(rig, observations), observations, processes) as pool:
+        fits = pool.fit([{"hypothesis": h} for h in [(), *((c,) for c in found)]])
+        base, singles = fits[0], polish(pool, fits[1:])
+    best = {}
+    for fit in singles:
+        name, place = fit.names[0], str(fit.hypothesis[0][1])
+        gain = fit.evidence - base.evidence
+        if name not in best or gain > best[name][0]:
+            best[name] = (gain, place)
+    return best
+
+
+def table(rows: list[tuple]) -> str:
+    """Markdown: truths down, the effects that come within 30 of any of them across."""
+    names = [effect.name for (effect, _), _, _ in rows]
+    heads = " | ".join(str(k + 1) for k in range(len(names)))
+    lines = [
+        f"| true effect | share of the ripple | evidence | place found | {heads} |",
+        "|---|---|---|---|" + "---|" * len(names),
+    ]
+    for k, ((effect, place), share, best) in enumerate(rows):
+        gain, found = best[effect.name]
+        cells = []
+        for name in names:
+            less = best[name][0] - gain if name in best else -np.inf
+            text = f"{less:.0f}" if less > -30 else ""
+            cells.append(f"**{text}**" if less > -ALIKE and name != effect.name else text)
+        title = f"{k + 1} {effect.name.replace('_', ' ')}, {place}"
+        lines.append(f"| {title} | {share:.1%} | {gain:.0f} | {found} | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("case", type=Path)
+    parser.add_argument("--out", type=Path)
+    parser.add_argument("--processes", type=int, default=2)
+    options = parser.parse_args()
+    case = load_case(options.case, states={"healthy"})
+    observations = prepare(
+        [observe(r, case.rig, HIGHEST_HZ) for r in case.healthy], case.rig, HIGHEST_HZ
+    )
+    rows = []
+    for k, effect in enumerate(tqdm(truths(case.rig, observations), unit="effect")):
+        made, share = recorded(case.rig, observations, effect, np.random.default_rng(k))
+        rows.append((effect, share, best_of_each(case.rig, made, options.processes)))
+        page = table(rows)
+        if options.out:
+            options.out.write_text(page)
+    print(page)
+
+
+if __name__ == "__main__":
+    main()
