@@ -25,8 +25,8 @@ NUMERICS = {"frequency": 7000.0, "points": 8.0, "degree": 7, "modes": 10}
 REFINE = 3
 """Of a drawn rig: wrong by less than a tenth of its noise, as `virtualrig.exact` checks before any
 case is drawn. Ripples are stronger and noise is weaker here than on the built-in rig, and a line
-that ends in a volume rings on for forty revolutions, so that errors add up: hence elements of higher
-degree and a third of the stable time step."""
+that ends in a volume rings on for forty revolutions, so that errors add up: hence elements of
+higher degree and a third of the stable time step."""
 
 SETTLED = 0.01
 """Pressures are periodic when they change by less than this share of the noise in a revolution."""
