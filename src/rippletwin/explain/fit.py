@@ -37,6 +37,7 @@ KEPT = ((4, 2, 1), (8, 4, 1))  # carried on after the first, the second and ever
 STEPS = (12, 8, 6)  # most steps below the first, second and later limits; the last may take more
 LAST_STEPS = 30
 CONVERGED = 1e-2  # change of minus the log posterior: evidence is judged in whole units
+REFINED = 4  # of many good starts those that are followed to the end
 MOST = 0.1
 """Largest model error before the last limit: more would leave the fit to its priors, and it would
 never leave a wrong valley."""
@@ -222,8 +223,8 @@ def refine(
     posterior = Posterior(twin, observations, None, source_free)
     thetas = [np.asarray(theta, dtype=float) for theta in thetas]
     if len(thetas) > 2:
-        tried = [descend(posterior, theta, STEPS[-1] // 2) for theta in thetas]
-        thetas = [theta for theta, _ in sorted(tried, key=lambda t: t[1])[:2]]
+        tried = [descend(posterior, theta, STEPS[-1]) for theta in thetas]
+        thetas = [theta for theta, _ in sorted(tried, key=lambda t: t[1])[:REFINED]]
     fits = [descend(posterior, theta, LAST_STEPS) for theta in thetas]
     return conclude(posterior, hypothesis, min(fits, key=lambda f: f[1])[0])
 

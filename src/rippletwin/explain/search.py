@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from itertools import product
+from itertools import pairwise, product
 from multiprocessing import get_context
 
 import numpy as np
@@ -23,17 +23,32 @@ parametric bootstraps of no-effect cases with refitting is below it (docs/explai
 CERTAIN = -3.0  # the same for an effect that no real line is without: twenty to one against it
 MOST = 4  # effects at a time
 STAND_INS = 10  # single effects tried in the place of another
+WEAK = -2.0  # of a weak effect's parameters, in prior standard deviations
 GOOD = 2.0 * FLOOR  # relative model error at which a fit is as good as it can be believed
 
 
-def scan(rig, hypothesis: Hypothesis) -> list[dict[str, float]]:
-    """Starts for the newest effect of a hypothesis: all combinations of its parameters' scans."""
+def scan(rig, hypothesis: Hypothesis, weak: bool = False) -> list[dict[str, float]]:
+    """Starts for the newest effect of a hypothesis: all combinations of its parameters' scans.
+
+    With `weak` the positive parameters that have no scan of their own start at WEAK, and places
+    along the line twice as densely: about a good fit the valleys are narrow.
+    """
     if not hypothesis:
         return [{}]
     effect, place = hypothesis[-1]
     parameters = effect.parameters(rig, place)
     names = [f"{effect.name}@{place}.{p.name}" for p in parameters]
-    return [dict(zip(names, us)) for us in product(*(p.scan for p in parameters))]
+    scans = [_weak(p) if weak else p.scan for p in parameters]
+    return [dict(zip(names, us)) for us in product(*scans)]
+
+
+def _weak(parameter) -> tuple[float, ...]:
+    if parameter.prior.kind == "lognormal" and len(parameter.scan) == 1:
+        return (WEAK,)
+    if parameter.prior.kind == "uniform":
+        between = [0.5 * (a + b) for a, b in pairwise(parameter.scan)]
+        return tuple(sorted([*parameter.scan, *between]))
+    return parameter.scan
 
 
 def library(rig, observations: Sequence, named: bool = True) -> list[tuple[Effect, Place]]:
@@ -99,9 +114,9 @@ def _prepare(base, observations):
 def work(job: dict) -> Fit:
     """Fit `hypothesis` to the observations with the indices `use` (all by default).
 
-    With `theta` from there; with `fit` from where that ended and the newest effect's scan; else by
-    continuation from the starts `starts` or the newest effect's scan; `source_free` as in
-    `fit_hypothesis`.
+    With `theta` from there; with `fit` from where that ended and the newest effect's scan, as
+    strong as its prior and weak; else by continuation from the starts `starts` or the newest
+    effect's scan; `source_free` as in `fit_hypothesis`.
     """
     base, observations = _DATA
     use = job.get("use")
@@ -111,7 +126,7 @@ def work(job: dict) -> Fit:
         return refine(base, hypothesis, observations, [job["theta"]], free)
     if "fit" in job:
         twin, thetas = base.with_(effects=hypothesis), []
-        for start in scan(base.rig, hypothesis):
+        for start in scan(base.rig, hypothesis) + scan(base.rig, hypothesis, weak=True):
             theta = carry(job["fit"], hypothesis, base)
             for name, u in start.items():
                 theta[twin.index[name]] = u
@@ -149,8 +164,12 @@ def search(pool: Workers, progress: Callable[[str, int, int], None] | None = Non
     found = library(rig, pool.observations)
     tell = _counter(progress, "single effects", len(found) + 1)
     fits = pool.fit([{"hypothesis": h} for h in [(), *((c,) for c in found)]], tell)
-    base, singles = fits[0], _ranked(fits[1:])
-    singles = polish(pool, singles)
+    base, singles = fits[0], fits[1:]
+    if base.floor <= GOOD:
+        # A line that fits without the effect has no other valley for it than a weak one nearby.
+        near = pool.fit([{"hypothesis": f.hypothesis, "fit": base} for f in singles])
+        singles = [max(pair, key=lambda f: f.evidence) for pair in zip(singles, near)]
+    singles = polish(pool, _ranked(singles))
     best, rivals = base, singles
     step = singles
     while True:
