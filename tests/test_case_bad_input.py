@@ -275,6 +275,15 @@ def test_speed_that_disagrees_with_the_piston_frequency(tmp_path, rpm):
     refused(tmp_path, "healthy_0.h5", "speed_rpm", f"{rpm} r/min with 9 pistons disagrees")
 
 
+def test_speed_holds_where_a_resonance_lifts_high_even_harmonics(tmp_path):
+    """Twice the speed would hold most of this ripple in its own first six piston harmonics."""
+    turns = np.arange(51200) / 51200 * 1000 / 60
+    sizes = {1: 0.1, 2: 0.3, 3: 0.05, 8: 1.0, 10: 1.0}
+    wave = sum(a * np.cos(2 * np.pi * 9 * h * turns) for h, a in sizes.items())
+    write_case(tmp_path, sheet(), 9.5e6 + 2e5 * np.stack([wave, 0.8 * wave]))
+    assert load_case(tmp_path).recordings[0].speed_rpm == 1000
+
+
 def test_wrong_number_of_pistons(tmp_path):
     spoilt(tmp_path, lambda c: c["pump"].update(pistons=7))
     refused(tmp_path, "healthy_0.h5", "speed_rpm", "7 pistons disagrees")

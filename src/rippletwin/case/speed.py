@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-HARMONICS = 6
+HARMONICS = 12  # of the nominal speed; every candidate is seen up to the same frequency
 SEARCH = (0.5, 2.0)
 CONTRAST = 5.0
 
@@ -15,15 +15,17 @@ def speed_in_data(
     """The speed (r/min) whose piston harmonics hold most of the ripple; None where there is none.
 
     `pressure` (S, N). Candidates from half to twice `speed_rpm` are scored by the power in their
-    first six piston harmonics. The nominal speed wins ties: half the true speed scores as well as
-    the true one, so a candidate's odd harmonics must hold power too.
+    piston harmonics up to the twelfth of `speed_rpm`. The nominal speed wins ties: half the true
+    speed scores as well as the true one, so a candidate's odd harmonics must hold power too.
     """
     frequency, power = _spectrum(pressure, sampling_rate_hz)
     # every candidate's harmonics are averaged over +-0.3 %, the wander of a shaft
     candidates = speed_rpm * np.exp(np.arange(np.log(SEARCH[0]), np.log(SEARCH[1]), 1e-3))
     fundamental = candidates * pistons / 60
-    bands = np.array(
-        [_band_power(frequency, power, h * fundamental, 0.003) for h in range(1, HARMONICS + 1)]
+    numbers = np.arange(1, int(HARMONICS / SEARCH[0]) + 1)
+    seen = np.outer(numbers, candidates) <= 1.01 * HARMONICS * speed_rpm
+    bands = seen * np.array(
+        [_band_power(frequency, power, h * fundamental, 0.003) for h in numbers]
     )
     total = np.sum(power)
     odd, even = bands[0::2].sum(0), bands[1::2].sum(0)
@@ -32,7 +34,7 @@ def speed_in_data(
     near = np.abs(candidates / speed_rpm - 1) <= 0.01
     if score[near].max() > 0.5 * score[best]:
         best = np.flatnonzero(near)[np.argmax(score[near])]
-    width = 2 * 0.003 * fundamental[best] * HARMONICS * (HARMONICS + 1) / 2
+    width = 2 * 0.003 * fundamental[best] * np.sum(numbers[seen[:, best]])
     background = total * width / (sampling_rate_hz / 2)
     return float(candidates[best]) if score[best] > CONTRAST * background else None
 
