@@ -84,7 +84,7 @@ def markdown(rows: list[dict], origin: dict) -> str:
 def _misfits(rows: list[dict]) -> list[str]:
     def median(name: str, kinds: tuple[str, ...]) -> str:
         values = [row[name] for row in rows if row["kind"] in kinds]
-        return f"{np.median(values):.2%}" if values else "-"
+        return f"{np.nanmedian(values):.2%}" if np.any(np.isfinite(values)) else "-"
 
     names = ("misfit_nominal", "misfit_calibrated", "swallowed", "misfit_corrected")
     names += ("held_out_before", "held_out_after")

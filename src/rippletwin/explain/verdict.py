@@ -172,7 +172,9 @@ def sentence(e: Explanation, result: dict, found: list[dict], base) -> str:
     kind, fit = result["verdict"], result["fit"]
     before, after = fit["before"]["held_out"], fit["after"]["held_out"]
     words = [CHANCE.get(kind, "")]
-    if kind in ("named", "ambiguous"):
+    if kind == "named" and not found:  # what was named acts at shaft orders alone
+        words = ["At the pistons' harmonics the twin lacks nothing."]
+    elif kind in ("named", "ambiguous"):
         names = [f"{f['effect'].name.replace('_', ' ')} at the {_place(e, f)}" for f in found]
         words = [
             f"The twin lacks {join(names)}: with it the misfit on data it has not seen goes from "

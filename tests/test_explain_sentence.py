@@ -1,0 +1,20 @@
+"""What a verdict says in words where nothing but shaft orders are amiss."""
+
+from types import SimpleNamespace
+
+from rippletwin.explain.verdict import sentence
+
+
+def test_shaft_orders_alone_need_no_effect_of_the_line():
+    """A named effect that acts at shaft orders only: no fit holds it, and the words say so."""
+    e = SimpleNamespace(
+        shaft=SimpleNamespace(name="piston_spread", relative=0.02),
+        alarms=SimpleNamespace(ringing=(), pull=(0.0, "load")),
+        judgement=SimpleNamespace(accepted=SimpleNamespace(hypothesis=())),
+    )
+    e.judgement.accepted.twin = SimpleNamespace(parameters=(), theta=())
+    misfits = {"before": {"held_out": 0.02}, "after": {"held_out": 0.02}}
+    result = {"verdict": "named", "fit": misfits, "next_recording": None}
+    words = sentence(e, result, [], None)
+    assert "pistons' harmonics the twin lacks nothing" in words
+    assert "2.0% of the ripple show piston spread" in words
