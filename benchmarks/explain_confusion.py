@@ -27,7 +27,7 @@ from rippletwin.case import load_case
 from rippletwin.explain.fit import prepare
 from rippletwin.explain.posterior import smooth_basis
 from rippletwin.explain.run import HIGHEST_HZ
-from rippletwin.explain.search import library, polish, workers
+from rippletwin.explain.search import alone, library, workers
 from rippletwin.misfit import relative_misfit
 from rippletwin.spectra import observe
 from rippletwin.twin import Twin
@@ -74,16 +74,11 @@ def _complex(rng, *shape) -> np.ndarray:
 
 def best_of_each(rig, observations, processes: int) -> dict[str, tuple[float, str]]:
     """Name -> (log evidence over the paper's line, place) of each effect at its best place."""
-    found = library(rig, observations)
     with workers(Twin(rig, observations), observations, processes) as pool:
-        fits = pool.fit([{"hypothesis": h} for h in [(), *((c,) for c in found)]])
-        base, singles = fits[0], polish(pool, fits[1:])
+        base, singles = alone(pool, library(rig, observations))
     best = {}
-    for fit in singles:
-        name, place = fit.names[0], str(fit.hypothesis[0][1])
-        gain = fit.evidence - base.evidence
-        if name not in best or gain > best[name][0]:
-            best[name] = (gain, place)
+    for fit in singles:  # best first
+        best.setdefault(fit.names[0], (fit.evidence - base.evidence, str(fit.hypothesis[0][1])))
     return best
 
 

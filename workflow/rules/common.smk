@@ -2,6 +2,7 @@
 import ast
 import os
 import re
+import subprocess
 import sys
 from pathlib import Path
 

@@ -77,7 +77,7 @@ rule explain_concealed:
         cache=f"{CONCEALED}/cache",
     shell:
         "(mkdir -p {params.out} {params.cache};"
-        " NUMBA_CACHE_DIR=$PWD/{params.cache} TMPDIR={params.out}"
+        " NUMBA_CACHE_DIR=$(realpath {params.cache}) TMPDIR={params.out}"
         " python -m concealed.jail --read {input.case} --write {params.out} --write {params.cache}"
         " -- python -m concealed.tool {input.case} {params.out}) > {log} 2>&1"
 

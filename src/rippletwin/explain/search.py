@@ -162,14 +162,7 @@ def search(pool: Workers, progress: Callable[[str, int, int], None] | None = Non
     """Forward and backward steps over the library, from the base; see `Search`."""
     rig = pool.base.rig
     found = library(rig, pool.observations)
-    tell = _counter(progress, "single effects", len(found) + 1)
-    fits = pool.fit([{"hypothesis": h} for h in [(), *((c,) for c in found)]], tell)
-    base, singles = fits[0], fits[1:]
-    if base.floor <= GOOD:
-        # A line that fits without the effect has no other valley for it than a weak one nearby.
-        near = pool.fit([{"hypothesis": f.hypothesis, "fit": base} for f in singles])
-        singles = [max(pair, key=lambda f: f.evidence) for pair in zip(singles, near)]
-    singles = polish(pool, _ranked(singles))
+    base, singles = alone(pool, found, progress)
     best, rivals = base, singles
     step = singles
     while True:
@@ -194,6 +187,19 @@ def search(pool: Workers, progress: Callable[[str, int, int], None] | None = Non
         tell = _counter(progress, f"{len(best.hypothesis) + 1} effects", len(jobs))
         step = _ranked(pool.fit(jobs, tell))
     return Search(base, singles, best, rivals)
+
+
+def alone(pool: Workers, found: Sequence, progress=None) -> tuple[Fit, list[Fit]]:
+    """The base, and each of the candidates `found` alone, best first."""
+    tell = _counter(progress, "single effects", len(found) + 1)
+    fits = pool.fit([{"hypothesis": h} for h in [(), *((c,) for c in found)]], tell)
+    base, singles = fits[0], fits[1:]
+    if base.floor <= GOOD:
+        # A line that fits without the effect has no other valley for it than a weak one nearby.
+        tell = _counter(progress, "weak effects", len(found))
+        near = pool.fit([{"hypothesis": f.hypothesis, "fit": base} for f in singles], tell)
+        singles = [max(pair, key=lambda f: f.evidence) for pair in zip(singles, near)]
+    return base, polish(pool, _ranked(singles))
 
 
 def exchange(pool: Workers, best: Fit, singles: Sequence[Fit], rounds: int = 2) -> Fit:

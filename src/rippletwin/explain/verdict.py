@@ -113,13 +113,14 @@ def _where(e: Explanation, found: list[dict]) -> dict:
     }
     if located is not None:
         where["one_element_free"] = located.gains
-    interior = detect.interior_test(e.observations, base)
-    if interior:
-        after = detect.interior_test(e.observations, e.judgement.accepted)
-        where["interior_misfit"] = {
-            "before": [float(np.sqrt(np.mean(part**2))) for part in interior],
-            "after": [float(np.sqrt(np.mean(part**2))) for part in after],
-        }
+        if len(e.rig.sensors) > 2:
+            where["interior_misfit"] = {
+                which: [
+                    float(np.sqrt(np.mean(error**2)))
+                    for error in detect.interior_test(e.observations, fit)
+                ]
+                for which, fit in (("before", base), ("after", e.judgement.accepted))
+            }
     if e.blind:
         where["source_informed_and_free"] = locate.side_by_side(e.search, e.blind)
     return where
