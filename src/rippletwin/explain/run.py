@@ -15,6 +15,7 @@ from rippletwin.explain.fit import Fit, prepare
 from rippletwin.explain.judge import ADEQUATE, Judgement, judge
 from rippletwin.explain.search import GOOD, Search, Workers, extended, search, workers
 from rippletwin.explain.shaft import ShaftLines, shaft_lines
+from rippletwin.explain.sheet import WithoutEffect, without_each
 from rippletwin.explain.validate import Validation, validate
 from rippletwin.spectra import observe, revolutions_of
 from rippletwin.twin import Twin
@@ -28,7 +29,8 @@ class Explanation:
 
     observations are as fitted; single holds the base fitted to each of them alone, shaft what the
     shaft orders say that are no multiples of the pistons' number, blind the fits that know nothing
-    of the source (`rippletwin.explain.locate.compared`), located where the base lacks something.
+    of the source (`rippletwin.explain.locate.compared`), located where the base lacks something,
+    without what a free data sheet would make of the data without each accepted effect.
     """
 
     rig: object
@@ -41,6 +43,7 @@ class Explanation:
     shaft: ShaftLines | None = None
     blind: tuple[Fit, ...] = ()
     located: locate.Located | None = None
+    without: tuple[WithoutEffect, ...] = ()
 
     @property
     def twin(self) -> Twin:
@@ -111,8 +114,9 @@ def explain_observations(
         held = late if len(data) == 1 and late else None
         blind = locate.blind(pool, found)
         validation = validate(pool, found.base, explanation, held)
-    checked = validation if explanation.hypothesis else None
-    judgement = judge(found, alarms, checked, reason)
+        checked = validation if explanation.hypothesis else None
+        judgement = judge(found, alarms, checked, reason)
+        without = without_each(pool, judgement.accepted)
     return Explanation(
         rig=rig,
         observations=tuple(data),
@@ -124,6 +128,7 @@ def explain_observations(
         shaft=shaft_lines(judgement.accepted.twin, observations, HIGHEST_HZ),
         blind=tuple(blind),
         located=locate.locate(found.base, data),
+        without=without,
     )
 
 

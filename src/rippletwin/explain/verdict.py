@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -83,6 +84,7 @@ def verdict(explanation: Explanation) -> dict:
         "equivalents": [list(names) for names in (*judgement.equivalents, *alike)],
         "next_recording": next_words,
         "fit": _fit(e),
+        "without": [asdict(each) for each in e.without],
         "sentence": "",
     }
     if kind == "unexplained" and found and not found[-1]["effect"].named:
@@ -196,6 +198,7 @@ def sentence(e: Explanation, result: dict, found: list[dict], base) -> str:
                     "such line is without it, unless data speak against it."
                 ] = None
         words += numbers
+        words += _against_the_sheet(e)
         if kind == "ambiguous":
             classes = "; ".join(join(names) for names in result["equivalents"])
             words.append(f"These recordings cannot tell apart {classes}.")
@@ -233,6 +236,17 @@ def sentence(e: Explanation, result: dict, found: list[dict], base) -> str:
     if e.judgement.accepted.hypothesis and pulled[0] > detect.PULL:
         words.append(f"Check {pulled[1]}: {pulled[0]:.1f} standard deviations from the data sheet.")
     return " ".join(word for word in words if word)
+
+
+def _against_the_sheet(e: Explanation) -> list[str]:
+    """Where the data alone would do without an effect, and only the data sheet says no."""
+    return [
+        f"Without {w.effect.replace('_', ' ')} a fit at {w.misfit:.1%} would be had with "
+        f"{w.parameter} at {w.value:.3g} {w.unit}, {w.pull:.0f} standard deviations from the "
+        "data sheet, which is what rejects it."
+        for w in e.without
+        if w.rivals and w.pull > detect.PULL
+    ]
 
 
 def _passive(result: dict) -> str:

@@ -61,7 +61,9 @@ def overlay(e) -> Figure | None:
             for name, values in curves.items():
                 x, y = _trace(o, values[k][s])
                 ax.plot(x, y, label=name, **looks[name])
-            if o.orders is None:
+            if o.kind == "input_impedance":
+                ax.set_ylim(0.0, 1.1)  # of a passive line's reflection
+            elif o.orders is None:
                 ax.set_yscale("log")
         axes[-1, k].set_xlabel("frequency / Hz" if o.orders is None else "shaft angle / degrees")
     first = e.observations[0]
@@ -109,8 +111,8 @@ def residuals(e) -> Figure:
             ax.set_title(f"{title}: {o.label}", loc="left")
             if row == count - 1:
                 ax.set_xlabel("frequency / Hz")
-    bar = fig.colorbar(image, ax=axes, shrink=0.8)
-    bar.set_label("log10 |residual| / believed error")
+    bar = fig.colorbar(image, ax=axes)
+    bar.set_label("log10 |residual|\n/ believed error")
     return fig
 
 
@@ -126,9 +128,10 @@ def evidence(e) -> Figure | None:
     if search.others:
         shown["no name: " + search.others[0].label] = search.others[0]
     gains = [search.gain(f) for f in shown.values()]
-    places = np.arange(len(shown))
-    lines = sum(1 + name.count(" + ") for name in shown)
-    fig, axes = style.figure(1, 1, height=0.9 + 0.24 * lines)
+    # One effect a line of the label, and each bar as far from its neighbours as its label is high.
+    lines = np.array([1 + name.count(" + ") for name in shown])
+    places = np.cumsum(lines) - 0.5 * lines
+    fig, axes = style.figure(1, 1, height=0.9 + 0.24 * int(np.sum(lines)))
     ax = axes[0, 0]
     colours = [style.CORRECTED if g > ACCEPT else style.NEUTRAL for g in gains]
     ax.barh(places, gains, color=colours, height=0.6, label="source as stated")
@@ -136,14 +139,21 @@ def evidence(e) -> Figure | None:
     points = [(k, unseen[f.label]) for k, f in enumerate(shown.values()) if f.label in unseen]
     if points:
         k, g = np.array(points).T
-        ax.plot(g, k, "D", ms=5, color=style.MEASURED, mfc="white", label="blind to the source")
+        ax.plot(
+            g,
+            places[k.astype(int)],
+            "D",
+            ms=5,
+            color=style.MEASURED,
+            mfc="white",
+            label="blind to the source",
+        )
     ax.axvline(ACCEPT, color=style.ALARM, ls="--", lw=1, label=f"threshold {ACCEPT:g}")
     ax.axvline(0.0, color=style.MEASURED, lw=0.6)
     ax.set_xscale("symlog", linthresh=10)
     ticks = [t for t in (-1000, -100, -10, 0, 10, 100, 1000, 10000) if _within(t, gains, unseen)]
     ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
     ax.minorticks_off()
-    # One effect a line: three in a row leave no room for the bars.
     ax.set_yticks(places, [name.replace(" + ", "\n+ ") for name in shown])
     ax.set_xlabel("log evidence over the calibrated line")
     fig.legend(loc="outside upper right", ncols=3)
@@ -205,15 +215,15 @@ def immittance(e) -> Figure | None:
                 f[known], y[known], sd[known], fmt="o", ms=2.5, lw=0.6, color=style.MEASURED,
                 label="asked for by the data",
             )  # fmt: skip
-            ax.plot(f, part(law), color=style.CORRECTED, label=name.replace("_", " "))
+            ax.plot(f, part(law), color=style.CORRECTED, label="law of the effect")
             ax.axhline(0.0, color=style.NEUTRAL, lw=0.5)
             low, high = np.min(part(law)), np.max(part(law))
             room = max(high - low, 0.3 * np.max(np.abs(law)))
             ax.set_ylim(low - 0.6 * room, high + 0.6 * room)
             ax.set_ylabel(f"{title} / {m.unit}")
-        column[0].set_title(f"{m.quantity},\n{m.where}", loc="left")
-        column[0].legend()
+        column[0].set_title(f"{name.replace('_', ' ')}:\n{m.quantity},\n{m.where}", loc="left")
         column[-1].set_xlabel("frequency / Hz")
+    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
     return fig
 
 

@@ -1,0 +1,117 @@
+"""What a real line lacks, found on one measurement and shown on another: docs/validation.md.
+
+    python benchmarks/measured_tube.py RUN_1 RUN_2 FOLDER
+
+RUN_1 and RUN_2 are the two measured input impedances; FOLDER gets a case of each, and of the first
+verdict.json, twin.json and figures.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from rippletwin.case import Case, load_case
+from rippletwin.effects import EFFECTS, Place
+from rippletwin.explain.fit import Fit, Hypothesis, prepare, refine
+from rippletwin.explain.run import explain
+from rippletwin.explain.sheet import loosened
+from rippletwin.explain.validate import score
+from rippletwin.explain.verdict import write
+from rippletwin.figures.explain import draw
+from rippletwin.forward import reflection
+from rippletwin.spectra import observe
+from rippletwin.twin import Twin
+
+SHEET = Path(__file__).resolve().parent.parent / "resources" / "air_tube" / "rig.yaml"
+ACOUSTICS: Hypothesis = (
+    (EFFECTS["unsteady_friction"], Place("line")),
+    (EFFECTS["thermal_boundary_layer"], Place("line")),
+    (EFFECTS["end_radiation"], Place("load")),
+)
+
+
+def case(run: Path, folder: Path) -> Case:
+    """The tube's case with one of the measurements."""
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.copy(SHEET, folder)
+    shutil.copy(run, folder / "measured.txt")
+    return load_case(folder)
+
+
+def fitted(rig, data, effects: Hypothesis) -> Fit:
+    """Fit from the sheet, with the sheet's uncertainties as priors."""
+    base = Twin(rig, data)
+    return refine(base, effects, data, [np.zeros(len(base.with_(effects=effects).parameters))])
+
+
+def nothing_fitted(fit: Fit) -> Fit:
+    """The same twin on the sheet's values."""
+    return replace(fit, twin=fit.twin.with_(theta=np.zeros_like(fit.twin.theta)))
+
+
+def another_day(fit: Fit, observation) -> tuple[Fit, float]:
+    """The fit with the wave speed alone that suits another run, and its ratio to the first's:
+    sound goes faster in warmer air."""
+    parameter = fit.twin.parameters[fit.twin.index["wave_speed[1]"]]
+    before = fit.twin.values()["wave_speed[1]"]
+
+    def at(ratio: float) -> Fit:
+        theta = fit.twin.theta.copy()
+        theta[fit.twin.index["wave_speed[1]"]] = parameter.prior.coordinate(ratio * before)
+        return replace(fit, twin=fit.twin.with_(theta=theta))
+
+    found = minimize_scalar(
+        lambda ratio: score(at(ratio), [observation]).misfit, bounds=(0.99, 1.01), method="bounded"
+    )
+    return at(found.x), float(found.x)
+
+
+def difference(a, b) -> float:
+    """Relative difference of two runs' reflection coefficients at the frequencies both have."""
+    _, i, j = np.intersect1d(a.frequency_hz, b.frequency_hz, return_indices=True)
+    first, second = reflection(a.values[:, i]), reflection(b.values[:, j])
+    return float(np.linalg.norm(second - first) / np.linalg.norm(first))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("runs", nargs=2, type=Path, metavar="RUN")
+    parser.add_argument("folder", type=Path)
+    arguments = parser.parse_args()
+    cases = [case(run, arguments.folder / f"run_{k + 1}") for k, run in enumerate(arguments.runs)]
+    whole = [observe(c.recordings[0], c.rig) for c in cases]
+    rig, data = cases[0].rig, prepare(whole[:1], cases[0].rig)
+    print(f"the runs differ by {difference(*whole):.2%} of the reflection coefficient\n")
+    print("| | run 1 | run 2 | bore |\n|---|---|---|---|")
+
+    def row(words: str, fit: Fit) -> None:
+        one, two = (score(fit, [o]).misfit for o in whole)
+        bore = fit.twin.values()["diameter[1]"]
+        print(f"| {words} | {one:.1%} | {two:.1%} | {1e3 * bore:.2f} mm |", flush=True)
+
+    for count in range(4):
+        names = [effect.name.replace("_", " ") for effect, _ in ACOUSTICS[:count]]
+        words = "nothing fitted: steady friction" if not names else f"... {names[-1]}"
+        row(words, nothing_fitted(fitted(rig, data, ACOUSTICS[:count])))
+    row("steady friction, calibrated to run 1", fitted(rig, data, ()))
+    loose = loosened(rig)
+    row("... without the sheet's tolerances", fitted(loose, data, ()))
+    row("unsteady friction, without the sheet's tolerances", fitted(loose, data, ACOUSTICS[:1]))
+    explanation = explain(cases[0], processes=1)
+    accepted = explanation.judgement.accepted
+    row("**explained**: " + ", ".join(accepted.names).replace("_", " "), accepted)
+    warmer, ratio = another_day(accepted, whole[1])
+    row(f"... with the wave speed {ratio - 1:+.2%}, that of run 2", warmer)
+    result = write(explanation, arguments.folder / "explained")
+    draw(explanation, arguments.folder / "explained")
+    print("\n" + result["sentence"])
+
+
+if __name__ == "__main__":
+    main()

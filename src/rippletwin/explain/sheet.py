@@ -1,0 +1,112 @@
+"""The sheet or the physics: what a free data sheet would make of the data without an effect.
+
+Recalibration swallows physics. Where a fit without an accepted effect does nearly as well once the
+line's numbers may go anywhere, what speaks for the effect is the data sheet, and how far the fit
+has to leave it says how firmly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+
+from rippletwin.case import Rig, Uncertainty
+from rippletwin.explain.fit import Fit, Hypothesis, refine
+from rippletwin.explain.search import Workers
+from rippletwin.explain.validate import score
+from rippletwin.parameters import coordinates
+from rippletwin.twin import Twin
+
+LOOSER, MOST = 20.0, 0.3  # times the stated uncertainty, and at most (relative, or m)
+NEARLY = 2.0  # times the accepted misfit: a fit as good as this could be taken for the explanation
+
+
+@dataclass(frozen=True)
+class WithoutEffect:
+    """A fit without one effect, the data sheet being free.
+
+    effect     name of what was left out
+    misfit     relative, in sample
+    parameter  the line's parameter that goes furthest from the sheet
+    value, nominal   its values, `unit`
+    pull       how far that is, in standard deviations as stated
+    rivals     whether the fit is nearly as good as the accepted one
+    """
+
+    effect: str
+    misfit: float
+    parameter: str
+    value: float
+    nominal: float
+    unit: str
+    pull: float
+    rivals: bool
+
+
+def without_each(pool: Workers, accepted: Fit) -> tuple[WithoutEffect, ...]:
+    """`WithoutEffect` of every accepted effect; the others stay.
+
+    Each is first fitted with the sheet as stated, by continuation, which finds the valley; from
+    there, and from where the accepted fit is, the sheet is let go.
+    """
+    every = accepted.hypothesis
+    rests = [(*every[:k], *every[k + 1 :]) for k in range(len(every))]
+    held = pool.fit([{"hypothesis": r, "starts": [_kept(accepted, r, pool.base)]} for r in rests])
+    limit = NEARLY * score(accepted, pool.observations).misfit
+    found = []
+    for (effect, _), fit in zip(every, held):
+        fit = _free(fit, accepted, pool.observations)
+        misfit = score(fit, pool.observations).misfit
+        parameter, pull = _furthest(fit, accepted.twin)
+        found.append(
+            WithoutEffect(
+                effect=effect.name,
+                misfit=misfit,
+                parameter=parameter.name,
+                value=fit.twin.values()[parameter.name],
+                nominal=parameter.nominal,
+                unit=parameter.unit,
+                pull=pull,
+                rivals=misfit < limit,
+            )
+        )
+    return tuple(found)
+
+
+def _kept(accepted: Fit, rest: Hypothesis, base: Twin) -> dict[str, float]:
+    """Coordinates of the effects that stay, as accepted."""
+    own = [p.name for p in base.with_(effects=rest).parameters if "@" in p.name]
+    index = accepted.twin.index
+    return {name: float(accepted.twin.theta[index[name]]) for name in own if name in index}
+
+
+def _free(held: Fit, accepted: Fit, observations: Sequence) -> Fit:
+    """`held` fitted again with a sheet that is hardly known."""
+    old = held.twin
+    base = Twin(
+        loosened(old.rig),
+        observations,
+        friction=old.friction,
+        source_sd=old.source_sd,
+        guessed_load=old.guessed_load,
+    )
+    parameters = base.with_(effects=held.hypothesis).parameters
+    starts = [coordinates(parameters, twin.values()) for twin in (old, accepted.twin)]
+    return refine(base, held.hypothesis, observations, starts, held.source_free)
+
+
+def loosened(rig: Rig) -> Rig:
+    """The rig with LOOSER times the stated uncertainty, at most MOST, nowhere less than stated."""
+    stated = {f.name: getattr(rig.uncertainty, f.name) for f in fields(Uncertainty)}
+    free = {name: max(sd, min(LOOSER * sd, MOST)) for name, sd in stated.items()}
+    return replace(rig, uncertainty=Uncertainty(**free))
+
+
+def _furthest(fit: Fit, stated: Twin):
+    """The line's parameter furthest from the sheet, and how far in stated standard deviations."""
+    values, found = fit.twin.values(), []
+    for p in stated.parameters:
+        if not p.flat and "@" not in p.name:
+            found.append((abs(float(p.prior.coordinate(values[p.name]))), p.name, p))
+    pull, _, parameter = max(found)
+    return parameter, pull

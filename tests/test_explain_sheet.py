@@ -1,0 +1,63 @@
+"""What a free data sheet would make of the data without an effect."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from explain_made import make, rig
+from rippletwin.case import Uncertainty
+from rippletwin.effects import EFFECTS, Place
+from rippletwin.effects.entrained_air import air_compressibility
+from rippletwin.explain.fit import prepare, refine
+from rippletwin.explain.search import Workers
+from rippletwin.explain.sheet import loosened, without_each
+from rippletwin.twin import Twin
+
+PRESSURE = 5e6
+
+
+def accepted(effect, values, **options):
+    """(fit that knows the truth, workers without it)."""
+    hypothesis = ((effect, Place(effect.element)),)
+    names = {f"{effect.name}@{effect.element}.{k}": v for k, v in values.items()}
+    bench, recorded, truth = make(
+        np.random.default_rng(5), hypothesis, names, source=0.0, noise=500.0, **options
+    )
+    data = prepare(recorded, bench)
+    base = Twin(bench, data)
+    return refine(base, hypothesis, data, [truth.theta]), Workers(base, data)
+
+
+def test_air_at_one_pressure_is_a_slower_wave():
+    """At one mean pressure air in the oil is nothing but a slower wave: rho a^2 C more
+    compressible, so that a falls by the root of one plus that. A sheet that may move takes it all
+    up, and how far it moves is known."""
+    values = {"gas_fraction": 0.02, "polytropic_exponent": 1.2}
+    fit, pool = accepted(EFFECTS["entrained_air"], values, points=((1000, PRESSURE),))
+    (found,) = without_each(pool, fit)
+    assert found.effect == "entrained_air" and found.rivals
+    assert found.parameter.startswith("wave_speed")
+    speed = fit.twin.values()[found.parameter]
+    air = [v for p, v in fit.twin.values().items() if p.startswith("entrained_air")]
+    softer = fit.twin.rig.fluid.density * speed**2 * air_compressibility(*air, PRESSURE)
+    slower = speed / np.sqrt(1 + softer)
+    assert found.value == pytest.approx(slower, rel=0.005)
+    # Stated as 5 %, of the logarithm.
+    assert found.pull == pytest.approx(abs(np.log(slower / found.nominal)) / 0.05, rel=0.05)
+
+
+def test_no_sheet_stands_in_for_friction_that_grows_with_frequency():
+    """Attenuation by steady friction is the same at all frequencies: whatever the line's numbers,
+    unsteady friction's root of frequency is not to be had."""
+    fit, pool = accepted(EFFECTS["unsteady_friction"], {})
+    (found,) = without_each(pool, fit)
+    assert not found.rivals
+
+
+def test_loosened_is_never_tighter_than_stated():
+    """Twenty times the stated, at most 30 %, and no less than stated where that is more."""
+    stated = Uncertainty(length=0.001, diameter=0.03, wave_speed=0.05, viscosity=0.4)
+    free = loosened(replace(rig(), uncertainty=stated)).uncertainty
+    assert (free.length, free.diameter, free.wave_speed) == (0.02, 0.3, 0.3)
+    assert free.viscosity == 0.4
