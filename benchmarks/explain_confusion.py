@@ -27,7 +27,8 @@ from rippletwin.case import load_case
 from rippletwin.explain.fit import prepare
 from rippletwin.explain.posterior import smooth_basis
 from rippletwin.explain.run import HIGHEST_HZ
-from rippletwin.explain.search import alone, library, workers
+from rippletwin.explain.search import alone, library
+from rippletwin.explain.workers import workers
 from rippletwin.misfit import relative_misfit
 from rippletwin.spectra import observe
 from rippletwin.twin import Twin

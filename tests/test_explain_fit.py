@@ -10,9 +10,10 @@ from rippletwin.effects import EFFECTS, Place
 from rippletwin.explain.detect import drift, interior_test, pull
 from rippletwin.explain.fit import fit_hypothesis, refine
 from rippletwin.explain.locate import locate
-from rippletwin.explain.posterior import FLOOR, Posterior, source_scale
-from rippletwin.explain.search import ACCEPT, Workers, scan, search
+from rippletwin.explain.posterior import FLOOR, SIZE, Posterior, source_scale
+from rippletwin.explain.search import ACCEPT, search
 from rippletwin.explain.validate import validate
+from rippletwin.explain.workers import Workers, scan
 from rippletwin.forward import Forward
 from rippletwin.misfit import relative_misfit
 from rippletwin.twin import Twin
@@ -159,7 +160,8 @@ def test_pull_names_the_parameter():
 
 def test_log_likelihood_is_that_of_the_whole_covariance_matrix():
     """Squares and log determinant of the whitened residual are those of one dense Gaussian with
-    noise, model error, rough and smooth source error over all sensors, frequencies, recordings."""
+    noise, model error and the source's error (rough, smooth, of size) over all sensors,
+    frequencies and recordings."""
     rng = np.random.default_rng(12)
     _, observations, truth = make(rng, points=POINTS[:2])
     posterior = Posterior(truth, observations, 2000.0)
@@ -174,6 +176,7 @@ def test_log_likelihood_is_that_of_the_whole_covariance_matrix():
     h = (prediction * np.concatenate(scale)).ravel()
     sensors = len(prediction)
     dense = np.outer(h, h.conj()) * np.kron(np.ones((sensors, sensors)), source)
+    dense += SIZE**2 * np.outer(prediction.ravel(), prediction.ravel().conj())
     noise = np.concatenate([o.covariance[:, 0, 0].real for o in posterior.observations])
     dense += np.diag(np.tile(noise + 0.02**2 * posterior.power, sensors))
     e = (posterior.values - prediction).ravel()

@@ -171,7 +171,9 @@ def in_the_chain(insert, s):
     """The same for the frequency domain."""
     if isinstance(insert, Branch):
         pipe = insert.pipe
-        y = branch_admittance(s, pipe.length, pipe.diameter, pipe.wave_speed, DENSITY, VISCOSITY)
+        y = branch_admittance(
+            s, pipe.length, pipe.diameter, pipe.wave_speed, DENSITY, VISCOSITY, insert.loss
+        )
         return Insert(insert.position, "shunt", y)
     return Insert(insert.position, insert.kind, insert.immittance(s))
 
@@ -214,7 +216,7 @@ VOLUME, LEAK, W = 2e-14, 5e-11, 2 * np.pi * 700.0
 SPOOL = Element(1.3037, "shunt", (0.4 / 4e9 * W**2,), (1.0, 0.6 * W, W**2))
 RESONATOR = Element(0.5, "series", (3e9 * W, 0.0), (1.0, 0.3 * W, W**2))
 MASS = Element(1.0, "series", (3e5, 0.0))
-STUB = Branch(0.8, Pipe(0.3, 0.008, 1250.0))
+STUB = Branch(0.8, Pipe(0.3, 0.008, 1250.0), 0.6)
 
 
 @pytest.mark.parametrize(

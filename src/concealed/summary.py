@@ -8,6 +8,7 @@ import numpy as np
 from scipy.stats import beta
 
 CHANGES = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, np.inf)
+NEAR_FLOOR = 1.2
 PROBABILITIES = (0.0, 0.5, 0.8, 0.95, 0.99, 1.0)
 
 
@@ -102,6 +103,15 @@ def scores(rows: list[dict]) -> list[tuple[str, str, Rate]]:
             "95 % intervals that hold the true value",
             "92 to 97 %",
             rate(i for row in rows for i in row["intervals"]),
+        ),
+        (
+            "Rightly named: held-out misfit within 1.2 times the floor",
+            "",
+            rate(
+                row["held_out_after"] <= NEAR_FLOOR * row["floor"]
+                for row in rows
+                if row["right"] and row["clean"]
+            ),
         ),
         (
             "Delays and impedances within two deviations, corrected",

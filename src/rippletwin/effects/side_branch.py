@@ -17,15 +17,15 @@ from rippletwin.line.chain import Insert
 from rippletwin.line.parts import Branch, Pipe
 
 
-def branch_admittance(s, length, diameter, wave_speed, density, viscosity):
+def branch_admittance(s, length, diameter, wave_speed, density, viscosity, loss=1.0):
     """Input admittance A/(rho a) sqrt(s/z) tanh(l sqrt(s z)/a) of a closed branch, m3/(Pa s).
 
-    z = s (1 + sqrt(r) + ...) carries the laminar boundary layer to first order,
-    s I0/I2 = s (1 + 2/r), r = R sqrt(s/nu): without loss the branch would be infinitely sharp.
+    z = s (1 + 2 c/r), r = R sqrt(s/nu), is the laminar boundary layer to first order, `loss` c
+    times: what a branch holds, its fittings and its end are known less well than the line's oil,
+    and at resonance its loss alone decides how sharp it is.
     """
     area = 0.25 * np.pi * diameter**2
-    loss = 1.0 + 2.0 / (0.5 * diameter * np.sqrt(s / viscosity))
-    root = np.sqrt(loss)
+    root = np.sqrt(1.0 + 2.0 * loss / (0.5 * diameter * np.sqrt(s / viscosity)))
     return area / (density * wave_speed * root) * np.tanh(length * s * root / wave_speed)
 
 
@@ -38,6 +38,7 @@ def _apply(network, line, values, place):
         line.wave_speeds[k],
         line.density,
         line.viscosity,
+        values["loss"],
     )
     network.inserts.append(Insert(on_line(network, values["position"]), "shunt", admittance))
 
@@ -46,19 +47,20 @@ def _in_time(line, state, values, place):
     # A pipe of its own at a junction, its far end closed.
     k = segment_at([pipe.length for pipe in line.pipes], values["position"])
     pipe = Pipe(values["length"], values["diameter"], state.wave_speeds[k])
-    line.inserts.append(Branch(on_line(line, values["position"]), pipe))
+    line.inserts.append(Branch(on_line(line, values["position"]), pipe, values["loss"]))
 
 
 EFFECT = Effect(
     name="side_branch",
     element="position",
     medium="any",
-    equation="q1 - q2 = Y p, Y = A_b/(rho a sqrt(1 + 2/r)) tanh(s l_b sqrt(1 + 2/r)/a)",
+    equation="q1 - q2 = Y p, Y = A_b/(rho a sqrt(1 + 2 c/r)) tanh(s l_b sqrt(1 + 2 c/r)/a)",
     source="Wylie & Streeter 1993, sec. 12.5 (branch); Zielke 1968 (loss, first order in 1/r)",
     parameters=lambda rig, place: (
         position_parameter(rig),
         Parameter("length", "m", lognormal(0.4, 0.8), (-1.2, 0.0, 1.2)),
         Parameter("diameter", "m", lognormal(0.6 * rig.line[0].diameter, 0.5)),
+        Parameter("loss", "1", lognormal(1.0, 1.0)),
     ),
     places=position_place,
     apply=_apply,

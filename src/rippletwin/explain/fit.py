@@ -29,6 +29,9 @@ LIMITS_HZ = (800.0, 1500.0, 2500.0, 4000.0)
 SCALINGS = (0.0, -0.7, 0.7, -1.4, 1.4, -2.1, 2.1)
 """Of the wave speed of the longest segment and of all others, in prior standard deviations: every
 pair of them is a start."""
+WIDE, FAR = 400, 2.0
+"""A line without effects is tried from as many wave speeds at random besides, each as many prior
+standard deviations away: all other fits lean on it, and a sheet may be further off than it says."""
 FEW = 3
 """Up to so many starts all pairs of scalings are tried; with more, as for a position along the
 line, all wave speeds are scaled together."""
@@ -155,7 +158,7 @@ def fit_hypothesis(
             steps = LAST_STEPS if last else STEPS[min(stage, len(STEPS) - 1)]
             theta, value = descend(posterior, theta, steps)
             fits.append((value, theta))
-        kept = KEPT[len(starts) > FEW]
+        kept = KEPT[len(starts) > FEW or not hypothesis]
         states = _distinct(fits)[: 1 if last else kept[min(stage, len(kept) - 1)]]
     return conclude(posterior, hypothesis, states[0][1])
 
@@ -177,11 +180,15 @@ def _first_states(posterior: Posterior, starts) -> list:
             thetas[twin.index[name]] = u
         thetas[speeds] = [b for _, b in pairs]
         thetas[speeds[longest]] = [a for a, _ in pairs]
+        if not posterior.twin.effects:
+            anywhere = np.zeros((len(twin.parameters), WIDE))
+            anywhere[speeds] = FAR * np.random.default_rng(0).normal(size=(len(speeds), WIDE))
+            thetas = np.concatenate([thetas, anywhere], axis=1)
         aligned = [align(posterior, theta) for theta in thetas.T]
         groups.append(sorted(aligned, key=lambda g: g[0]))
     first = [group[0] for group in groups]
     rest = sorted((g for group in groups for g in group[1:]), key=lambda g: g[0])
-    tried = TRIED[len(starts) > FEW]
+    tried = TRIED[len(starts) > FEW or not posterior.twin.effects]
     return sorted(first, key=lambda g: g[0])[:tried] + rest[: max(tried - len(first), 0)]
 
 

@@ -18,6 +18,10 @@ VERDICTS = ("consistent", "named", "ambiguous", "unexplained", "calibration_only
 EQUIVALENT = 3.0
 """Log evidence within which two explanations cannot be told apart: twenty to one."""
 
+SURE = 2.0 * ACCEPT
+"""Log evidence from which something is missing even where the line fits without and no explanation
+holds on data left out."""
+
 ADEQUATE = 5.0 * GOOD
 """Relative model error above which no name is given: an effect that leaves more than this is at
 most a part of what is missing."""
@@ -53,16 +57,25 @@ def judge(
     if nameless:
         return Judgement("unexplained", other)
     if not best.hypothesis:
-        if "misfit" in alarms.ringing or "drift" in alarms.ringing:
-            return Judgement("unexplained", best)
-        calibrated = {"pull", "disagreement"} & set(alarms.ringing)
-        return Judgement("calibration_only" if calibrated else "consistent", best)
-    if best.floor > ADEQUATE or (validation is not None and not validation.holds):
+        return _nothing_missing(best, alarms)
+    fails = validation is not None and not validation.holds
+    if fails and search.base.floor <= GOOD and search.gain(best) < SURE:
+        # A line that fits without it, and data left out that speak against it: an absorber.
+        return _nothing_missing(search.base, alarms)
+    if best.floor > ADEQUATE or fails:
         # Without a name it is modelled all the same, by whatever describes the data best.
         stands_in = other is not None and other.evidence > best.evidence
         return Judgement("unexplained", other if stands_in else best)
     classes = equivalents(search)
     return Judgement("ambiguous" if classes else "named", best, classes)
+
+
+def _nothing_missing(base: Fit, alarms: Alarms) -> Judgement:
+    """The line alone, if no alarm says that it does not fit."""
+    if "misfit" in alarms.ringing or "drift" in alarms.ringing:
+        return Judgement("unexplained", base)
+    calibrated = {"pull", "disagreement"} & set(alarms.ringing)
+    return Judgement("calibration_only" if calibrated else "consistent", base)
 
 
 def needed_over(best: Fit, search: Search) -> float:

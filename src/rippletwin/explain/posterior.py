@@ -3,7 +3,7 @@
 The model of the errors is noise with a covariance C, a relative model error delta common to all
 sensors, and the error of a nominal source, relative and along the prediction h, in two parts:
 
-    E[e e^H] = C + (delta^2 m + lambda^2 n) I + (sigma^2 I + tau^2 K) o g h (g h)^H
+    E[e e^H] = C + (delta^2 m + lambda^2 n) I + (sigma^2 I + tau^2 K) o g h (g h)^H + s^2 h h^H
 
 sigma is the part that differs from harmonic to harmonic, tau the part that is smooth in frequency,
 as a wrong bulk modulus or port timing makes it. Between frequencies f and f' of recordings o and p
@@ -15,6 +15,12 @@ frequency, for an error of timing is one of phase, and half of both is common to
 points, for it is the same pump that is modelled wrongly. A smooth error is what an effect
 at the pump, friction or a hose may look like; without it their standard deviations would be several
 times too small, and an effect at the pump would be named where only the ripple is wrong.
+
+tau is what the residual says, but of one thing it says nothing: an error of the ripple's size that
+all operating points share is taken up by the line's impedance, all segments alike. Displacement
+fixes the mean flow and not the backflow, which makes most of a ripple and goes with the bulk
+modulus. So a size common to all is uncertain by s = 3 % whatever tau is; without it the impedances
+of concealed cases were off by 1 to 4 % and stated to 0.8 % (docs/explain.md).
 
 g >= 1 is the size of the nominal ripple about a harmonic over that of the harmonic itself: where
 two parts of the ripple cancel, or 40 dB below the strongest harmonic, a few per cent of the parts
@@ -44,6 +50,7 @@ FLOORS = np.geomspace(FLOOR, 1.5, 9)
 SOURCE_SDS = np.array([0.003, 0.01, 0.03, 0.1])
 """sigma is one of these, the last being the largest that is put down to the ripple."""
 SMOOTH_SDS = np.array([0.01, 0.03, 0.1])  # the same for tau
+SIZE = 0.03  # s
 CORRELATION_HZ = 1000.0  # l and f0
 LEAST = 0.01  # of the strongest harmonic: smaller ones are uncertain by more than their own share
 PRODUCTS = 0.2  # lambda
@@ -90,9 +97,9 @@ class Posterior:
         for o, part in zip(data, self.forward.slices):
             if o.source == "nominal":
                 self._scale[part] = source_scale(self.forward.source[part])
-        self._basis = self._scale[nominal] * smooth_basis(
-            self.forward.frequency_hz[nominal], self.forward.recording[nominal]
-        )
+        smooth = smooth_basis(self.forward.frequency_hz[nominal], self.forward.recording[nominal])
+        size = np.ones((1, smooth.shape[1]))
+        self._basis = np.concatenate([self._scale[nominal] * smooth, size])
         self.count = 2 * (self.values.size - int(np.sum(self._free)))
         self._pressures = all(o.kind != "input_impedance" for o in data)
 
@@ -126,8 +133,13 @@ class Posterior:
             np.sqrt(self._variance(self.floor)),
             np.where(self._known, 0.0, np.where(self._free, np.inf, self.source_sd * self._scale)),
             self._nominal,
-            self.smooth_sd * self._basis,
+            self._sds(self.smooth_sd)[:, None] * self._basis,
         )
+
+    def _sds(self, smooth_sd) -> np.ndarray:
+        """Standard deviations (..., J) of the basis's amplitudes for tau (...)."""
+        smooth = np.repeat(np.asarray(smooth_sd)[..., None], len(self._basis) - 1, axis=-1)
+        return np.concatenate([smooth, np.full((*smooth.shape[:-1], 1), SIZE)], axis=-1)
 
     def estimate_errors(self, prediction: np.ndarray, theta: np.ndarray) -> None:
         """Set floor and source errors to their most likely values given the residuals at theta.
@@ -165,12 +177,13 @@ class Posterior:
                     optimize=["einsum_path", (0, 1), (0, 1)],
                 )  # fmt: skip
                 share = (cross[:, self._nominal] * gain) @ self._basis.T  # (G, D, J)
+                sizes_of = self._sds(taus)[:, None, None]  # (T, 1, 1, J)
                 root = np.linalg.cholesky(
-                    np.eye(len(self._basis)) + taus[:, None, None, None, None] ** 2 * gram
+                    np.eye(len(self._basis)) + sizes_of[..., None] * gram * sizes_of[..., None, :]
                 )
                 both = np.stack([share.real, share.imag], axis=-1)
-                solved = np.linalg.solve(root, np.broadcast_to(both, (len(taus), *both.shape)))
-                cost -= scale * taus[:, None, None] ** 2 * np.sum(solved**2, axis=(-2, -1))
+                solved = np.linalg.solve(root, sizes_of[..., None] * both)
+                cost -= scale * np.sum(solved**2, axis=(-2, -1))
                 cost += 2 * np.sum(np.log(np.diagonal(root, axis1=-2, axis2=-1)), axis=-1)
             smooth, source, best = np.unravel_index(np.argmin(cost), cost.shape)
             self.floor = float(floors[best])
@@ -208,8 +221,8 @@ class Posterior:
         """Most likely source (F,) relative to the prediction's, given whitened residuals."""
         pull = np.sum(np.conj(self._rotate(prediction)) * metric.adjoint(whitened), axis=0)
         error = (self.source_sd * self._scale) ** 2 * pull
-        smooth = self._basis.T @ (self._basis @ pull[self._nominal])
-        error[self._nominal] += self.smooth_sd**2 * smooth
+        sds = self._sds(self.smooth_sd)
+        error[self._nominal] += self._basis.T @ (sds**2 * (self._basis @ pull[self._nominal]))
         return np.where(
             self._free, self._amplitude(prediction), 1.0 + np.where(self._known, 0.0, error)
         )

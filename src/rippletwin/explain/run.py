@@ -13,10 +13,11 @@ from rippletwin.errors import InputError
 from rippletwin.explain import contradiction, detect, locate
 from rippletwin.explain.fit import Fit, prepare
 from rippletwin.explain.judge import ADEQUATE, Judgement, judge
-from rippletwin.explain.search import GOOD, Search, Workers, extended, search, workers
+from rippletwin.explain.search import GOOD, Search, extended, search
 from rippletwin.explain.shaft import ShaftLines, shaft_lines
 from rippletwin.explain.sheet import WithoutEffect, without_each
 from rippletwin.explain.validate import Validation, validate
+from rippletwin.explain.workers import Workers, workers
 from rippletwin.spectra import observe, revolutions_of
 from rippletwin.twin import Twin
 

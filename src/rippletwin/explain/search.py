@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise, product
-from multiprocessing import get_context
 
 import numpy as np
 
 from rippletwin.effects import Effect, Place, candidates
-from rippletwin.explain.fit import Fit, Hypothesis, fit_hypothesis, refine
+from rippletwin.explain.fit import Fit, Hypothesis
 from rippletwin.explain.posterior import FLOOR
-from rippletwin.twin import Twin
+from rippletwin.explain.workers import Workers, carry, scan
 
 ACCEPT = 8.0
 """Log evidence that an effect must add. The largest that chance gave any effect of the library in
@@ -23,32 +19,9 @@ parametric bootstraps of no-effect cases with refitting is below it (docs/explai
 CERTAIN = -3.0  # the same for an effect that no real line is without: twenty to one against it
 MOST = 4  # effects at a time
 STAND_INS = 10  # single effects tried in the place of another
-WEAK = -2.0  # of a weak effect's parameters, in prior standard deviations
+LENT = 5  # single effects from whose lines the base is fitted again
+LIMITS = {"line_volume": "load_volume"}  # effects at any place that are another at the line's end
 GOOD = 2.0 * FLOOR  # relative model error at which a fit is as good as it can be believed
-
-
-def scan(rig, hypothesis: Hypothesis, weak: bool = False) -> list[dict[str, float]]:
-    """Starts for the newest effect of a hypothesis: all combinations of its parameters' scans.
-
-    With `weak` the positive parameters that have no scan of their own start at WEAK, and places
-    along the line twice as densely: about a good fit the valleys are narrow.
-    """
-    if not hypothesis:
-        return [{}]
-    effect, place = hypothesis[-1]
-    parameters = effect.parameters(rig, place)
-    names = [f"{effect.name}@{place}.{p.name}" for p in parameters]
-    scans = [_weak(p) if weak else p.scan for p in parameters]
-    return [dict(zip(names, us)) for us in product(*scans)]
-
-
-def _weak(parameter) -> tuple[float, ...]:
-    if parameter.prior.kind == "lognormal" and len(parameter.scan) == 1:
-        return (WEAK,)
-    if parameter.prior.kind == "uniform":
-        between = [0.5 * (a + b) for a, b in pairwise(parameter.scan)]
-        return tuple(sorted([*parameter.scan, *between]))
-    return parameter.scan
 
 
 def library(rig, observations: Sequence, named: bool = True) -> list[tuple[Effect, Place]]:
@@ -64,76 +37,6 @@ def library(rig, observations: Sequence, named: bool = True) -> list[tuple[Effec
             continue  # act at shaft orders that are not fitted, see `rippletwin.explain.shaft`
         found.append((effect, place))
     return found
-
-
-class Workers:
-    """Fits hypotheses to one set of data, in `pool` or, where that is None, in this process."""
-
-    def __init__(self, base: Twin, observations: Sequence, pool=None):
-        self.base, self.observations = base, list(observations)
-        self._pool = pool
-
-    def fit(self, jobs: Sequence[dict], progress: Callable[[], None] | None = None) -> list[Fit]:
-        """Fits in the order of `jobs`, each a hypothesis and options of `work`."""
-        if self._pool is None:
-            _prepare(self.base, self.observations)
-            results = map(work, jobs)
-        else:
-            results = self._pool.map(work, jobs)
-        fits = []
-        for fit in results:
-            fits.append(fit)
-            if progress is not None:
-                progress()
-        return fits
-
-
-@contextmanager
-def workers(base: Twin, observations: Sequence, count: int) -> Iterator[Workers]:
-    """`Workers` with `count` processes; an interrupt ends them."""
-    if count < 2:
-        yield Workers(base, observations)
-        return
-    pool = ProcessPoolExecutor(
-        count, get_context("fork"), initializer=_prepare, initargs=(base, observations)
-    )
-    try:
-        yield Workers(base, observations, pool)
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
-_DATA: tuple = ()  # of a worker process: base twin and observations
-
-
-def _prepare(base, observations):
-    global _DATA
-    _DATA = base, observations
-
-
-def work(job: dict) -> Fit:
-    """Fit `hypothesis` to the observations with the indices `use` (all by default).
-
-    With `theta` from there; with `fit` from where that ended and the newest effect's scan, as
-    strong as its prior and weak; else by continuation from the starts `starts` or the newest
-    effect's scan; `source_free` as in `fit_hypothesis`.
-    """
-    base, observations = _DATA
-    use = job.get("use")
-    observations = observations if use is None else [observations[k] for k in use]
-    hypothesis, free = job["hypothesis"], job.get("source_free", False)
-    if "theta" in job:
-        return refine(base, hypothesis, observations, [job["theta"]], free)
-    if "fit" in job:
-        twin, thetas = base.with_(effects=hypothesis), []
-        for start in scan(base.rig, hypothesis) + scan(base.rig, hypothesis, weak=True):
-            theta = carry(job["fit"], hypothesis, base)
-            for name, u in start.items():
-                theta[twin.index[name]] = u
-            thetas.append(theta)
-        return refine(base, hypothesis, observations, thetas, free)
-    starts = job.get("starts") or scan(base.rig, hypothesis)
-    return fit_hypothesis(base, hypothesis, observations, starts, free)
 
 
 @dataclass
@@ -176,7 +79,7 @@ def search(pool: Workers, progress: Callable[[str, int, int], None] | None = Non
             if new.evidence - best.evidence < CERTAIN:
                 break
         best, rivals = new, step
-        best = exchange(pool, backward(pool, best), singles)
+        best = simplify(pool, exchange(pool, backward(pool, best), singles), found)
         if len(best.hypothesis) >= MOST:
             break
         jobs = [
@@ -193,13 +96,24 @@ def alone(pool: Workers, found: Sequence, progress=None) -> tuple[Fit, list[Fit]
     """The base, and each of the candidates `found` alone, best first."""
     tell = _counter(progress, "single effects", len(found) + 1)
     fits = pool.fit([{"hypothesis": h} for h in [(), *((c,) for c in found)]], tell)
-    base, singles = fits[0], fits[1:]
+    base, singles = _lowest(pool, fits[0], fits[1:]), fits[1:]
     if base.floor <= GOOD:
         # A line that fits without the effect has no other valley for it than a weak one nearby.
         tell = _counter(progress, "weak effects", len(found))
         near = pool.fit([{"hypothesis": f.hypothesis, "fit": base} for f in singles], tell)
         singles = [max(pair, key=lambda f: f.evidence) for pair in zip(singles, near)]
     return base, polish(pool, _ranked(singles))
+
+
+def _lowest(pool: Workers, base: Fit, singles: Sequence[Fit]) -> Fit:
+    """The base, or what it becomes from where the best effects have brought the line.
+
+    A base that stopped in a wrong valley, as from a sheet that is far off, would give all of the
+    way out of it to whichever effect first finds out.
+    """
+    starts = _ranked(singles)[:LENT]
+    jobs = [{"hypothesis": (), "theta": carry(fit, (), pool.base)} for fit in starts]
+    return max([base, *pool.fit(jobs)], key=lambda fit: fit.evidence)
 
 
 def exchange(pool: Workers, best: Fit, singles: Sequence[Fit], rounds: int = 2) -> Fit:
@@ -225,6 +139,33 @@ def exchange(pool: Workers, best: Fit, singles: Sequence[Fit], rounds: int = 2) 
             break
         best = better[0]
     return best
+
+
+def simplify(pool: Workers, best: Fit, found: Sequence) -> Fit:
+    """Put in the place of each effect one that it contains, unless that costs ACCEPT.
+
+    What the larger has besides is physics of its own, which has to be worth as much as any other.
+    """
+    for k, member in enumerate(best.hypothesis):
+        rest = best.hypothesis[:k] + best.hypothesis[k + 1 :]
+        jobs = [
+            {"hypothesis": (*rest, c), "fit": best}
+            for c in found
+            if c not in rest and _contains(member, c, pool.base.rig)
+        ]
+        for fit in _ranked(pool.fit(jobs))[:1]:
+            if fit.evidence > best.evidence - ACCEPT:
+                return simplify(pool, fit, found)
+    return best
+
+
+def _contains(member, other, rig) -> bool:
+    """Whether an effect is a special case of another: of its equations, or where it may be."""
+    (effect, place), (less, where) = member, other
+    if effect is not less:
+        return LIMITS.get(effect.name) == less.name
+    names = [{p.name for p in e.parameters(rig, at)} for e, at in (member, other)]
+    return place.element == where.element and names[1] < names[0]
 
 
 def restarted(best: Fit, hypothesis: Hypothesis, rig) -> dict:
@@ -292,17 +233,6 @@ def backward(pool: Workers, best: Fit) -> Fit:
             break
         best = fits[weakest]
     return best
-
-
-def carry(fit: Fit, hypothesis: Hypothesis, base: Twin) -> np.ndarray:
-    """theta of a twin with another hypothesis, parameters in common where `fit` has them."""
-    twin = base.with_(effects=hypothesis)
-    return np.array(
-        [
-            fit.twin.theta[fit.twin.index[p.name]] if p.name in fit.twin.index else 0.0
-            for p in twin.parameters
-        ]
-    )
 
 
 def needed(fit: Fit) -> float:

@@ -12,8 +12,8 @@ from dataclasses import dataclass, fields, replace
 
 from rippletwin.case import Rig, Uncertainty
 from rippletwin.explain.fit import Fit, Hypothesis, refine
-from rippletwin.explain.search import Workers
 from rippletwin.explain.validate import score
+from rippletwin.explain.workers import Workers
 from rippletwin.parameters import coordinates
 from rippletwin.twin import Twin
 

@@ -12,9 +12,10 @@ import numpy as np
 
 from rippletwin.explain.fit import Fit, align, select
 from rippletwin.explain.posterior import Posterior
-from rippletwin.explain.search import Workers
+from rippletwin.explain.workers import Workers
 from rippletwin.misfit import relative_misfit, theil
 
+UNKNOWN = 0.5  # variance of a coordinate whose prior has 1
 AGREE = 3.5  # standard deviations between a fold's parameter of an effect and the whole fit's
 
 
@@ -124,13 +125,16 @@ def _difference(whole: Fit, fold: Fit) -> float:
     """Largest difference of an effect's parameter in the fold's standard deviations.
 
     The fold's data are part of the whole's, so that the variance of the difference is the fold's
-    less the whole's; it is held above a quarter of the fold's.
+    less the whole's; it is held above a quarter of the fold's. A parameter of which the fold knows
+    hardly more than its prior, as a pressure exponent at one pressure, cannot disagree.
     """
     worst = 0.0
     for p in whole.twin.parameters:
         if "@" in p.name:
             k, m = whole.twin.index[p.name], fold.twin.index[p.name]
             own = fold.covariance[m, m]
+            if own > UNKNOWN:
+                continue
             variance = max(own - whole.covariance[k, k], 0.25 * own) + 1e-4
             z = abs(whole.twin.theta[k] - fold.twin.theta[m]) / np.sqrt(variance)
             worst = max(worst, float(z))

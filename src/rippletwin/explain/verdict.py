@@ -218,7 +218,7 @@ def sentence(e: Explanation, result: dict, found: list[dict], base) -> str:
         words.append(f"Next: {result['next_recording']}.")
     if kind in ("named", "ambiguous") and found:
         if places(e.search):
-            words.append("Its place cannot be told: see equivalents.")
+            words.append("Its place or form cannot be told: see equivalents.")
         words.append(_without_source(e))
     if kind == "bad_data":
         words = [f"The data contradict themselves: {e.judgement.reason}."]

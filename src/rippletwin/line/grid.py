@@ -28,6 +28,7 @@ class Grid:
         self.mean = float(np.mean(line.flow))
         self.pipes, self.starts, joints = _cut(line, self.dt)
         self.main = len(self.pipes)
+        self.thicker = [1.0] * self.main  # than the line's oil: what friction of a branch is worth
         self._rungs(joints)
         self._lay()
         self._losses()
@@ -44,6 +45,7 @@ class Grid:
             if isinstance(rung, Branch):
                 self.kinds[r] = kernel.BRANCH, len(self.pipes)
                 self.pipes.append(rung.pipe)
+                self.thicker.append(rung.loss**2)
                 self.starts.append(rung.position)
             else:
                 self.kinds[r, 0] = {"shunt": kernel.SHUNT, "series": kernel.SERIES}[rung.kind]
@@ -87,7 +89,7 @@ class Grid:
                 friction, steady = "unsteady", BRANCH_STEADY
             area, radius = 0.25 * np.pi * pipe.diameter**2, 0.5 * pipe.diameter
             inertance = line.density / area * pipe.wave_speed * self.dt
-            rate = line.viscosity / radius**2
+            rate = self.thicker[k] * line.viscosity / radius**2
             soft = 0.0
             for m, (kappa, tau) in enumerate(pipe.creep):
                 x = self.dt / tau

@@ -63,11 +63,13 @@ class Element:
 class Branch:
     """A `pipe` with its far end closed, at `position` (m).
 
-    Its friction is the boundary layer to first order, Z' = (rho/A) s (1 + 2/r), r = R sqrt(s/nu).
+    Its friction is the boundary layer to first order, `loss` times:
+    Z' = (rho/A) s (1 + 2 loss/r), r = R sqrt(s/nu).
     """
 
     position: float
     pipe: Pipe
+    loss: float = 1.0
 
 
 @dataclass(frozen=True)

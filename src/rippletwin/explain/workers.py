@@ -1,0 +1,121 @@
+"""Fits of many hypotheses to one set of data, in processes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from itertools import pairwise, product
+from multiprocessing import get_context
+
+import numpy as np
+
+from rippletwin.explain.fit import Fit, Hypothesis, fit_hypothesis, refine
+from rippletwin.twin import Twin
+
+WEAK = -2.0  # of a weak effect's parameters, in prior standard deviations
+
+
+def scan(rig, hypothesis: Hypothesis, weak: bool = False) -> list[dict[str, float]]:
+    """Starts for the newest effect of a hypothesis: all combinations of its parameters' scans.
+
+    With `weak` the positive parameters that have no scan of their own start at WEAK, and places
+    along the line twice as densely: about a good fit the valleys are narrow.
+    """
+    if not hypothesis:
+        return [{}]
+    effect, place = hypothesis[-1]
+    parameters = effect.parameters(rig, place)
+    names = [f"{effect.name}@{place}.{p.name}" for p in parameters]
+    scans = [_weak(p) if weak else p.scan for p in parameters]
+    return [dict(zip(names, us)) for us in product(*scans)]
+
+
+def _weak(parameter) -> tuple[float, ...]:
+    if parameter.prior.kind == "lognormal" and len(parameter.scan) == 1:
+        return (WEAK,)
+    if parameter.prior.kind == "uniform":
+        between = [0.5 * (a + b) for a, b in pairwise(parameter.scan)]
+        return tuple(sorted([*parameter.scan, *between]))
+    return parameter.scan
+
+
+def carry(fit: Fit, hypothesis: Hypothesis, base: Twin) -> np.ndarray:
+    """theta of a twin with another hypothesis, parameters in common where `fit` has them."""
+    twin = base.with_(effects=hypothesis)
+    return np.array(
+        [
+            fit.twin.theta[fit.twin.index[p.name]] if p.name in fit.twin.index else 0.0
+            for p in twin.parameters
+        ]
+    )
+
+
+class Workers:
+    """Fits hypotheses to one set of data, in `pool` or, where that is None, in this process."""
+
+    def __init__(self, base: Twin, observations: Sequence, pool=None):
+        self.base, self.observations = base, list(observations)
+        self._pool = pool
+
+    def fit(self, jobs: Sequence[dict], progress: Callable[[], None] | None = None) -> list[Fit]:
+        """Fits in the order of `jobs`, each a hypothesis and options of `work`."""
+        if self._pool is None:
+            _prepare(self.base, self.observations)
+            results = map(work, jobs)
+        else:
+            results = self._pool.map(work, jobs)
+        fits = []
+        for fit in results:
+            fits.append(fit)
+            if progress is not None:
+                progress()
+        return fits
+
+
+@contextmanager
+def workers(base: Twin, observations: Sequence, count: int) -> Iterator[Workers]:
+    """`Workers` with `count` processes; an interrupt ends them."""
+    if count < 2:
+        yield Workers(base, observations)
+        return
+    pool = ProcessPoolExecutor(
+        count, get_context("fork"), initializer=_prepare, initargs=(base, observations)
+    )
+    try:
+        yield Workers(base, observations, pool)
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+_DATA: tuple = ()  # of a worker process: base twin and observations
+
+
+def _prepare(base, observations):
+    global _DATA
+    _DATA = base, observations
+
+
+def work(job: dict) -> Fit:
+    """Fit `hypothesis` to the observations with the indices `use` (all by default).
+
+    With `theta` from there; with `fit` from where that ended and the newest effect's scan, as
+    strong as its prior and weak; else by continuation from the starts `starts` or the newest
+    effect's scan; `source_free` as in `fit_hypothesis`.
+    """
+    base, observations = _DATA
+    use = job.get("use")
+    observations = observations if use is None else [observations[k] for k in use]
+    hypothesis, free = job["hypothesis"], job.get("source_free", False)
+    if "theta" in job:
+        return refine(base, hypothesis, observations, [job["theta"]], free)
+    if "fit" in job:
+        twin, thetas = base.with_(effects=hypothesis), []
+        for start in scan(base.rig, hypothesis) + scan(base.rig, hypothesis, weak=True):
+            theta = carry(job["fit"], hypothesis, base)
+            for name, u in start.items():
+                theta[twin.index[name]] = u
+            thetas.append(theta)
+        return refine(base, hypothesis, observations, thetas, free)
+    starts = job.get("starts") or scan(base.rig, hypothesis)
+    return fit_hypothesis(base, hypothesis, observations, starts, free)

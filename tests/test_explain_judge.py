@@ -1,0 +1,61 @@
+"""From fits to a verdict, and which of two explanations that contain each other is taken."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from explain_made import rig
+from rippletwin.effects import EFFECTS, Place
+from rippletwin.explain.detect import Alarms
+from rippletwin.explain.fit import Fit
+from rippletwin.explain.judge import SURE, judge
+from rippletwin.explain.search import ACCEPT, Search, simplify
+from rippletwin.explain.validate import Score, Validation
+
+QUIET = Alarms(0.004, (1.0, "diameter[1]"), (1.0, "length[1]"), (1.0, ""))
+HOSE = (EFFECTS["viscoelastic_wall"], Place("segment 1", 0))
+VOLUME = (EFFECTS["line_volume"], Place("position"))
+END = (EFFECTS["load_volume"], Place("load"))
+SMALL = (EFFECTS["source_impedance"], Place("source", form="volume"))
+LARGE = (EFFECTS["source_impedance"], Place("source", form="volume and passage"))
+
+
+def fit(evidence, *hypothesis):
+    return Fit(hypothesis, None, 0.0, evidence, None, 0.004, 0.01, 0.01)
+
+
+def validation(after, disagreement=1.0):
+    scores = [{"held_out": Score(m, 0.5 * m)} for m in (0.02, after)]
+    return Validation(*scores, ("recording 1",), disagreement)
+
+
+@pytest.mark.parametrize(
+    ("gain", "after", "verdict"),
+    [
+        (SURE - 1, 0.01, "named"),
+        (SURE - 1, 0.03, "consistent"),  # the line fits without, data left out speak against it
+        (SURE + 1, 0.03, "unexplained"),  # too much evidence for chance, and no explanation
+    ],
+)
+def test_an_explanation_must_hold_where_it_was_not_fitted(gain, after, verdict):
+    base, best = fit(0.0), fit(gain, HOSE)
+    found = judge(Search(base, [best], best), QUIET, validation(after))
+    assert found.verdict == verdict
+    assert found.accepted is (base if verdict == "consistent" else best)
+
+
+@pytest.mark.parametrize(("large", "small"), [(LARGE, SMALL), (VOLUME, END)])
+@pytest.mark.parametrize("cost", [ACCEPT - 1, ACCEPT + 1])
+def test_the_larger_of_two_must_be_worth_its_physics(large, small, cost):
+    """A passage beside a volume, a place of its own for a volume: kept if they bring ACCEPT."""
+    best = fit(100.0, HOSE, large)
+    asked = []
+
+    def answer(jobs):
+        asked.extend(jobs)
+        return [fit(100.0 - cost, *job["hypothesis"]) for job in jobs]
+
+    pool = SimpleNamespace(base=SimpleNamespace(rig=rig()), fit=answer)
+    taken = simplify(pool, best, [HOSE, VOLUME, END, SMALL, LARGE])
+    assert [job["hypothesis"] for job in asked] == [(HOSE, small)]
+    assert taken.hypothesis == ((HOSE, small) if cost < ACCEPT else (HOSE, large))
