@@ -16,7 +16,7 @@ def markdown(rows: list[dict], origin: dict) -> str:
         [
             "# What `rippletwin explain` finds when the effect is concealed",
             "",
-            f"{len(rows)} cases drawn from commit `{origin['commit'][:12]}` and number "
+            f"{len(rows)} cases drawn from tree `{origin['commit'][:12]}` and number "
             f"{origin['number']}{changed}. Shares with exact 95 % intervals. docs/concealed.md "
             "says how.",
             "",
