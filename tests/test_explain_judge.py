@@ -1,11 +1,13 @@
 """From fits to a verdict, and which of two explanations that contain each other is taken."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 
 from explain_made import rig
 from rippletwin.effects import EFFECTS, Place
+from rippletwin.explain import validate
 from rippletwin.explain.detect import Alarms
 from rippletwin.explain.fit import Fit
 from rippletwin.explain.judge import SURE, judge
@@ -13,6 +15,7 @@ from rippletwin.explain.search import ACCEPT, Search, simplify
 from rippletwin.explain.validate import Score, Validation
 
 QUIET = Alarms(0.004, (1.0, "diameter[1]"), (1.0, "length[1]"), (1.0, ""))
+FRICTION = replace(EFFECTS["unsteady_friction"], certain=True)
 HOSE = (EFFECTS["viscoelastic_wall"], Place("segment 1", 0))
 VOLUME = (EFFECTS["line_volume"], Place("position"))
 END = (EFFECTS["load_volume"], Place("load"))
@@ -59,3 +62,25 @@ def test_the_larger_of_two_must_be_worth_its_physics(large, small, cost):
     taken = simplify(pool, best, [HOSE, VOLUME, END, SMALL, LARGE])
     assert [job["hypothesis"] for job in asked] == [(HOSE, small)]
     assert taken.hypothesis == ((HOSE, small) if cost < ACCEPT else (HOSE, large))
+
+
+def test_effects_that_do_not_transfer_are_dropped_weakest_first(monkeypatch):
+    """Of hose, gain and friction the gain costs least and does not help on data left out: it goes.
+    Then the hose is tried, which helps, and friction, which no line is without, never."""
+    gain, friction = (EFFECTS["sensor_gain"], Place("sensor p1", 0)), (FRICTION, Place("line"))
+    costs, tried = {HOSE: 50.0, gain: 9.0, friction: 1.0}, []
+
+    def answer(jobs):
+        return [fit(-sum(c for e, c in costs.items() if e not in j["hypothesis"]), *j["hypothesis"])
+                for j in jobs]  # fmt: skip
+
+    def validated(pool, without, best, late):
+        (lost,) = set(best.hypothesis) - set(without.hypothesis)
+        tried.append(lost)
+        return validation(0.03 if lost is gain else 0.01)
+
+    monkeypatch.setattr(validate, "validate", validated)
+    monkeypatch.setattr(validate, "carry", lambda *_: None)
+    pool = SimpleNamespace(base=None, fit=answer)
+    best = validate.that_transfers(pool, fit(0.0, HOSE, gain, friction))
+    assert best.hypothesis == (HOSE, friction) and tried == [gain, HOSE]

@@ -60,7 +60,8 @@ EFFECT = Effect(
         position_parameter(rig),
         Parameter("length", "m", lognormal(0.4, 0.8), (-1.2, 0.0, 1.2)),
         Parameter("diameter", "m", lognormal(0.6 * rig.line[0].diameter, 0.5)),
-        Parameter("loss", "1", lognormal(1.0, 1.0)),
+        # Between a steady friction's, some 0.2 at a resonance, and that of fittings.
+        Parameter("loss", "1", lognormal(0.7, 0.7)),
     ),
     places=position_place,
     apply=_apply,

@@ -16,7 +16,7 @@ from rippletwin.explain.judge import ADEQUATE, Judgement, judge
 from rippletwin.explain.search import GOOD, Search, extended, search
 from rippletwin.explain.shaft import ShaftLines, shaft_lines
 from rippletwin.explain.sheet import WithoutEffect, without_each
-from rippletwin.explain.validate import Validation, validate
+from rippletwin.explain.validate import Validation, that_transfers, validate
 from rippletwin.explain.workers import Workers, workers
 from rippletwin.spectra import observe, revolutions_of
 from rippletwin.twin import Twin
@@ -96,12 +96,14 @@ def explain_observations(
     data = prepare(observations, rig, HIGHEST_HZ if observations[0].orders is not None else None)
     early, late = prepare(early, rig, HIGHEST_HZ), prepare(late, rig, HIGHEST_HZ)
     base = Twin(rig, data)
+    held = late if len(data) == 1 and late else None
     with workers(base, data, processes) as pool:
         if reason:
             fit = pool.fit([{"hypothesis": ()}])[0]
             found = Search(fit, [], fit)
         else:
             found = search(pool, progress)
+            found.best = that_transfers(pool, found.best, held)
             found.others = _others(pool, found)
             reason = contradiction.wiring(base, data, found)
         single = _alone(pool, found.base)
@@ -112,7 +114,6 @@ def explain_observations(
             detect.drift(early, late, sum(segment.delay for segment in rig.line)),
         )
         explanation = found.others[0] if _prefers_other(found) else found.best
-        held = late if len(data) == 1 and late else None
         blind = locate.blind(pool, found)
         validation = validate(pool, found.base, explanation, held)
         checked = validation if explanation.hypothesis else None

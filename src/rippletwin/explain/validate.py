@@ -12,7 +12,7 @@ import numpy as np
 
 from rippletwin.explain.fit import Fit, align, select
 from rippletwin.explain.posterior import Posterior
-from rippletwin.explain.workers import Workers
+from rippletwin.explain.workers import Workers, carry
 from rippletwin.misfit import relative_misfit, theil
 
 UNKNOWN = 0.5  # variance of a coordinate whose prior has 1
@@ -92,6 +92,25 @@ def validate(pool: Workers, base: Fit, best: Fit, late: Sequence | None = None) 
         words,
         max((_difference(best, fold[1]) for fold in refitted), default=0.0),
     )
+
+
+def that_transfers(pool: Workers, best: Fit, late: Sequence | None = None) -> Fit:
+    """`best` without those of its effects that do not help on data left out.
+
+    The one whose loss costs least evidence is tried first. What no line is without stays.
+    """
+    while len(best.hypothesis) > 1:
+        rests = [
+            (*best.hypothesis[:k], *best.hypothesis[k + 1 :])
+            for k, (effect, _) in enumerate(best.hypothesis)
+            if not effect.certain
+        ]
+        jobs = [{"hypothesis": r, "theta": carry(best, r, pool.base)} for r in rests]
+        without = max(pool.fit(jobs), key=lambda fit: fit.evidence, default=None)
+        if without is None or validate(pool, without, best, late).holds:
+            break
+        best = without
+    return best
 
 
 def _refit(pool: Workers, fits: list[Fit], folds: list[list[int]]) -> list[list[Fit]]:
