@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -18,6 +19,7 @@ from rippletwin.figures import style
 
 POINTS = 4  # operating points or effects shown side by side at most
 SAMPLES = 720
+TITLE = 84  # letters that titles side by side have room for
 
 
 def draw(explanation, folder: str | Path, suffixes: Sequence[str] = (".png", ".svg")) -> list[Path]:
@@ -221,7 +223,8 @@ def immittance(e) -> Figure | None:
             room = max(high - low, 0.3 * np.max(np.abs(law)))
             ax.set_ylim(low - 0.6 * room, high + 0.6 * room)
             ax.set_ylabel(f"{title} / {m.unit}")
-        column[0].set_title(f"{name.replace('_', ' ')}:\n{m.quantity},\n{m.where}", loc="left")
+        words = f"{name.replace('_', ' ')}: {m.quantity}, {m.where}"
+        column[0].set_title(textwrap.fill(words, TITLE // len(found)), loc="left")
         column[-1].set_xlabel("frequency / Hz")
     fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
     return fig
