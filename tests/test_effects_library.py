@@ -177,6 +177,23 @@ def test_short_branch_is_a_volume():
     np.testing.assert_allclose(readings[0][low], readings[1][low], rtol=2e-2)
 
 
+def test_an_orifice_passes_what_a_leak_leaves():
+    """A laminar leak G takes G p of the mean flow Q; the orifice then passes q = Q - G p, and the
+    slope of its square law at p is q/(2 p)."""
+    net, state = network(rig())
+    pressure, flow, leak = 1e7, 1e-3, 2e-11
+    net.load = "admittance", np.full(len(S), flow / (2 * pressure))
+    state.mean_flow, state.load_passes_flow = flow, True
+    values = {"position": 1.0, "conductance": leak, "pressure_exponent": 0.0}
+    EFFECTS["leak"].apply(net, state, values, Place("position"))
+    np.testing.assert_allclose(net.load[1], (flow - leak * pressure) / (2 * pressure), rtol=1e-12)
+    # A coefficient from the data sheet stands.
+    net, state = network(rig())
+    before = net.load[1].copy()
+    EFFECTS["leak"].apply(net, state, values, Place("position"))
+    np.testing.assert_array_equal(net.load[1], before)
+
+
 def test_air_slows_the_wave_as_wood_does():
     """Wave speed with air equals Wood's from the mixture's compressibility (1930)."""
     net, state = network(rig())

@@ -114,12 +114,16 @@ def test_faulty_pump_draws_on_the_same_leak():
     """A pump that delivers 5 % less: the mean falls in orifice and leak as their slopes say."""
     leak = EFFECTS["leak"], Place("position")
     healthy, flow = np.full(3072, 1e-3), np.full(3072, 0.95e-3)
-    twin = corrected(leak, strength=1.5)
+    twin = corrected(leak, strength=-0.5)
     values = twin.effect_values(twin.theta)[0][2]
     conductance = values["conductance"] * 0.95 ** -values["pressure_exponent"]
     moc = propagate(twin, flow, healthy, SPEED_HZ, PRESSURE, steps=2048, tolerance=1e-9)
     fall = PRESSURE - moc.pressure[-1].mean()
-    orifice = 1e-3 / (2.0 * PRESSURE)
+    exponent = values["pressure_exponent"]
+    slope = values["conductance"] * (PRESSURE / 1e7) ** -exponent
+    passed = 1e-3 - slope * PRESSURE / (1.0 - exponent)
+    assert passed > 0.5e-3
+    orifice = passed / (2.0 * PRESSURE)
     assert conductance > 0.1 * orifice
     assert fall == pytest.approx(0.05e-3 / (orifice + conductance), rel=0.05)
 

@@ -110,6 +110,8 @@ class LineState:
     heat_capacity_ratio, prandtl   of a gas, else None
     orders, recording, mean_flow   shaft order, recording's number and mean flow (m3/s) of each
                      frequency, (F,); None where there is no shaft
+    load_passes_flow whether the load's coefficient rests on that mean flow: what leaves the line
+                     before the load has not passed it
     """
 
     density: float
@@ -123,6 +125,7 @@ class LineState:
     orders: np.ndarray | None = None
     recording: np.ndarray | None = None
     mean_flow: np.ndarray | None = None
+    load_passes_flow: bool = False
 
     def area(self, k: int):
         """Cross section of segment k, m2."""

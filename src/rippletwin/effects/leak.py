@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from rippletwin.effects.base import (
@@ -17,6 +19,7 @@ from rippletwin.line.chain import Insert
 from rippletwin.line.parts import Element
 
 ATMOSPHERE = 1.01325e5  # Pa
+MOST_DRAWN = 0.5  # of the mean flow: more is no leak
 REFERENCE_PRESSURE = 1e7  # Pa, at which the conductance is stated
 
 
@@ -27,6 +30,20 @@ def leak_conductance(conductance, pressure_exponent, mean_pressure):
     return conductance * relative ** (-pressure_exponent)
 
 
+def drawn_share(values, state):
+    """Share of the nominal mean flow that the leak draws and an orifice behind it never sees.
+
+    q = integral of G dp = G p/(1 - m). An orifice's coefficient is taken from the mean flow and the
+    load pressure, and its slope dq/dp = q/(2 p) is as much too large as the flow. Zero where the
+    load's coefficient is known otherwise.
+    """
+    if not state.load_passes_flow:
+        return 0.0
+    exponent, pressure = values["pressure_exponent"], state.mean_pressure
+    slope = leak_conductance(values["conductance"], exponent, pressure)
+    return np.minimum(slope * pressure / (1.0 - exponent) / state.mean_flow, MOST_DRAWN)
+
+
 def _apply(network, line, values, place):
     conductance = leak_conductance(
         values["conductance"], values["pressure_exponent"], line.mean_pressure
@@ -34,6 +51,9 @@ def _apply(network, line, values, place):
     network.inserts.append(
         Insert(on_line(network, values["position"]), "shunt", conductance + 0.0 * network.s)
     )
+    kind, value = network.load
+    if kind == "admittance":
+        network.load = kind, value * (1.0 - drawn_share(values, line))
 
 
 def _parameters(rig, place):
@@ -53,6 +73,11 @@ def _in_time(line, state, values, place):
         values["conductance"], values["pressure_exponent"], state.mean_pressure
     )
     line.inserts.append(Element(on_line(line, values["position"]), "shunt", (conductance,)))
+    # An element answers to what differs from the steady state, so the draw leaves by the source.
+    share = float(drawn_share(values, state))
+    line.end = replace(line.end, coefficient=line.end.coefficient * (1.0 - share))
+    line.flow = line.flow - share * line.mean_flow
+    line.mean_flow *= 1.0 - share
 
 
 EFFECT = Effect(
