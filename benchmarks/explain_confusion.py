@@ -1,12 +1,13 @@
 """Which effects can be told apart on a rig: the confusion matrix, and what it costs to take one for
 another.
 
-    python benchmarks/explain_confusion.py CASE [--out FILE.md] [--processes 2]
+    python benchmarks/explain_confusion.py CASE [--strength -2] [--out FILE.md] [--processes 2]
 
 For every effect of the library in turn, the healthy recordings of CASE are replaced by what a twin
 with that effect would give: line and load off by their stated uncertainty, the effect's parameters
-at their prior medians, sensor noise as recorded, and a ripple that is wrong by SOURCE smoothly in
-frequency. Every effect at every place is then fitted, the line refitted with each. A cell is the
+`strength` deviations of their priors from the medians (those that are centred on nothing,
+exp(strength) deviations from it, and places at the middle), sensor noise as recorded, and a ripple
+that is wrong by SOURCE smoothly in frequency. Every effect at every place is then fitted, the line refitted with each. A cell is the
 log evidence of the best place of the column's effect less that of the true effect at its best
 place: at 0 the two cannot be told apart, below -3 the true one is twenty times as probable.
 
@@ -46,14 +47,22 @@ def truths(rig, observations) -> list:
     return list(chosen.values())
 
 
-def recorded(rig, observations, effect, rng):
+def coordinate(parameter, strength: float) -> float:
+    """Of an effect's parameter at `strength`."""
+    if parameter.prior.kind == "lognormal":
+        return strength
+    centred = parameter.prior.kind == "normal" and parameter.prior.centre == 0.0
+    return float(np.exp(strength)) if centred else 0.0
+
+
+def recorded(rig, observations, effect, strength, rng):
     """(observations of a twin with the effect, its share of the ripple)."""
     twin = Twin(rig, observations, effects=(effect,))
     own = f"{effect[0].name}@{effect[1]}."
     theta = rng.normal(size=len(twin.theta)).clip(-2, 2)
     for k, p in enumerate(twin.parameters):
         if p.flat or p.name.startswith(own):
-            theta[k] = 0.0
+            theta[k] = 0.0 if p.flat else coordinate(p, strength)
     with_effect = twin.with_(theta=theta).predict(observations)
     bare = Twin(rig, observations)
     kept = [theta[twin.index[p.name]] for p in bare.parameters]
@@ -106,6 +115,7 @@ def table(rows: list[tuple]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("case", type=Path)
+    parser.add_argument("--strength", type=float, default=-2.0)
     parser.add_argument("--out", type=Path)
     parser.add_argument("--processes", type=int, default=2)
     options = parser.parse_args()
@@ -115,7 +125,8 @@ def main() -> None:
     )
     rows = []
     for k, effect in enumerate(tqdm(truths(case.rig, observations), unit="effect")):
-        made, share = recorded(case.rig, observations, effect, np.random.default_rng(k))
+        rng = np.random.default_rng(k)
+        made, share = recorded(case.rig, observations, effect, options.strength, rng)
         rows.append((effect, share, best_of_each(case.rig, made, options.processes)))
         page = table(rows)
         if options.out:
