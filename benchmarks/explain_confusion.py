@@ -7,9 +7,10 @@ For every effect of the library in turn, the healthy recordings of CASE are repl
 with that effect would give: line and load off by their stated uncertainty, the effect's parameters
 `strength` deviations of their priors from the medians (those that are centred on nothing,
 exp(strength) deviations from it, and places at the middle), sensor noise as recorded, and a ripple
-that is wrong by SOURCE smoothly in frequency. Every effect at every place is then fitted, the line refitted with each. A cell is the
-log evidence of the best place of the column's effect less that of the true effect at its best
-place: at 0 the two cannot be told apart, below -3 the true one is twenty times as probable.
+that is wrong by SOURCE smoothly in frequency. Every effect at every place is then fitted, the line
+refitted with each. A cell is the log evidence of the best place of the column's effect less that of
+the true effect at its best place: at 0 the two cannot be told apart, below -3 the true one is
+twenty times as probable.
 
 The recordings come from the same equations as the twin: this shows what the data can tell, not
 whether the equations are right.
