@@ -7,7 +7,7 @@ import pytest
 
 from explain_made import rig
 from rippletwin.effects import EFFECTS, Place
-from rippletwin.explain import validate
+from rippletwin.explain import validate, workers
 from rippletwin.explain.detect import Alarms
 from rippletwin.explain.fit import Fit
 from rippletwin.explain.judge import SURE, judge
@@ -80,7 +80,7 @@ def test_effects_that_do_not_transfer_are_dropped_weakest_first(monkeypatch):
         return validation(0.03 if lost is gain else 0.01)
 
     monkeypatch.setattr(validate, "validate", validated)
-    monkeypatch.setattr(validate, "carry", lambda *_: None)
+    monkeypatch.setattr(workers, "carry", lambda *_: None)
     pool = SimpleNamespace(base=None, fit=answer)
     best = validate.that_transfers(pool, fit(0.0, HOSE, gain, friction))
     assert best.hypothesis == (HOSE, friction) and tried == [gain, HOSE]

@@ -35,9 +35,10 @@ def test_air_at_one_pressure_is_a_slower_wave():
     up, and how far it moves is known."""
     values = {"gas_fraction": 0.02, "polytropic_exponent": 1.2}
     fit, pool = accepted(EFFECTS["entrained_air"], values, points=((1000, PRESSURE),))
-    (found,) = without_each(pool, fit)
+    (base,) = pool.fit([{"hypothesis": ()}])
+    (found,) = without_each(pool, base, fit)
     assert found.effect == "entrained_air" and found.rivals
-    free = _free(pool.fit([{"hypothesis": ()}])[0], fit, pool.observations).twin.values()
+    free = _free(base, fit, pool.observations).twin.values()
     with_air = fit.twin.values()
     air = [v for p, v in with_air.items() if p.startswith("entrained_air")]
     for k in (1, 2, 3):
@@ -55,7 +56,7 @@ def test_no_sheet_stands_in_for_friction_that_grows_with_frequency():
     """Attenuation by steady friction is the same at all frequencies: whatever the line's numbers,
     unsteady friction's root of frequency is not to be had."""
     fit, pool = accepted(EFFECTS["unsteady_friction"], {})
-    (found,) = without_each(pool, fit)
+    (found,) = without_each(pool, *pool.fit([{"hypothesis": ()}]), fit)
     assert not found.rivals
 
 

@@ -88,9 +88,6 @@ class Forward:
                 self.frequency_hz, rig.load.frequency_hz, rig.load.impedance
             )
         self._friction = {}
-        self._load_passes_flow = (
-            rig.load.kind == "orifice" and rig.load.coefficient is None and not twin.guessed_load
-        )
         self._orifice = None
         periodic = [r for r, point in enumerate(points) if point.ripple is not None]
         if rig.load.kind == "orifice" and periodic:
@@ -168,7 +165,7 @@ class Forward:
             orders=self.order,
             recording=self.recording,
             mean_flow=self.mean_flow,
-            load_passes_flow=self._load_passes_flow,
+            load_passes_flow=self.twin.rig.load.passes_flow and not self.twin.guessed_load,
         )
 
     def _orifice_admittance(self, factor: float) -> np.ndarray:

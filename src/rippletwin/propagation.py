@@ -89,7 +89,7 @@ def line_in_time(twin, flow, healthy_flow, speed_hz, load_pressure, source_capac
         heat_capacity_ratio=rig.fluid.heat_capacity_ratio,
         prandtl=rig.fluid.prandtl,
         mean_flow=nominal,
-        load_passes_flow=rig.load.kind == "orifice" and rig.load.coefficient is None,
+        load_passes_flow=rig.load.passes_flow,
     )
     for effect, place, values in twin.effect_values(twin.theta):
         effect.in_time(line, state, values, place)

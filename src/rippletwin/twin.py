@@ -102,10 +102,8 @@ class Twin:
         if len(set(self.labels)) < len(self.labels):
             raise ValueError(f"recordings need labels of their own, not {self.labels}")
         if guessed_load is None:
-            guessed_load = (
-                rig.load.kind == "orifice"
-                and rig.load.coefficient is None
-                and any(o.source == "free" and o.flow_ripple is None for o in observations)
+            guessed_load = rig.load.passes_flow and any(
+                o.source == "free" and o.flow_ripple is None for o in observations
             )
         self.guessed_load = bool(guessed_load)
         self._effect_parameters = [effect.parameters(rig, place) for effect, place in self.effects]

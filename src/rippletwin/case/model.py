@@ -74,6 +74,11 @@ class Load:
     frequency_hz: np.ndarray | None = None
     impedance: np.ndarray | None = None
 
+    @property
+    def passes_flow(self) -> bool:
+        """Whether it is an orifice whose coefficient has to come from the mean flow."""
+        return self.kind == "orifice" and self.coefficient is None
+
 
 @dataclass(frozen=True)
 class Uncertainty:

@@ -82,6 +82,10 @@ class Fit:
         """Names of the effects."""
         return tuple(effect.name for effect, _ in self.hypothesis)
 
+    def without(self, k: int) -> Hypothesis:
+        """The hypothesis but for its effect k."""
+        return self.hypothesis[:k] + self.hypothesis[k + 1 :]
+
     @property
     def label(self) -> str:
         """Effects and places in words; "" of the paper's line."""
@@ -148,7 +152,8 @@ def fit_hypothesis(
     twin = base.with_(effects=hypothesis)
     stages = limits(observations)
     posterior = Posterior(twin, observations, stages[0], source_free)
-    states = _first_states(posterior, starts)
+    many = len(starts) > FEW or not hypothesis
+    states = _first_states(posterior, starts, TRIED[many])
     for stage, limit in enumerate(stages):
         last = stage == len(stages) - 1
         posterior = Posterior(twin, observations, limit, source_free)
@@ -158,13 +163,13 @@ def fit_hypothesis(
             steps = LAST_STEPS if last else STEPS[min(stage, len(STEPS) - 1)]
             theta, value = descend(posterior, theta, steps)
             fits.append((value, theta))
-        kept = KEPT[len(starts) > FEW or not hypothesis]
+        kept = KEPT[many]
         states = _distinct(fits)[: 1 if last else kept[min(stage, len(kept) - 1)]]
     return conclude(posterior, hypothesis, states[0][1])
 
 
-def _first_states(posterior: Posterior, starts) -> list:
-    """(misfit, theta) to set out from: the best of each start, then the best overall."""
+def _first_states(posterior: Posterior, starts, tried: int) -> list:
+    """(misfit, theta) to set out from, `tried`: the best of each start, then the best overall."""
     twin = posterior.twin
     delays = [segment.length / segment.wave_speed for segment in twin.rig.line]
     longest = int(np.argmax(delays))
@@ -180,7 +185,7 @@ def _first_states(posterior: Posterior, starts) -> list:
             thetas[twin.index[name]] = u
         thetas[speeds] = [b for _, b in pairs]
         thetas[speeds[longest]] = [a for a, _ in pairs]
-        if not posterior.twin.effects:
+        if not twin.effects:
             anywhere = np.zeros((len(twin.parameters), WIDE))
             anywhere[speeds] = FAR * np.random.default_rng(0).normal(size=(len(speeds), WIDE))
             thetas = np.concatenate([thetas, anywhere], axis=1)
@@ -188,7 +193,6 @@ def _first_states(posterior: Posterior, starts) -> list:
         groups.append(sorted(aligned, key=lambda g: g[0]))
     first = [group[0] for group in groups]
     rest = sorted((g for group in groups for g in group[1:]), key=lambda g: g[0])
-    tried = TRIED[len(starts) > FEW or not posterior.twin.effects]
     return sorted(first, key=lambda g: g[0])[:tried] + rest[: max(tried - len(first), 0)]
 
 

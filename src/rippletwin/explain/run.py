@@ -118,7 +118,7 @@ def explain_observations(
         validation = validate(pool, found.base, explanation, held)
         checked = validation if explanation.hypothesis else None
         judgement = judge(found, alarms, checked, reason)
-        without = without_each(pool, judgement.accepted)
+        without = without_each(pool, found.base, judgement.accepted)
     return Explanation(
         rig=rig,
         observations=tuple(data),

@@ -10,7 +10,7 @@ import numpy as np
 from rippletwin.effects import Effect, Place, candidates
 from rippletwin.explain.fit import Fit, Hypothesis
 from rippletwin.explain.posterior import FLOOR
-from rippletwin.explain.workers import Workers, carry, scan
+from rippletwin.explain.workers import Workers, carry, dropping, in_common, scan
 
 ACCEPT = 8.0
 """Log evidence that an effect must add. The largest that chance gave any effect of the library in
@@ -128,9 +128,8 @@ def exchange(pool: Workers, best: Fit, singles: Sequence[Fit], rounds: int = 2) 
         stand_ins = [f.hypothesis[0] for f in singles[:STAND_INS]]
         jobs = []
         for k in range(len(best.hypothesis)):
-            rest = best.hypothesis[:k] + best.hypothesis[k + 1 :]
             jobs += [
-                restarted(best, (*rest, c), pool.base.rig)
+                restarted(best, (*best.without(k), c), pool.base.rig)
                 for c in stand_ins
                 if c not in best.hypothesis
             ]
@@ -147,7 +146,7 @@ def simplify(pool: Workers, best: Fit, found: Sequence) -> Fit:
     What the larger has besides is physics of its own, which has to be worth as much as any other.
     """
     for k, member in enumerate(best.hypothesis):
-        rest = best.hypothesis[:k] + best.hypothesis[k + 1 :]
+        rest = best.without(k)
         jobs = [
             {"hypothesis": (*rest, c), "fit": best}
             for c in found
@@ -170,9 +169,7 @@ def _contains(member, other, rig) -> bool:
 
 def restarted(best: Fit, hypothesis: Hypothesis, rig) -> dict:
     """The job that fits from nominal again, effects in common starting where they were."""
-    names = {f"{effect.name}@{place}" for effect, place in hypothesis}
-    index, theta = best.twin.index, best.twin.theta
-    kept = {name: float(theta[k]) for name, k in index.items() if name.split(".")[0] in names}
+    kept = in_common(best, hypothesis)
     return {
         "hypothesis": hypothesis,
         "starts": [{**kept, **start} for start in scan(rig, hypothesis)],
@@ -219,11 +216,7 @@ def finer(rig, fit: Fit) -> list[dict[str, float]]:
 def backward(pool: Workers, best: Fit) -> Fit:
     """Drop every effect that the others have made needless."""
     while len(best.hypothesis) > 1:
-        jobs = []
-        for k in range(len(best.hypothesis)):
-            rest = best.hypothesis[:k] + best.hypothesis[k + 1 :]
-            jobs.append({"hypothesis": rest, "theta": carry(best, rest, pool.base)})
-        fits = pool.fit(jobs)
+        fits = pool.fit([dropping(best, k, pool.base) for k in range(len(best.hypothesis))])
         losses = [
             best.evidence - fit.evidence - needed_of(effect)
             for fit, (effect, _) in zip(fits, best.hypothesis)

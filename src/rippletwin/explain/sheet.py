@@ -11,9 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 from rippletwin.case import Rig, Uncertainty
-from rippletwin.explain.fit import Fit, Hypothesis, refine
+from rippletwin.explain import detect
+from rippletwin.explain.fit import Fit, refine
 from rippletwin.explain.validate import score
-from rippletwin.explain.workers import Workers
+from rippletwin.explain.workers import Workers, in_common
 from rippletwin.parameters import coordinates
 from rippletwin.twin import Twin
 
@@ -43,21 +44,24 @@ class WithoutEffect:
     rivals: bool
 
 
-def without_each(pool: Workers, accepted: Fit) -> tuple[WithoutEffect, ...]:
-    """`WithoutEffect` of every accepted effect; the others stay.
+def without_each(pool: Workers, base: Fit, accepted: Fit) -> tuple[WithoutEffect, ...]:
+    """`WithoutEffect` of every accepted effect; the others stay. `base` is the fit without any.
 
     Each is first fitted with the sheet as stated, by continuation, which finds the valley; from
     there, and from where the accepted fit is, the sheet is let go.
     """
-    every = accepted.hypothesis
-    rests = [(*every[:k], *every[k + 1 :]) for k in range(len(every))]
-    held = pool.fit([{"hypothesis": r, "starts": [_kept(accepted, r, pool.base)]} for r in rests])
+    rests = [accepted.without(k) for k in range(len(accepted.hypothesis))]
+    held = [base]
+    if len(rests) > 1:
+        held = pool.fit([{"hypothesis": r, "starts": [in_common(accepted, r)]} for r in rests])
     limit = NEARLY * score(accepted, pool.observations).misfit
     found = []
-    for (effect, _), fit in zip(every, held):
+    for (effect, _), fit in zip(accepted.hypothesis, held):
         fit = _free(fit, accepted, pool.observations)
         misfit = score(fit, pool.observations).misfit
-        parameter, pull = _furthest(fit, accepted.twin)
+        stated = coordinates(pool.base.parameters, fit.twin.values())
+        pull, name = detect.pull(replace(fit, twin=pool.base.with_(theta=stated)))
+        parameter = pool.base.parameters[pool.base.index[name]]
         found.append(
             WithoutEffect(
                 effect=effect.name,
@@ -71,13 +75,6 @@ def without_each(pool: Workers, accepted: Fit) -> tuple[WithoutEffect, ...]:
             )
         )
     return tuple(found)
-
-
-def _kept(accepted: Fit, rest: Hypothesis, base: Twin) -> dict[str, float]:
-    """Coordinates of the effects that stay, as accepted."""
-    own = [p.name for p in base.with_(effects=rest).parameters if "@" in p.name]
-    index = accepted.twin.index
-    return {name: float(accepted.twin.theta[index[name]]) for name in own if name in index}
 
 
 def _free(held: Fit, accepted: Fit, observations: Sequence) -> Fit:
@@ -100,13 +97,3 @@ def loosened(rig: Rig) -> Rig:
     stated = {f.name: getattr(rig.uncertainty, f.name) for f in fields(Uncertainty)}
     free = {name: max(sd, min(LOOSER * sd, MOST)) for name, sd in stated.items()}
     return replace(rig, uncertainty=Uncertainty(**free))
-
-
-def _furthest(fit: Fit, stated: Twin):
-    """The line's parameter furthest from the sheet, and how far in stated standard deviations."""
-    values, found = fit.twin.values(), []
-    for p in stated.parameters:
-        if not p.flat and "@" not in p.name:
-            found.append((abs(float(p.prior.coordinate(values[p.name]))), p.name, p))
-    pull, _, parameter = max(found)
-    return parameter, pull

@@ -12,7 +12,7 @@ import numpy as np
 
 from rippletwin.explain.fit import Fit, align, select
 from rippletwin.explain.posterior import Posterior
-from rippletwin.explain.workers import Workers, carry
+from rippletwin.explain.workers import Workers, dropping
 from rippletwin.misfit import relative_misfit, theil
 
 UNKNOWN = 0.5  # variance of a coordinate whose prior has 1
@@ -100,12 +100,11 @@ def that_transfers(pool: Workers, best: Fit, late: Sequence | None = None) -> Fi
     The one whose loss costs least evidence is tried first. What no line is without stays.
     """
     while len(best.hypothesis) > 1:
-        rests = [
-            (*best.hypothesis[:k], *best.hypothesis[k + 1 :])
+        jobs = [
+            dropping(best, k, pool.base)
             for k, (effect, _) in enumerate(best.hypothesis)
             if not effect.certain
         ]
-        jobs = [{"hypothesis": r, "theta": carry(best, r, pool.base)} for r in rests]
         without = max(pool.fit(jobs), key=lambda fit: fit.evidence, default=None)
         if without is None or validate(pool, without, best, late).holds:
             break

@@ -51,6 +51,19 @@ def carry(fit: Fit, hypothesis: Hypothesis, base: Twin) -> np.ndarray:
     )
 
 
+def in_common(fit: Fit, hypothesis: Hypothesis) -> dict[str, float]:
+    """Coordinates by name, as fitted, of the effects that another hypothesis has too."""
+    names = {f"{effect.name}@{place}" for effect, place in hypothesis}
+    index, theta = fit.twin.index, fit.twin.theta
+    return {name: float(theta[k]) for name, k in index.items() if name.split(".")[0] in names}
+
+
+def dropping(fit: Fit, k: int, base: Twin) -> dict:
+    """The job that fits again without effect k, from where the fit is."""
+    rest = fit.without(k)
+    return {"hypothesis": rest, "theta": carry(fit, rest, base)}
+
+
 class Workers:
     """Fits hypotheses to one set of data, in `pool` or, where that is None, in this process."""
 

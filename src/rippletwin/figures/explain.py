@@ -138,18 +138,10 @@ def evidence(e) -> Figure | None:
     colours = [style.CORRECTED if g > ACCEPT else style.NEUTRAL for g in gains]
     ax.barh(places, gains, color=colours, height=0.6, label="source as stated")
     unseen = {row["effects"]: row["source_free"] for row in side_by_side(search, e.blind)}
-    points = [(k, unseen[f.label]) for k, f in enumerate(shown.values()) if f.label in unseen]
+    points = [(unseen[f.label], y) for y, f in zip(places, shown.values()) if f.label in unseen]
     if points:
-        k, g = np.array(points).T
-        ax.plot(
-            g,
-            places[k.astype(int)],
-            "D",
-            ms=5,
-            color=style.MEASURED,
-            mfc="white",
-            label="blind to the source",
-        )
+        looks = dict(ms=5, color=style.MEASURED, mfc="white", label="blind to the source")
+        ax.plot(*np.array(points).T, "D", **looks)
     ax.axvline(ACCEPT, color=style.ALARM, ls="--", lw=1, label=f"threshold {ACCEPT:g}")
     ax.axvline(0.0, color=style.MEASURED, lw=0.6)
     ax.set_xscale("symlog", linthresh=10)
