@@ -181,6 +181,7 @@ def _from_mean_orders(orders: np.ndarray, limit: int) -> np.ndarray:
     scatter = np.mean(np.abs(some - mean) ** 2, axis=0)
     floor = np.median(scatter, axis=1, keepdims=True)
     weight = np.where(np.abs(mean) ** 2 > 10 * floor / len(some) * KNOTS_PER_REVOLUTION, 1.0, 0.0)
-    weight = weight / floor
+    # An order that a resonance turns as the speed wanders is no measure of the angle.
+    weight = weight / np.maximum(scatter, floor)
     turn = np.einsum("rsk,sk,k->r", some, weight * mean.conj(), k).imag
     return turn / np.sum(weight * np.abs(mean) ** 2 * k**2) / (2 * np.pi)

@@ -9,6 +9,7 @@ from scipy.ndimage import uniform_filter1d
 
 from rippletwin.case.model import FlowRipple, Recording, Rig, Sensor
 from rippletwin.revolutions import Revolutions, cut_revolutions
+from rippletwin.wander import at_mean_speed, mean_speed
 
 __all__ = [
     "Observation",
@@ -94,15 +95,12 @@ def revolutions_of(
 def _observe_periodic(
     recording, rig, revolutions, max_frequency_hz, piston_harmonics_only
 ) -> Observation:
-    speed_hz = 1 / np.mean(1 / revolutions.speed_hz)
+    speed_hz = mean_speed(revolutions.speed_hz)
     highest = _highest(max_frequency_hz, recording.sampling_rate_hz)
     orders = np.arange(1, int(highest / speed_hz) + 1)
     spectra = 2 * np.fft.rfft(revolutions.windows, axis=2)[:, :, orders]
     spectra /= revolutions.windows.shape[2]
-    delay = sum(segment.delay for segment in rig.line)
-    values, covariance = average(
-        spectra, revolutions.speed_hz / speed_hz - 1, 2 * np.pi * orders * speed_hz * delay
-    )
+    values, covariance = at_mean_speed(spectra, revolutions.speed_hz, orders)
     if piston_harmonics_only:
         kept = orders % rig.pump["pistons"] == 0
         orders, values, covariance = orders[kept], values[:, kept], covariance[kept]
@@ -115,70 +113,12 @@ def _observe_periodic(
         values=values,
         covariance=covariance,
         mean=revolutions.windows.mean(axis=(0, 2)),
-        speed_hz=float(speed_hz),
+        speed_hz=speed_hz,
         load_pressure=recording.load_pressure,
         source="nominal" if nominal else "free",
         flow_ripple=recording.flow_ripple,
         sensors=rig.sensors,
     )
-
-
-def average(
-    spectra: np.ndarray, deviation: np.ndarray, phase_rad: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Mean (S, F) of window spectra (R, S, F) at the mean speed and its covariance (F, S, S).
-
-    `deviation` (R,) is each window's relative deviation from the mean speed. A line answers
-    differently at another speed: where a path has a phase of `phase_rad` (F,), X changes by about
-    X (j phase d - (phase d)^2 / 2) at the deviation d, half a radian at 5 kHz for 0.3 % over 5 m of
-    oil. So the values are the intercept of a regression on d and d^2. The coefficient of d^2 has a
-    prior of mean zero and just that size: it costs a weak order, which does not need it, no
-    precision. The covariance is the scatter about the regression with the prior's share added;
-    `sensors + 2` windows' worth of the channel's typical noise is mixed into the scatter, which
-    keeps it positive definite where there are few windows.
-    """
-    windows, sensors = spectra.shape[:2]
-    if windows < 8:
-        design = np.ones((windows, 1))
-    else:
-        design = np.column_stack([np.ones(windows), deviation, deviation**2])
-        design[:, 1] -= design[:, 1].mean()
-    # scatter about the unrestricted regression: free of what the speed does
-    hat = design @ np.linalg.pinv(design)
-    residual = spectra - np.einsum("rq,qsf->rsf", hat, spectra)
-    freedom = windows - np.linalg.matrix_rank(design)
-    scatter = np.einsum("rsf,rtf->fst", residual, residual.conj())
-    typical = np.median(np.einsum("fss->fs", scatter).real, axis=0) / freedom
-    prior = sensors + 2
-    scatter = (scatter + prior * np.diag(typical)) / (freedom + prior)
-    weights, curvature = _intercept(spectra, scatter, design, phase_rad)
-    values = np.einsum("sfr,rsf->sf", weights, spectra)
-    covariance = scatter * np.einsum("sfr,tfr->fst", weights, weights)
-    for s in range(sensors):
-        covariance[:, s, s] += curvature[s]
-    return values, covariance
-
-
-def _intercept(spectra, scatter, design, phase_rad):
-    """Weights (S, F, R) of the windows in the intercept, and the variance (S, F) that the prior on
-    the coefficient of d^2 adds to it."""
-    sensors, orders = spectra.shape[1:]
-    if design.shape[1] == 1:
-        return np.full((sensors, orders, len(design)), 1 / len(design)), np.zeros((sensors, orders))
-    scale = np.max(np.abs(design), axis=0)
-    scale[scale == 0] = 1.0
-    design = design / scale
-    noise = np.einsum("fss->sf", scatter).real
-    power = np.abs(spectra.mean(axis=0)) ** 2 + 1e-300
-    size = power * (0.5 * phase_rad**2 * scale[2]) ** 2 + 1e-300
-    precision = np.zeros((sensors, orders, 3, 3))
-    precision[..., 1, 1] = noise / (power * (phase_rad * scale[1]) ** 2 + 1e-300)
-    precision[..., 2, 2] = noise / size
-    gram = design.T @ design + precision
-    weights = np.linalg.solve(gram, np.broadcast_to(design.T, (sensors, orders, *design.T.shape)))[
-        ..., 0, :
-    ]
-    return weights, (weights @ design[:, 2]) ** 2 * size
 
 
 def _observe_random(recording, rig, max_frequency_hz) -> Observation:

@@ -44,7 +44,7 @@ def conceal(drawn: Drawn, folder: Path, rng: np.random.Generator) -> dict:
     rig = build(drawn.sheet, drawn.seal | {"numerics": NUMERICS})
     entries = []
     for point in drawn.points:
-        take = record(rig, point, rng, driving(rig, point), SETTLED * rig.noise, REFINE)
+        take = record(rig, point, rng, driving(rig, point), SETTLED * rig.noise, REFINE, True)
         write_recording(folder / "recordings" / f"{point.label}.h5", take)
         write_ripple(folder / ripple_name(point), *nominal_flow(drawn.sheet, point))
         entries.append(listed(point, with_ripple=True))

@@ -1,10 +1,9 @@
-"""Periodic orbits of a rig at one operating point, and recordings made of them.
+"""Periodic orbits of a rig at one operating point, and marches at a wandering speed.
 
-At constant speed the bench settles into a motion that repeats every revolution. A recording with a
-slowly wandering speed is composed of such orbits: at each instant that of the speed at that
-instant, at the crank angle reached by then. The line forgets within some 0.1 s while the speed
-wanders over seconds, and `march` run with a varying speed shows what the shortcut costs
-(docs/virtualrig.md).
+At constant speed the bench settles into a motion that repeats every revolution. Where the speed
+wanders the bench can march on from there at the speed of each instant, or a recording can be
+composed of a few orbits, which is right where a line forgets faster than its speed changes and
+no resonance is sharper than the wander is wide (docs/virtualrig.md).
 """
 
 from collections.abc import Callable
@@ -65,6 +64,7 @@ class Bench:
         self.chambers, self.ports = pump.tables(rig.pump, rig.network.density, chosen)
         if flow is not None:
             self.chambers = self.chambers[:0]
+        self._ripple = np.array(rig.ripple, dtype=float).reshape(-1, 3)
         self.state = None
 
     def settle(
@@ -82,12 +82,10 @@ class Bench:
         (orifice coefficient) is given. Raises RuntimeError where it does not settle.
         """
         speed = 2 * np.pi * speed_rpm / 60
-        period = 2 * np.pi / speed
-        every = int(np.ceil(period / RECORDS / self.largest_step)) * self.refine
+        every, dt = self._steps(speed)
         steps = every * RECORDS
-        cut = line(self.rig.network, period / steps)
-        given = self.flow(speed_rpm) if callable(self.flow) else self.flow
-        given = np.asarray(given, dtype=float)
+        cut = line(self.rig.network, dt)
+        given = self._given(speed_rpm)
         flow = 0.97 * self.rig.pump.displacement * speed_rpm / 60
         if not len(self.chambers):
             flow = given.mean()
@@ -97,12 +95,12 @@ class Bench:
         load = self.nodes[self.rig.load_node]
         load[stepper.VALVE_SET] = load_pressure
         load[stepper.ORIFICE] = valve if valve is not None else self._valve(flow, load_pressure)
-        crank = (speed, np.array(self.rig.ripple, dtype=float).reshape(-1, 3))
+        crank = (speed, self._ripple, np.zeros(0))
         before = np.inf
         for revolution in range(1, most + 1):
             pressure, outlet, nodal, newton = stepper.run(
                 cut, self.nodes, self.chambers, self.ports, given, crank, self.state,
-                0, steps, every, period / steps, self.sensors,
+                0, steps, every, dt, self.sensors,
             )  # fmt: skip
             if newton > pump.MOST_NEWTON_STEPS:
                 raise RuntimeError("the pump's chambers did not converge; refine the time step")
@@ -125,6 +123,41 @@ class Bench:
                     revolutions=revolution,
                 )
         raise RuntimeError(f"not periodic after {most} revolutions: still moving {residual:.0f} Pa")
+
+    def valve(self, speed_rpm: float, load_pressure: float, tolerance: float = 20.0) -> float:
+        """The orifice coefficient that gives `load_pressure`, m3/s/Pa^0.5."""
+        if len(self.chambers):
+            return self.settle(speed_rpm, load_pressure, tolerance=tolerance).valve
+        return self._valve(self._given(speed_rpm).mean(), load_pressure)
+
+    def march(self, speed_rpm: float, deviation: np.ndarray) -> np.ndarray:
+        """Pressure (sensors, K) at the sensors' places, Pa, while the speed goes its way.
+
+        Goes on from the orbit that was settled last, which must be that of `speed_rpm`; the valve
+        stays as it was. `deviation` (K,) is the relative deviation of the speed, from one record to
+        the next, RECORDS a revolution of `speed_rpm` apart.
+        """
+        speed = 2 * np.pi * speed_rpm / 60
+        every, dt = self._steps(speed)
+        ahead = np.concatenate([[0.0], np.cumsum(deviation)]) * speed * every * dt
+        pressure, _, _, newton = stepper.run(
+            line(self.rig.network, dt), self.nodes, self.chambers, self.ports,
+            self._given(speed_rpm), (speed, self._ripple, ahead), self.state,
+            0, every * len(deviation), every, dt, self.sensors,
+        )  # fmt: skip
+        if newton > pump.MOST_NEWTON_STEPS:
+            raise RuntimeError("the pump's chambers did not converge; refine the time step")
+        return pressure
+
+    def _steps(self, speed: float) -> tuple[int, float]:
+        """Steps from record to record at a `speed` in rad/s, and their size in s."""
+        period = 2 * np.pi / speed
+        every = int(np.ceil(period / RECORDS / self.largest_step)) * self.refine
+        return every, period / (every * RECORDS)
+
+    def _given(self, speed_rpm: float) -> np.ndarray:
+        given = self.flow(speed_rpm) if callable(self.flow) else self.flow
+        return np.asarray(given, dtype=float)
 
     def _valve(self, pump_flow: float, load_pressure: float) -> float:
         """Orifice coefficient that passes the pump's flow, less what leaks on the way."""

@@ -7,10 +7,12 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 
-from virtualrig.orbit import Bench, Orbit
+from virtualrig.orbit import RECORDS, Bench, Orbit
 from virtualrig.rig import Rig, Sensing, build
 
 SAMPLING_RATE_HZ = 51200.0
+
+MARGIN = 0.05  # s that a march runs on before the first and after the last sample
 
 
 @dataclass(frozen=True)
@@ -44,20 +46,27 @@ def record(
     flow: Callable[[float], np.ndarray] | None = None,
     tolerance: float = 20.0,
     refine: int = 1,
+    marched: bool = False,
 ) -> Take:
     """One recording of `rig` at `point`. Its first sample falls at a random crank angle.
 
-    `flow`, `refine` and `tolerance` as in `Bench` and `Bench.settle`.
+    `flow`, `refine` and `tolerance` as in `Bench` and `Bench.settle`. Where the speed wanders the
+    bench is run at the speed of every instant if `marched`, which takes as long as the recording
+    is; else the recording is composed of three orbits.
     """
     set_speed = point.speed_rpm * (1 + rig.speed_error * rng.standard_normal())
     set_pressure = point.load_pressure * (1 + rig.load_pressure_error * rng.standard_normal())
     count = round(point.seconds * SAMPLING_RATE_HZ)
     speed = set_speed * (1 + wander(count, rig.wander, rig.correlation_s, rng))
     turns = rng.uniform() + np.concatenate([[0.0], np.cumsum(speed[:-1])]) / 60 / SAMPLING_RATE_HZ
-    orbits = family(Bench(rig, point.faults, flow, refine), speed, set_pressure, tolerance)
-    pressure = follow(orbits, rig.sensing, speed, turns)
+    bench = Bench(rig, point.faults, flow, refine)
+    if marched and rig.wander > 0:
+        pressure, orbit = march(bench, speed, turns, set_pressure, tolerance)
+    else:
+        orbits = family(bench, speed, set_pressure, tolerance)
+        pressure, orbit = follow(orbits, rig.sensing, speed, turns), orbits[len(orbits) // 2]
     pressure += rig.noise * rng.standard_normal(pressure.shape)
-    return Take(pressure, turns, orbits[len(orbits) // 2])
+    return Take(pressure, turns, orbit)
 
 
 def nominal_ripple(known: dict, point: Point) -> tuple[np.ndarray, np.ndarray]:
@@ -121,14 +130,39 @@ def follow(
     return total
 
 
+def march(
+    bench: Bench, speed: np.ndarray, turns: np.ndarray, load_pressure: float, tolerance: float
+) -> tuple[np.ndarray, Orbit]:
+    """Sensed pressure (sensors, samples) of the bench run at `speed` (r/min) and crank `turns`,
+    which are those of the samples, and the orbit it set out from.
+
+    The valve is set once, at the mean. Before the first sample the speed is the first sample's.
+    """
+    valve = bench.valve(speed.mean(), load_pressure, tolerance)
+    first = bench.settle(speed[0], load_pressure, valve, tolerance)
+    before = (turns[0] % 1.0) + np.ceil(MARGIN * speed[0] / 60)  # revolutions, from crank angle 0
+    seconds = np.arange(len(speed)) / SAMPLING_RATE_HZ + before * 60 / speed[0]
+    step = 60 / speed[0] / RECORDS
+    at = step * np.arange(1, int(np.ceil((seconds[-1] + MARGIN) / step)) + 1)
+    pressure = bench.march(speed[0], np.interp(at - step / 2, seconds, speed / speed[0] - 1))
+    # the filter wraps around: what that spoils at either end lies within the margins
+    sensed = _filtered(pressure, 1 / (step * pressure.shape[1]), bench.rig.sensing)
+    return CubicSpline(at, sensed, axis=1)(seconds), first
+
+
 def sense(orbit: Orbit, sensing: tuple[Sensing, ...]) -> np.ndarray:
     """What the sensors make of an orbit's pressures: gain, delay and resonance, order by order."""
-    spectrum = np.fft.rfft(orbit.pressure, axis=1)
-    s = 2j * np.pi * np.arange(spectrum.shape[1]) * orbit.speed_rpm / 60
+    return _filtered(orbit.pressure, orbit.speed_rpm / 60, sensing)
+
+
+def _filtered(pressure: np.ndarray, base_hz: float, sensing: tuple[Sensing, ...]) -> np.ndarray:
+    """Sensed (sensors, M) of a pressure (sensors, M) that repeats with `base_hz`."""
+    spectrum = np.fft.rfft(pressure, axis=1)
+    s = 2j * np.pi * np.arange(spectrum.shape[1]) * base_hz
     for row, chain in zip(spectrum, sensing, strict=True):
         row *= chain.gain * np.exp(-s * chain.delay)
         if chain.resonance is not None:
             frequency, damping = chain.resonance
             omega = 2 * np.pi * frequency
             row *= omega**2 / (s**2 + 2 * damping * omega * s + omega**2)
-    return np.fft.irfft(spectrum, n=orbit.pressure.shape[1], axis=1)
+    return np.fft.irfft(spectrum, n=pressure.shape[1], axis=1)

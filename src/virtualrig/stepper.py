@@ -261,16 +261,17 @@ def _close(line, state, now, flux_p, flux_q):
 def run(line, nodes, chambers, ports, source, crank, state, phase, steps, every, dt, sensors):
     """March `steps` steps of `dt` from `state`, whose newest step is number `phase`.
 
-    The crank stands at `speed * phase * dt` plus its ripple; `crank` is (speed in rad/s,
-    ripple), the ripple (terms, 3) being order, relative amplitude of speed and phase. `source`
-    (M,) is a flow into node 0 over one revolution, added to that of the pump; `chambers` may be
-    empty. `sensors` is (element, (count, n) interpolation rows). Every `every` steps a record
-    is kept.
+    The crank stands at `speed * phase * dt` plus its wander and its ripple; `crank` is (speed in
+    rad/s, ripple, wander), the ripple (terms, 3) being order, relative amplitude of speed and
+    phase, the wander (0,) or (steps // every + 1,) how far in rad the crank is ahead of even
+    turning at every record. `source` (M,) is a flow into node 0 over one revolution, added to that
+    of the pump, as strong as the crank is fast; `chambers` may be empty. `sensors` is (element,
+    (count, n) interpolation rows). Every `every` steps a record is kept.
 
     Returns sensor pressures (count, records), flow into the line at x = 0 (records,), pressures
     of the nodes (nodes, records), and the greatest number of Newton steps that the chambers took.
     """
-    speed, ripple = crank
+    speed, ripple, wander = crank
     element, rows = sensors
     count, n = rows.shape
     elements = state.flow.shape[1]
@@ -293,16 +294,22 @@ def run(line, nodes, chambers, ports, source, crank, state, phase, steps, every,
         _advance(line, state, ring, dt)
         phase += 1
         _meet(line, state, now, flux_p, flux_q, wave_in, wave_lead)
-        turn = speed * (phase * dt)
-        angle, rate = turn, 1.0
+        turn, drift = speed * (phase * dt), 1.0
+        if len(wander):
+            k = (step - 1) // every
+            slope = (wander[k + 1] - wander[k]) / every
+            turn += wander[k] + slope * (step - k * every)
+            drift += slope / (speed * dt)
+        angle, rate = turn, drift
         for term in range(len(ripple)):
             order, amplitude, shift = ripple[term]
             angle += amplitude / order * np.sin(order * turn + shift)
-            rate += amplitude * np.cos(order * turn + shift)
+            rate += drift * amplitude * np.cos(order * turn + shift)
         place = turn / (2 * np.pi) % 1.0 * len(source)
         low = int(place) % len(source)
         share = place - int(place)
         given = source[low] * (1 - share) + source[(low + 1) % len(source)] * share
+        given *= drift
         _remember(state.node, ring)
         for s in range(NODE_STATES):
             for node in range(n_nodes):

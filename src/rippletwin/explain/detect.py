@@ -23,6 +23,7 @@ MISFIT = 3.0 * FLOOR  # relative model error above which a fit is bad
 PULL = 4.0  # prior standard deviations
 DISAGREEMENT = 4.0  # standard deviations between two operating points
 SIGNIFICANCE = 1e-3
+PASSAGES = 30.0  # of the line that a wave makes in a resonance whose phase a speed turns
 
 
 @dataclass(frozen=True)
@@ -86,8 +87,8 @@ def drift(early: Sequence, late: Sequence, delay: float) -> tuple[float, str]:
     """Smallest p-value, over recordings, that two parts of it agree, and the recording's label.
 
     The shaft angle between the parts is free, the covariances are the parts' own, and a relative
-    error is allowed: half the model's floor, and what another mean speed does to the phase of ten
-    passages of the line. Corrected for the number of recordings.
+    error is allowed: half the model's floor, and what another mean speed does to the phase of the
+    passages of the line that a sharp resonance is made of. Corrected for the number of recordings.
     """
     worst = (1.0, "")
     for a, b in zip(early, late):
@@ -115,7 +116,7 @@ def difference(a, b, delay: float) -> tuple[np.ndarray, np.ndarray]:
     power = np.mean(np.abs(a.values) ** 2, axis=0)
     variance = np.einsum("fss->sf", a.covariance + b.covariance).real
     speed = abs(a.speed_hz / b.speed_hz - 1.0)
-    phase = 2 * np.pi * a.frequency_hz * 10.0 * delay * speed
+    phase = 2 * np.pi * a.frequency_hz * PASSAGES * delay * speed
     variance = variance + ((0.5 * FLOOR) ** 2 + phase**2) * power
     match = np.sum(np.conj(a.values) * b.values / variance, axis=0)
     # The angle: first coarsely, from the strongest order, then refined by the phase slope.

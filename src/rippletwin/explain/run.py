@@ -11,10 +11,16 @@ from rippletwin.case import Case
 from rippletwin.effects import candidates
 from rippletwin.errors import InputError
 from rippletwin.explain import contradiction, detect, locate
-from rippletwin.explain.fit import Fit, prepare
+from rippletwin.explain.fit import Fit, fit_hypothesis, prepare
 from rippletwin.explain.judge import ADEQUATE, Judgement, judge
 from rippletwin.explain.search import GOOD, Search, extended, search
-from rippletwin.explain.shaft import ShaftLines, shaft_lines
+from rippletwin.explain.shaft import (
+    RELATIVE,
+    ShaftLines,
+    as_turned,
+    shaft_lines,
+    standing_out,
+)
 from rippletwin.explain.sheet import WithoutEffect, without_each
 from rippletwin.explain.validate import Validation, that_transfers, validate
 from rippletwin.explain.workers import Workers, workers
@@ -93,7 +99,13 @@ def explain_observations(
 
     `reason` says why the data contradict themselves, where they do; then nothing is searched for.
     """
-    data = prepare(observations, rig, HIGHEST_HZ if observations[0].orders is not None else None)
+    turning = _turning(rig, observations)
+    early, late = as_turned(early, turning), as_turned(late, turning)
+    data = prepare(
+        as_turned(observations, turning),
+        rig,
+        HIGHEST_HZ if observations[0].orders is not None else None,
+    )
     early, late = prepare(early, rig, HIGHEST_HZ), prepare(late, rig, HIGHEST_HZ)
     base = Twin(rig, data)
     held = late if len(data) == 1 and late else None
@@ -132,6 +144,17 @@ def explain_observations(
         located=locate.locate(found.base, data),
         without=without,
     )
+
+
+def _turning(rig, observations: Sequence) -> ShaftLines | None:
+    """How unevenly the shaft turns, by a line that is calibrated and no more; None where evenly."""
+    found = None
+    if "pistons" in rig.pump:
+        found = standing_out(observations, rig.pump["pistons"], HIGHEST_HZ)
+    if found is None or found[0] < RELATIVE:
+        return None
+    data = prepare(observations, rig, HIGHEST_HZ)
+    return shaft_lines(fit_hypothesis(Twin(rig, data), (), data).twin, observations, HIGHEST_HZ)
 
 
 def _others(pool: Workers, found: Search) -> list[Fit]:

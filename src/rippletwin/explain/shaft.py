@@ -1,21 +1,23 @@
 """Lines at shaft orders that equal pistons at even speed do not make.
 
 The nominal pump has none, so they are no matter of fitting the line: the line as it was explained
-tells what flow at the pump they come from, and whether one flow accounts for every sensor. Even
-modulation of the speed makes sidebands in a fixed relation to the piston orders; what is left is
-spread of the pistons.
+tells what flow at the pump they come from, and whether one flow accounts for every sensor. A shaft
+that turns unevenly makes sidebands of the piston orders; what is left is spread of the pistons.
+What the sidebands have, the piston orders lack: at high orders a small swing takes most of them,
+and the line must be fitted with the ripple that such a shaft delivers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.optimize import least_squares
 from scipy.stats import chi2
 
-from rippletwin.effects.speed_fluctuation import sidebands
-from rippletwin.forward import Forward
+from rippletwin.case.model import FlowRipple
+from rippletwin.forward import Forward, flow_harmonics
 from rippletwin.likelihood import cut
 from rippletwin.twin import Twin
 
@@ -23,17 +25,19 @@ FLOOR = 0.02  # of the lines, where no orifice couples them: the line's own erro
 RELATIVE = 0.01  # of the ripple: below it the lines are no effect worth a name
 SIGNIFICANCE = 1e-6
 SHARE = 0.7  # of the lines' energy that modulation must explain to be the name
+LOW = (4, 12, 1000)  # piston orders up to which modulation is first sought as a small one
 
 
 @dataclass(frozen=True)
 class ShaftLines:
     """Lines at other orders than the pistons'.
 
-    relative   their norm over the ripple's, both at the sensors
-    p_value    of noise alone making them
-    coherent   share of their energy that one flow at the pump accounts for
-    name       "speed_fluctuation", "piston_spread" or None
-    value      modulation of the shaft angle in rad, or spread over the mean flow, rms
+    relative    their norm over the ripple's, both at the sensors
+    p_value     of noise alone making them
+    coherent    share of their energy that one flow at the pump accounts for
+    name        "speed_fluctuation", "piston_spread" or None
+    value       modulation of the shaft angle in rad, or spread over the mean flow, rms
+    modulation  b of each recording by its label: the shaft is ahead by Re(b exp(j t)), rad
     """
 
     relative: float
@@ -41,58 +45,107 @@ class ShaftLines:
     coherent: float
     name: str | None
     value: float
+    modulation: Mapping[str, complex] = field(default_factory=dict)
+
+
+def standing_out(
+    observations: Sequence, pistons: int, highest_hz: float
+) -> tuple[float, float] | None:
+    """Norm of the lines at other orders over the ripple's, and the probability that noise alone
+    makes them; None where no observation has such orders."""
+    data = _with_lines(observations, pistons, highest_hz)
+    if not data:
+        return None
+    lines = energy = chi = 0.0
+    count = 0
+    for o, off in data:
+        power = np.abs(o.values[:, off]) ** 2
+        variance = _variance(o)[:, off]
+        energy += np.sum(np.abs(o.values) ** 2)
+        lines += max(np.sum(power) - np.sum(variance), 0.0)
+        chi += 2 * np.sum(power / variance)
+        count += 2 * power.size
+    return float(np.sqrt(lines / energy)), float(chi2.sf(chi, count))
 
 
 def shaft_lines(twin: Twin, observations: Sequence, highest_hz: float) -> ShaftLines | None:
     """Judge the periodic observations with all their orders; None where there are none."""
     pistons = twin.rig.pump.get("pistons")
-    data = [cut(o, highest_hz) for o in observations if o.orders is not None]
-    data = [o for o in data if np.any(np.asarray(o.orders) % pistons)]
-    if not data:
+    found = standing_out(observations, pistons, highest_hz) if pistons else None
+    if found is None:
         return None
-    off_energy = energy = chi = explained = modulated = flows = 0.0
-    count, modulation, spread = 0, [], []
-    for o in data:
+    relative, p = found
+    explained = lines = modulated = flows = 0.0
+    modulation, spread = {}, []
+    for o, off in _with_lines(observations, pistons, highest_hz):
         orders = np.asarray(o.orders, int)
-        off = orders % pistons != 0
         unit = _response(twin, o)
-        variance = np.einsum("fss->sf", o.covariance).real
         power = np.mean(np.abs(o.values) ** 2, axis=0)
-        weight = 1.0 / (variance + (FLOOR**2 * power)[None])
+        weight = 1.0 / (_variance(o) + (FLOOR**2 * power)[None])
         flow = np.sum(weight * np.conj(unit) * o.values, 0) / np.sum(weight * np.abs(unit) ** 2, 0)
         left = o.values - unit * flow
-        energy += np.sum(np.abs(o.values) ** 2)
-        noise = np.sum(variance[:, off])
-        off_energy += max(np.sum(np.abs(o.values[:, off]) ** 2) - noise, 0.0)
-        chi += 2 * np.sum(np.abs(o.values[:, off]) ** 2 / variance[:, off])
-        count += 2 * o.values[:, off].size
+        lines += np.sum(np.abs(o.values[:, off]) ** 2)
         explained += np.sum(np.abs(left[:, off]) ** 2)
-        b, rest, whole = _modulation(orders, flow, unit, off)
-        modulation.append(abs(b))
+        point = twin.operating_point(o)
+        even = np.zeros(orders.max() + 1, complex)
+        at = orders[~off]
+        even[at] = flow[~off] if point.ripple is None else flow_harmonics(point.ripple, at)
+        even[0] = point.mean_flow
+        b, rest, whole = _modulation(even, orders[off], flow[off], unit[:, off], pistons)
+        modulation[o.label] = b
         modulated += rest
         flows += whole
-        mean = twin.operating_point(o).mean_flow
-        spread.append(float(np.sqrt(0.5 * np.sum(np.abs(flow[orders < pistons]) ** 2)) / mean))
-    relative = float(np.sqrt(off_energy / energy))
-    p = float(chi2.sf(chi, count))
-    coherent = 1.0 - float(
-        explained
-        / max(
-            np.sum(
-                [
-                    np.sum(np.abs(o.values[:, np.asarray(o.orders, int) % pistons != 0]) ** 2)
-                    for o in data
-                ]
-            ),
-            1e-300,
+        spread.append(
+            float(np.sqrt(0.5 * np.sum(np.abs(flow[orders < pistons]) ** 2)) / point.mean_flow)
         )
-    )
+    coherent = 1.0 - float(explained / max(lines, 1e-300))
     name, value = None, 0.0
     if relative > RELATIVE and p < SIGNIFICANCE and coherent > 0.5:
         by_speed = modulated < (1.0 - SHARE) * flows
         name = "speed_fluctuation" if by_speed else "piston_spread"
-        value = float(np.mean(modulation if by_speed else spread))
-    return ShaftLines(relative, p, coherent, name, value)
+        value = float(np.mean(np.abs(list(modulation.values())) if by_speed else spread))
+    return ShaftLines(relative, p, coherent, name, value, modulation)
+
+
+def as_turned(observations: Sequence, shaft: ShaftLines | None) -> list:
+    """The observations with the ripple that a shaft delivers which turns as `shaft` says."""
+    if shaft is None or shaft.name != "speed_fluctuation":
+        return list(observations)
+    return [
+        o
+        if o.flow_ripple is None or o.label not in shaft.modulation
+        else replace(o, flow_ripple=turned(o.flow_ripple, shaft.modulation[o.label]))
+        for o in observations
+    ]
+
+
+def turned(ripple: FlowRipple, modulation: complex) -> FlowRipple:
+    """The flow ripple of a shaft that is ahead of even turning by Re(b exp(j t)) rad at angle t."""
+    count = max(len(ripple.flow) // 2, 8)
+    spectrum = flow_harmonics(ripple, np.arange(count))
+    flow = _flow(spectrum, modulation)
+    return replace(ripple, angle_deg=360.0 * np.arange(len(flow)) / len(flow), flow=flow)
+
+
+def _flow(spectrum: np.ndarray, modulation: complex) -> np.ndarray:
+    """Flow (M,) at M even instants of a revolution: q(angle(t)) d angle/dt, from the spectrum
+    (F,) of q at even speed, orders 0 to F - 1."""
+    instant = 2.0 * np.pi * np.arange(4 * len(spectrum)) / (4 * len(spectrum))
+    swing = modulation * np.exp(1j * instant)
+    orders = np.flatnonzero(spectrum)
+    flow = (np.exp(1j * np.outer(instant + swing.real, orders)) @ spectrum[orders]).real
+    return flow * (1.0 - swing.imag)
+
+
+def _with_lines(observations: Sequence, pistons: int, highest_hz: float) -> list[tuple]:
+    """(observation, which of its orders are no multiple of `pistons`) where there are any."""
+    data = [cut(o, highest_hz) for o in observations if o.orders is not None]
+    data = [(o, np.asarray(o.orders) % pistons != 0) for o in data]
+    return [(o, off) for o, off in data if np.any(off)]
+
+
+def _variance(o) -> np.ndarray:
+    return np.einsum("fss->sf", o.covariance).real
 
 
 def _response(twin: Twin, observation) -> np.ndarray:
@@ -103,14 +156,27 @@ def _response(twin: Twin, observation) -> np.ndarray:
     return forward(twin.theta)[0]
 
 
-def _modulation(orders, flow, unit, off):
-    """Best modulation b, and the pressure energy at other orders with and without it taken off."""
-    piston = np.where(off, 0.0, flow)
-    gain = np.sum(np.abs(unit[:, off]) ** 2, axis=0)
-    columns = np.stack([sidebands(orders, piston, b)[off] for b in (1.0, 1j)], axis=1)
-    root = np.sqrt(gain)
-    target, design = root * flow[off], root[:, None] * columns
-    real = np.concatenate([design.real, design.imag])
-    solution = np.linalg.lstsq(real, np.concatenate([target.real, target.imag]), rcond=None)[0]
-    rest = target - design @ solution
-    return complex(*solution), float(np.sum(np.abs(rest) ** 2)), float(np.sum(np.abs(target) ** 2))
+def _modulation(even, orders, flow, unit, pistons):
+    """Best modulation b, and the pressure energy at other orders with and without it taken off.
+
+    even (K,) is the flow's spectrum at even speed from order 0; orders, flow (F,) and unit (S, F)
+    are what is not at piston orders. Far from its value b has other minima, so that it is first
+    sought where it is small: at low orders.
+    """
+    root = np.sqrt(np.sum(np.abs(unit) ** 2, axis=0))
+    target = root * flow
+
+    def left(b):
+        flow = np.fft.rfft(_flow(even, complex(*b)))[orders] * (2.0 / (4 * len(even)))
+        rest = target - root * flow
+        return np.concatenate([rest.real, rest.imag])
+
+    step, best = 1e-6, None
+    for most in LOW:
+        low = np.tile(orders < most * pistons, 2)
+        slope = np.stack([(left(d) - left((0, 0))) / step for d in ((step, 0), (0, step))], axis=1)
+        start = np.linalg.lstsq(-slope[low], left((0, 0))[low], rcond=None)[0]
+        found = least_squares(left, start, x_scale=1e-3)
+        if best is None or found.cost < best.cost:
+            best = found
+    return complex(*best.x), 2.0 * float(best.cost), float(np.sum(np.abs(target) ** 2))
