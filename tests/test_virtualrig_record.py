@@ -232,7 +232,7 @@ def test_built_in_rig_is_converged_to_a_tenth_of_its_noise():
 
 @pytest.fixture(scope="module")
 def driven():
-    """A short line between a given flow of 25 kinds of ripple and the valve, its speed wandering."""
+    """A short line between a given flow and the valve; its speed wanders."""
     sheet = read_yaml(SHEET) | {"sensors": [{"name": "p1", "position": 0.41}]}
     seal = QUICK | {"speed": {"error": 0.0, "wander": 1e-3, "correlation_s": 0.3}}
     turn = 2 * np.pi * np.arange(4608) / 4608
