@@ -85,6 +85,14 @@ def explain(commands) -> None:
     )
     parser.add_argument("--processes", type=int, default=2, help="processes to fit with")
     parser.add_argument("--no-figures", action="store_true", help="write no figures")
+    parser.add_argument(
+        "--bootstrap",
+        type=int,
+        default=0,
+        metavar="N",
+        help="where something is named, N recordings drawn without it and fitted with the whole "
+        "library say what chance gives (at least 10; each takes a good part of the first search)",
+    )
 
     def run(arguments) -> int:
         import json
@@ -95,9 +103,17 @@ def explain(commands) -> None:
         from tqdm import tqdm
 
         from rippletwin.case import load_case
+        from rippletwin.explain.bootstrap import FEWEST
         from rippletwin.explain.run import explain as find
         from rippletwin.explain.verdict import write
 
+        if arguments.bootstrap and arguments.bootstrap < FEWEST:
+            raise InputError(
+                "command line",
+                "--bootstrap",
+                f"{arguments.bootstrap} draws tell no threshold",
+                f"give at least {FEWEST}, or leave it out",
+            )
         case = load_case(arguments.case, states={"healthy"})
         bars = {}
 
@@ -107,7 +123,7 @@ def explain(commands) -> None:
             bars[what].update(done - bars[what].n)
 
         try:
-            explanation = find(case, arguments.processes, progress)
+            explanation = find(case, arguments.processes, progress, arguments.bootstrap)
         finally:
             for bar in bars.values():
                 bar.close()

@@ -7,20 +7,26 @@ import numpy as np
 from rippletwin.effects.base import Effect, Parameter, normal, source_place
 
 
-def sidebands(orders: np.ndarray, flow: np.ndarray, modulation: complex) -> np.ndarray:
-    """First-order sidebands (F,) of `flow` (F,) at shaft `orders` (F,).
+def swung(spectrum: np.ndarray, modulation: complex, count: int) -> np.ndarray:
+    """Flow (count,) at even instants of a revolution of a shaft that is ahead of even turning by
+    Re(b exp(j t)) rad at angle t, b = `modulation`: q(angle(t)) d angle/dt.
 
-    q(theta + Re(b exp(j theta))) with b = `modulation` in rad puts j k b X_k/2 at order k + 1 and
-    j k conj(b) X_k/2 at order k - 1. Orders that are not in `orders` are lost.
+    spectrum (F,) is that of q at even speed: peak amplitudes of orders 0 to F - 1, the mean first.
+    By Jacobi and Anger order k spreads to order n as j^(n-k) J_(n-k)(k |b|): small swings make
+    sidebands, and larger ones leave little of a high order itself.
     """
-    at = {int(n): i for i, n in enumerate(orders)}
-    out = np.zeros_like(flow)
-    for i, k in enumerate(orders):
-        for step, factor in ((1, modulation), (-1, np.conj(modulation))):
-            j = at.get(int(k) + step)
-            if j is not None:
-                out[j] += 0.5j * k * factor * flow[i]
-    return out
+    instant = 2.0 * np.pi * np.arange(count) / count
+    swing = modulation * np.exp(1j * instant)
+    orders = np.flatnonzero(spectrum)
+    flow = (np.exp(1j * np.outer(instant + swing.real, orders)) @ spectrum[orders]).real
+    return flow * (1.0 - swing.imag)
+
+
+def peaks(flow: np.ndarray) -> np.ndarray:
+    """Peak amplitudes (M // 2 + 1,) of shaft orders of a flow (M,) over one revolution."""
+    spectrum = np.fft.rfft(flow) * (2.0 / len(flow))
+    spectrum[0] /= 2.0
+    return spectrum
 
 
 def _apply(network, line, values, place):
@@ -28,24 +34,23 @@ def _apply(network, line, values, place):
     flow = np.array(np.broadcast_to(network.source_flow, np.shape(network.s)), dtype=complex)
     for r in np.unique(line.recording):
         own = line.recording == r
-        flow[own] = flow[own] + sidebands(line.orders[own], flow[own], b)
+        orders = np.asarray(line.orders[own], int)
+        spectrum = np.zeros(orders.max() + 1, complex)
+        spectrum[0], spectrum[orders] = line.mean_flow[own][0], flow[own]
+        flow[own] = peaks(swung(spectrum, b, 4 * len(spectrum)))[orders]
     network.source_flow = flow
 
 
 def _in_time(line, state, values, place):
-    # q(angle + d) = q + d dq/dangle, to first order in both domains.
-    spectrum = np.fft.rfft(line.flow)
-    slope = np.fft.irfft(1j * np.arange(len(spectrum)) * spectrum, len(line.flow))
-    angle = 2.0 * np.pi * np.arange(len(line.flow)) / len(line.flow)
-    b = complex(values["cosine"], values["sine"])
-    line.flow = line.flow + (b * np.exp(1j * angle)).real * slope
+    spectrum = peaks(line.flow)
+    line.flow = swung(spectrum, complex(values["cosine"], values["sine"]), len(line.flow))
 
 
 EFFECT = Effect(
     name="speed_fluctuation",
     element="source",
     medium="any",
-    equation="Q_(k+1) += j k b X_k/2, Q_(k-1) += j k b* X_k/2, angle + Re(b e^(j angle))",
+    equation="q(angle) d angle/dt, angle = t + Re(b e^(j t))",
     source="Randall 2011, Vibration-based Condition Monitoring, sec. 3.3 (phase modulation)",
     parameters=lambda rig, place: (
         Parameter("cosine", "rad", normal(0.0, 5e-3)),

@@ -44,11 +44,16 @@ class Judgement:
 
 
 def judge(
-    search: Search, alarms: Alarms, validation: Validation | None, contradiction: str = ""
+    search: Search,
+    alarms: Alarms,
+    validation: Validation | None,
+    contradiction: str = "",
+    threshold: float = ACCEPT,
 ) -> Judgement:
     """Weigh the search's best explanation against the base, its rivals and the nameless networks.
 
-    `contradiction` says why the data contradict themselves, if they do.
+    `contradiction` says why the data contradict themselves, if they do; `threshold` is the log
+    evidence that an explanation must have over the base, where chance gives more than ACCEPT.
     """
     best, other = search.best, search.others[0] if search.others else None
     if contradiction:
@@ -58,6 +63,8 @@ def judge(
         return Judgement("unexplained", other)
     if not best.hypothesis:
         return _nothing_missing(best, alarms)
+    if search.gain(best) < threshold:
+        return _nothing_missing(search.base, alarms)
     fails = validation is not None and not validation.holds
     if fails and search.base.floor <= GOOD and search.gain(best) < SURE:
         # A line that fits without it, and data left out that speak against it: an absorber.

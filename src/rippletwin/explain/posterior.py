@@ -141,6 +141,23 @@ class Posterior:
         smooth = np.repeat(np.asarray(smooth_sd)[..., None], len(self._basis) - 1, axis=-1)
         return np.concatenate([smooth, np.full((*smooth.shape[:-1], 1), SIZE)], axis=-1)
 
+    def draw(self, prediction: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Values (S, F) that a twin of this prediction might have given, its errors drawn anew.
+
+        A free source stays as strong as the data have it.
+        """
+
+        def normal(*shape):
+            return (rng.normal(size=(*shape, 2)) @ np.array([1.0, 1j])) / np.sqrt(2.0)
+
+        h = self.best_source(prediction)
+        relative = np.where(self._known | self._free, 0.0, self.source_sd * self._scale)
+        source = 1.0 + relative * normal(h.shape[1])
+        sds = self._sds(self.smooth_sd)
+        source[self._nominal] += (sds * normal(len(sds))) @ self._basis
+        error = np.sqrt(self._variance(self.floor)) * normal(*h.shape)
+        return source * h + np.einsum("fsk,kf->sf", np.conj(self._rotation), error)
+
     def estimate_errors(self, prediction: np.ndarray, theta: np.ndarray) -> None:
         """Set floor and source errors to their most likely values given the residuals at theta.
 

@@ -11,9 +11,10 @@ from rippletwin.case import Case
 from rippletwin.effects import candidates
 from rippletwin.errors import InputError
 from rippletwin.explain import contradiction, detect, locate
+from rippletwin.explain.bootstrap import Chance, chance
 from rippletwin.explain.fit import Fit, fit_hypothesis, prepare
 from rippletwin.explain.judge import ADEQUATE, Judgement, judge
-from rippletwin.explain.search import GOOD, Search, extended, search
+from rippletwin.explain.search import ACCEPT, GOOD, Search, extended, search
 from rippletwin.explain.shaft import (
     RELATIVE,
     ShaftLines,
@@ -37,7 +38,8 @@ class Explanation:
     observations are as fitted; single holds the base fitted to each of them alone, shaft what the
     shaft orders say that are no multiples of the pistons' number, blind the fits that know nothing
     of the source (`rippletwin.explain.locate.compared`), located where the base lacks something,
-    without what a free data sheet would make of the data without each accepted effect.
+    without what a free data sheet would make of the data without each accepted effect, chance the
+    draws without an effect where they were asked for.
     """
 
     rig: object
@@ -51,6 +53,12 @@ class Explanation:
     blind: tuple[Fit, ...] = ()
     located: locate.Located | None = None
     without: tuple[WithoutEffect, ...] = ()
+    chance: Chance | None = None
+
+    @property
+    def threshold(self) -> float:
+        """Log evidence that an effect must add to be named."""
+        return ACCEPT if self.chance is None else max(ACCEPT, self.chance.threshold)
 
     @property
     def twin(self) -> Twin:
@@ -59,11 +67,15 @@ class Explanation:
 
 
 def explain(
-    case: Case, processes: int = 2, progress: Callable[[str, int, int], None] | None = None
+    case: Case,
+    processes: int = 2,
+    progress: Callable[[str, int, int], None] | None = None,
+    draws: int = 0,
 ) -> Explanation:
     """Explain a case's healthy recordings.
 
-    `progress` is told what is being fitted, how many fits are done, and of how many.
+    `progress` is told what is being fitted, how many fits are done, and of how many. With `draws`
+    the threshold is that of as many recordings drawn without an effect (`explain.bootstrap`).
     Raises InputError where no recording is healthy.
     """
     if not case.healthy:
@@ -83,7 +95,9 @@ def explain(
         else:
             observations.append(observe(recording, case.rig, HIGHEST_HZ))
     reason = contradiction.find(case.rig, case.healthy, observations, early, late)
-    return explain_observations(case.rig, observations, early, late, processes, progress, reason)
+    return explain_observations(
+        case.rig, observations, early, late, processes, progress, reason, draws
+    )
 
 
 def explain_observations(
@@ -94,10 +108,12 @@ def explain_observations(
     processes: int = 2,
     progress: Callable[[str, int, int], None] | None = None,
     reason: str = "",
+    draws: int = 0,
 ) -> Explanation:
     """Explain observations; `early` and `late` are those of the two halves of periodic ones.
 
     `reason` says why the data contradict themselves, where they do; then nothing is searched for.
+    With `draws` the threshold is that of so many recordings drawn without an effect.
     """
     turning = _turning(rig, observations)
     early, late = as_turned(early, turning), as_turned(late, turning)
@@ -129,7 +145,11 @@ def explain_observations(
         blind = locate.blind(pool, found)
         validation = validate(pool, found.base, explanation, held)
         checked = validation if explanation.hypothesis else None
-        judgement = judge(found, alarms, checked, reason)
+        by_chance = None
+        if draws and found.best.hypothesis:
+            by_chance = chance(found.base, data, draws, processes, progress)
+        threshold = ACCEPT if by_chance is None else max(ACCEPT, by_chance.threshold)
+        judgement = judge(found, alarms, checked, reason, threshold)
         without = without_each(pool, found.base, judgement.accepted)
     return Explanation(
         rig=rig,
@@ -143,6 +163,7 @@ def explain_observations(
         blind=tuple(blind),
         located=locate.locate(found.base, data),
         without=without,
+        chance=by_chance,
     )
 
 

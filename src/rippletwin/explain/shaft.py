@@ -17,6 +17,7 @@ from scipy.optimize import least_squares
 from scipy.stats import chi2
 
 from rippletwin.case.model import FlowRipple
+from rippletwin.effects.speed_fluctuation import peaks, swung
 from rippletwin.forward import Forward, flow_harmonics
 from rippletwin.likelihood import cut
 from rippletwin.twin import Twin
@@ -123,18 +124,8 @@ def turned(ripple: FlowRipple, modulation: complex) -> FlowRipple:
     """The flow ripple of a shaft that is ahead of even turning by Re(b exp(j t)) rad at angle t."""
     count = max(len(ripple.flow) // 2, 8)
     spectrum = flow_harmonics(ripple, np.arange(count))
-    flow = _flow(spectrum, modulation)
+    flow = swung(spectrum, modulation, 4 * count)
     return replace(ripple, angle_deg=360.0 * np.arange(len(flow)) / len(flow), flow=flow)
-
-
-def _flow(spectrum: np.ndarray, modulation: complex) -> np.ndarray:
-    """Flow (M,) at M even instants of a revolution: q(angle(t)) d angle/dt, from the spectrum
-    (F,) of q at even speed, orders 0 to F - 1."""
-    instant = 2.0 * np.pi * np.arange(4 * len(spectrum)) / (4 * len(spectrum))
-    swing = modulation * np.exp(1j * instant)
-    orders = np.flatnonzero(spectrum)
-    flow = (np.exp(1j * np.outer(instant + swing.real, orders)) @ spectrum[orders]).real
-    return flow * (1.0 - swing.imag)
 
 
 def _with_lines(observations: Sequence, pistons: int, highest_hz: float) -> list[tuple]:
@@ -167,8 +158,7 @@ def _modulation(even, orders, flow, unit, pistons):
     target = root * flow
 
     def left(b):
-        flow = np.fft.rfft(_flow(even, complex(*b)))[orders] * (2.0 / (4 * len(even)))
-        rest = target - root * flow
+        rest = target - root * peaks(swung(even, complex(*b), 4 * len(even)))[orders]
         return np.concatenate([rest.real, rest.imag])
 
     step, best = 1e-6, None

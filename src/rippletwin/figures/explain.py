@@ -135,14 +135,15 @@ def evidence(e) -> Figure | None:
     places = np.cumsum(lines) - 0.5 * lines
     fig, axes = style.figure(1, 1, height=0.9 + 0.24 * int(np.sum(lines)))
     ax = axes[0, 0]
-    colours = [style.CORRECTED if g > ACCEPT else style.NEUTRAL for g in gains]
+    colours = [style.CORRECTED if g > e.threshold else style.NEUTRAL for g in gains]
     ax.barh(places, gains, color=colours, height=0.6, label="source as stated")
     unseen = {row["effects"]: row["source_free"] for row in side_by_side(search, e.blind)}
     points = [(unseen[f.label], y) for y, f in zip(places, shown.values()) if f.label in unseen]
     if points:
         looks = dict(ms=5, color=style.MEASURED, mfc="white", label="blind to the source")
         ax.plot(*np.array(points).T, "D", **looks)
-    ax.axvline(ACCEPT, color=style.ALARM, ls="--", lw=1, label=f"threshold {ACCEPT:g}")
+    words = f"threshold {e.threshold:.2g}"
+    ax.axvline(e.threshold, color=style.ALARM, ls="--", lw=1, label=words)
     ax.axvline(0.0, color=style.MEASURED, lw=0.6)
     ax.set_xscale("symlog", linthresh=10)
     ticks = [t for t in (-1000, -100, -10, 0, 10, 100, 1000, 10000) if _within(t, gains, unseen)]
