@@ -16,7 +16,8 @@ import time
 import torch
 from torch import nn
 
-from rippletwin.networks import ARCHITECTURES, build
+from rippletwin.architectures import ARCHITECTURES
+from rippletwin.networks import build
 from rippletwin.training import MALLOC_ENVIRONMENT
 
 

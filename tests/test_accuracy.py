@@ -19,7 +19,7 @@ from rippletwin.accuracy import (
     score,
     summarise,
 )
-from rippletwin.networks import ARCHITECTURES, CLASSES
+from rippletwin.architectures import ARCHITECTURES, CLASSES
 from rippletwin.training import History
 
 ROOT = Path(__file__).parents[1]

@@ -7,6 +7,7 @@ import pytest
 import torch
 from torch import nn
 
+from rippletwin.architectures import ARCHITECTURES
 from rippletwin.attention import (
     alignment,
     attention,
@@ -15,7 +16,7 @@ from rippletwin.attention import (
     feature_positions,
     grad_cam,
 )
-from rippletwin.networks import ARCHITECTURES, build
+from rippletwin.networks import build
 
 
 def network_and_input(name, n=3):

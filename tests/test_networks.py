@@ -8,7 +8,8 @@ import pytest
 import torch
 from torch import nn
 
-from rippletwin.networks import ARCHITECTURES, build
+from rippletwin.architectures import ARCHITECTURES
+from rippletwin.networks import build
 
 TIME = {name for name, a in ARCHITECTURES.items() if a.domain == "time"}
 

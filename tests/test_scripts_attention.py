@@ -7,7 +7,8 @@ import torch
 import xarray as xr
 
 from rippletwin import store
-from rippletwin.networks import CLASSES, build
+from rippletwin.architectures import CLASSES
+from rippletwin.networks import build
 from run_script import run_script
 
 POINTS = 3072

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from rippletwin.networks import ARCHITECTURES, CLASSES
+from rippletwin.architectures import ARCHITECTURES, CLASSES
 
 TRUE_STATES = ("H", "S", "C")
 UNKNOWN = "?"  # state of a recording that is there to be diagnosed

@@ -22,7 +22,7 @@ import pandas as pd
 from scipy.stats import t as student
 
 from rippletwin.accuracy import summarise
-from rippletwin.networks import ARCHITECTURES
+from rippletwin.architectures import ARCHITECTURES
 
 RECORDINGS = "experimental"  # the dataset that learns from recordings: no zero-shot claim is of it
 STRICT, EITHER, PAPER = "strict", "either severity", "the paper's table"

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 import scipy.fft
-import torch
 from scipy.special import gamma as gamma_function
 
 GAMMA, BETA = 3.0, 60.0  # Morse wavelet exp(-w^GAMMA) w^BETA, the convention of ssqueezepy and jLab
@@ -80,6 +79,8 @@ def synchrosqueeze(
     window. A tone of amplitude A gives magnitude A in its row; the real part summed over rows is
     the signal, within the band, at those times.
     """
+    import torch  # takes seconds, and those who want an image's axes need not wait
+
     signals = np.asarray(signals)
     points = signals.shape[-1]
     frequency = frequency_axis(settings)

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import rankdata
 
-from rippletwin.networks import ARCHITECTURES
+from rippletwin.architectures import ARCHITECTURES
 
 EXACT = 8  # networks up to which all orders are tried for the p-value
 DRAWS = 20_000  # random orders beyond

@@ -8,8 +8,9 @@ import xarray as xr
 
 from job import start
 from rippletwin import store
+from rippletwin.architectures import CLASSES
 from rippletwin.attention import alignment, attention, density, fault_region
-from rippletwin.networks import CLASSES, restored
+from rippletwin.networks import restored
 from rippletwin.training import predict
 
 WINDOWS = 16  # of each recording, for the mean heat

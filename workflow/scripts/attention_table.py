@@ -6,7 +6,7 @@ import pandas as pd
 
 from job import start
 from rippletwin import store
-from rippletwin.networks import ARCHITECTURES
+from rippletwin.architectures import ARCHITECTURES
 from rippletwin.selection import alignment_table, markdown, rank_table
 
 tell = start(snakemake)

@@ -6,8 +6,9 @@ import torch
 
 from job import start
 from rippletwin import store
+from rippletwin.architectures import CLASSES
 from rippletwin.dataset import split_by_time
-from rippletwin.networks import CLASSES, restored
+from rippletwin.networks import restored
 from rippletwin.training import predict
 
 tell = start(snakemake)

@@ -6,7 +6,8 @@ import torch
 
 from job import start
 from rippletwin import store
-from rippletwin.networks import CLASSES, restored
+from rippletwin.architectures import CLASSES
+from rippletwin.networks import restored
 from rippletwin.training import predict
 
 tell = start(snakemake)

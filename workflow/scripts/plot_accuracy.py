@@ -4,8 +4,8 @@ import pandas as pd
 
 from job import start
 from rippletwin.accuracy import summarise
+from rippletwin.architectures import ARCHITECTURES
 from rippletwin.figures import diagnosis, save
-from rippletwin.networks import ARCHITECTURES
 
 tell = start(snakemake)
 ours = summarise(pd.read_csv(snakemake.input.table))

@@ -6,10 +6,10 @@ import numpy as np
 
 from job import start
 from rippletwin import store
+from rippletwin.architectures import ARCHITECTURES
 from rippletwin.case import load_case
 from rippletwin.figures import attention, save
 from rippletwin.imaging import SstSettings, image_axes
-from rippletwin.networks import ARCHITECTURES
 
 tell = start(snakemake)
 params, output = snakemake.params, snakemake.output

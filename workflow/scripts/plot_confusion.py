@@ -4,8 +4,8 @@ import pandas as pd
 
 from job import start
 from rippletwin.accuracy import CLASSES, TRUE_STATES, confusion_of
+from rippletwin.architectures import ARCHITECTURES
 from rippletwin.figures import diagnosis, save
-from rippletwin.networks import ARCHITECTURES
 
 tell = start(snakemake)
 results = pd.read_csv(snakemake.input.table)

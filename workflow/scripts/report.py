@@ -8,7 +8,7 @@ import pandas as pd
 from job import start
 from rippletwin import store
 from rippletwin.accuracy import UNKNOWN, accuracy_table, answer_table, result_row, score
-from rippletwin.networks import CLASSES
+from rippletwin.architectures import CLASSES
 from rippletwin.training import History
 
 tell = start(snakemake)

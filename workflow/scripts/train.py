@@ -8,8 +8,9 @@ import torch
 
 from job import start
 from rippletwin import store
+from rippletwin.architectures import CLASSES
 from rippletwin.dataset import split_by_time
-from rippletwin.networks import CLASSES, build
+from rippletwin.networks import build
 from rippletwin.training import TrainingSettings, train
 
 tell = start(snakemake)
