@@ -32,6 +32,7 @@ pair of them is a start."""
 WIDE, FAR = 400, 2.0
 """A line without effects is tried from as many wave speeds at random besides, each as many prior
 standard deviations away: all other fits lean on it, and a sheet may be further off than it says."""
+SPREAD = 4  # fits below a limit about which the next is begun at random, where that is asked for
 FEW = 3
 """Up to so many starts all pairs of scalings are tried; with more, as for a position along the
 line, all wave speeds are scaled together."""
@@ -143,11 +144,13 @@ def fit_hypothesis(
     observations: Sequence,
     starts: Sequence[dict[str, float]] = ({},),
     source_free: bool = False,
+    draws: int = 0,
 ) -> Fit:
     """Fit by continuation from the nominal values, from several starts.
 
     `base` is a twin without effects of the right rig and recordings. Each of `starts` gives
     coordinates of effect parameters by name; each is tried with the scalings of the wave speeds.
+    With `draws` every limit is also begun from that many draws about each fit below the last one.
     """
     twin = base.with_(effects=hypothesis)
     stages = limits(observations)
@@ -165,7 +168,31 @@ def fit_hypothesis(
             fits.append((value, theta))
         kept = KEPT[many]
         states = _distinct(fits)[: 1 if last else kept[min(stage, len(kept) - 1)]]
+        if draws and not last:
+            above = Posterior(twin, observations, stages[stage + 1], source_free)
+            states = states + _about(posterior, states[:SPREAD], above, draws, TRIED[many])
     return conclude(posterior, hypothesis, states[0][1])
+
+
+def _about(posterior: Posterior, states, above: Posterior, draws: int, tried: int) -> list:
+    """(misfit, theta) to go on from: of `draws` about each of the `states` the `tried` that are
+    best `above` the limit.
+
+    A few harmonics at two sensors leave a line much freedom, and from the likeliest of the lines
+    that they allow no way may lead to the one that higher harmonics demand.
+    """
+    rng, found = np.random.default_rng(0), []
+    for _, theta in states:
+        prediction = posterior.predict(theta)
+        posterior.estimate_errors(prediction, theta)
+        posterior.floor = MOST  # as far as a line may be off that is not yet the right one
+        jacobian = posterior.linearise(theta, prediction)[1]
+        hessian = jacobian.T @ jacobian
+        hessian[~posterior.prior, ~posterior.prior] += 1e-9
+        root = np.linalg.inv(np.linalg.cholesky(hessian)).T
+        spread = root @ rng.normal(size=(len(theta), draws))
+        found += [align(above, theta + step) for step in spread.T]
+    return sorted(found, key=lambda g: g[0])[:tried]
 
 
 def _first_states(posterior: Posterior, starts, tried: int) -> list:

@@ -19,6 +19,7 @@ parametric bootstraps of no-effect cases with refitting is below it (docs/explai
 CERTAIN = -3.0  # the same for an effect that no real line is without: twenty to one against it
 MOST = 4  # effects at a time
 STAND_INS = 10  # single effects tried in the place of another
+DRAWS = 800  # about each fit below a limit
 LENT = 5  # single effects from whose lines the base is fitted again
 LIMITS = {"line_volume": "load_volume"}  # effects at any place that are another at the line's end
 GOOD = 2.0 * FLOOR  # relative model error at which a fit is as good as it can be believed
@@ -46,7 +47,7 @@ class Search:
     base     the paper's line, fitted
     singles  every effect at every place alone, best first
     best     the accepted hypothesis (may be the base)
-    rivals   fits of the last step that took `best` in or could have: alternatives to it
+    rivals   fits of every step that took effects in or could have: alternatives to `best`
     others   passive networks that compete, best first
     """
 
@@ -78,7 +79,7 @@ def search(pool: Workers, progress: Callable[[str, int, int], None] | None = Non
             new = certain[0]
             if new.evidence - best.evidence < CERTAIN:
                 break
-        best, rivals = new, step
+        best, rivals = new, rivals if step is singles else [*rivals, *step]
         best = simplify(pool, exchange(pool, backward(pool, best), singles), found)
         if len(best.hypothesis) >= MOST:
             break
@@ -106,13 +107,17 @@ def alone(pool: Workers, found: Sequence, progress=None) -> tuple[Fit, list[Fit]
 
 
 def _lowest(pool: Workers, base: Fit, singles: Sequence[Fit]) -> Fit:
-    """The base, or what it becomes from where the best effects have brought the line.
+    """The base, or what it becomes from where the best effects have brought the line, or from
+    draws about what lower harmonics leave possible.
 
     A base that stopped in a wrong valley, as from a sheet that is far off, would give all of the
     way out of it to whichever effect first finds out.
     """
     starts = _ranked(singles)[:LENT]
     jobs = [{"hypothesis": (), "theta": carry(fit, (), pool.base)} for fit in starts]
+    if base.floor > GOOD and len(pool.observations) == 1:
+        # Of one operating point the lowest harmonics say least.
+        jobs = [{"hypothesis": (), "draws": DRAWS}, *jobs]
     return max([base, *pool.fit(jobs)], key=lambda fit: fit.evidence)
 
 

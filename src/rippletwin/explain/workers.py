@@ -114,7 +114,7 @@ def work(job: dict) -> Fit:
 
     With `theta` from there; with `fit` from where that ended and the newest effect's scan, as
     strong as its prior and weak; else by continuation from the starts `starts` or the newest
-    effect's scan; `source_free` as in `fit_hypothesis`.
+    effect's scan; `source_free` and `draws` as in `fit_hypothesis`.
     """
     base, observations = _DATA
     use = job.get("use")
@@ -131,4 +131,4 @@ def work(job: dict) -> Fit:
             thetas.append(theta)
         return refine(base, hypothesis, observations, thetas, free)
     starts = job.get("starts") or scan(base.rig, hypothesis)
-    return fit_hypothesis(base, hypothesis, observations, starts, free)
+    return fit_hypothesis(base, hypothesis, observations, starts, free, job.get("draws", 0))
