@@ -23,7 +23,7 @@ MISFIT = 3.0 * FLOOR  # relative model error above which a fit is bad
 PULL = 4.0  # prior standard deviations
 DISAGREEMENT = 4.0  # standard deviations between two operating points
 SIGNIFICANCE = 1e-3
-PASSAGES = 30.0  # of the line that a wave makes in a resonance whose phase a speed turns
+PASSAGES = 100.0  # of the line that a wave makes in a sharp resonance, whose phase the speed turns
 
 
 @dataclass(frozen=True)

@@ -10,17 +10,13 @@ import numpy as np
 from rippletwin.explain.detect import Alarms
 from rippletwin.explain.fit import Fit
 from rippletwin.explain.locate import extent
-from rippletwin.explain.search import ACCEPT, GOOD, Search
+from rippletwin.explain.search import ACCEPT, GOOD, SURE, Search
 from rippletwin.explain.validate import Validation
 
 VERDICTS = ("consistent", "named", "ambiguous", "unexplained", "calibration_only", "bad_data")
 
 EQUIVALENT = 3.0
 """Log evidence within which two explanations cannot be told apart: twenty to one."""
-
-SURE = 2.0 * ACCEPT
-"""Log evidence from which something is missing even where the line fits without and no explanation
-holds on data left out."""
 
 ADEQUATE = 5.0 * GOOD
 """Relative model error above which no name is given: an effect that leaves more than this is at

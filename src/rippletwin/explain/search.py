@@ -16,6 +16,10 @@ ACCEPT = 8.0
 """Log evidence that an effect must add. The largest that chance gave any effect of the library in
 parametric bootstraps of no-effect cases with refitting is below it (docs/explain.md)."""
 
+SURE = 2.0 * ACCEPT
+"""Log evidence from which something is missing even where the line fits without and no explanation
+holds on data left out."""
+
 CERTAIN = -3.0  # the same for an effect that no real line is without: twenty to one against it
 MOST = 4  # effects at a time
 STAND_INS = 10  # single effects tried in the place of another

@@ -1,0 +1,99 @@
+"""What a wandering speed does to harmonics, and what is left of it at the mean speed.
+
+    python benchmarks/wander.py [--wander 0.0005] [--takes 3]
+
+The virtual rig records a line of steady friction that ends in a volume, marched at a wandering
+speed, and again at the even speed that is the mean. Printed: norm of the difference of all piston
+harmonics below 4 kHz over the norm of the even ones, shaft angle aligned, and the same for the
+harmonic that differs most; for the mean over the revolutions and for the value at the mean speed.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+
+import numpy as np
+
+from rippletwin.revolutions import cut_revolutions
+from rippletwin.wander import at_mean_speed, mean_speed
+from virtualrig.recorder import SAMPLING_RATE_HZ, Point, record
+from virtualrig.rig import SHEET, build, read_yaml
+
+PISTONS, HIGHEST_HZ, RPM = 9, 4000.0, 1550.0
+SEAL = {
+    "line": {
+        "segments": [
+            {"length": 1.7, "diameter": 0.0146, "wave_speed": 1158.0},
+            {"length": 3.1, "diameter": 0.0167, "wave_speed": 1164.0},
+        ]
+    },
+    "sensors": [0.4, 3.46],
+    "effects": [{"name": "load_volume", "volume": 2.3e-5}],
+    "noise": 2000.0,
+    "numerics": {"frequency": 7000.0, "points": 8.0, "degree": 7, "modes": 10},
+}
+
+
+def flow() -> np.ndarray:
+    """Flow of nine pistons over a revolution, m3/s: half sines and a backflow at each opening."""
+    angle = 2 * np.pi * np.arange(4608) / 4608
+    total = np.zeros_like(angle)
+    for k in range(PISTONS):
+        own = (angle + 2 * np.pi * k / PISTONS) % (2 * np.pi)
+        total += np.where(own < np.pi, np.sin(own), 0.0)
+        total -= 0.3 * np.exp(-0.5 * ((own - 0.12) / 0.02) ** 2)
+    return 2.5e-4 * total / total.mean()
+
+
+def harmonics(take, speed_rpm: float):
+    """Mean speed, orders, and their values as mean of the revolutions and at the mean speed."""
+    revolutions = cut_revolutions(take.pressure, SAMPLING_RATE_HZ, PISTONS, speed_rpm)
+    speed = mean_speed(revolutions.speed_hz)
+    orders = PISTONS * np.arange(1, int(HIGHEST_HZ / speed / PISTONS) + 1)
+    spectra = 2 * np.fft.rfft(revolutions.windows, axis=2)[:, :, orders]
+    spectra /= revolutions.windows.shape[2]
+    return speed, orders, spectra.mean(0), at_mean_speed(spectra, revolutions.speed_hz, orders)[0]
+
+
+def apart(values, even, orders) -> tuple[float, float]:
+    """Difference of all harmonics and of the worst of the stronger half, shaft angle aligned."""
+    match = np.sum(np.conj(values) * even / np.abs(even) ** 2, axis=0)
+    grid = np.linspace(-np.pi, np.pi, 40001) / PISTONS
+    angle = grid[np.argmax((np.exp(-1j * np.outer(grid, orders)) @ match).real)]
+    gap = values * np.exp(1j * angle * orders) - even
+    size = np.linalg.norm(even, axis=0)
+    strong = size > np.median(size)
+    worst = np.max((np.linalg.norm(gap, axis=0) / size)[strong])
+    return float(np.linalg.norm(gap) / np.linalg.norm(even)), float(worst)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--wander", type=float, default=5e-4)
+    parser.add_argument("--takes", type=int, default=3)
+    arguments = parser.parse_args()
+    sheet = read_yaml(SHEET)
+    sheet = sheet | {"sensors": [{"name": "p1", "position": 0.4}, {"name": "p2", "position": 3.46}]}
+    speed = {"error": 0.0, "wander": arguments.wander, "correlation_s": 3.0}
+    rig, ripple = build(sheet, SEAL | {"speed": speed}), flow()
+
+    def driving(speed_rpm):
+        return ripple * speed_rpm / RPM
+
+    print("| take | mean of revolutions | worst | at the mean speed | worst |")
+    print("|---|---|---|---|---|")
+    for k in range(arguments.takes):
+        point = Point("a", RPM, 7.7e6, 3.2)
+        taken = record(rig, point, np.random.default_rng(k), driving, 20.0, 3, marched=True)
+        mean_hz, orders, plain, at_mean = harmonics(taken, RPM)
+        # the mean of the revolutions that were kept is not quite that of the recording
+        point = replace(point, speed_rpm=60 * mean_hz)
+        even = record(replace(rig, wander=0.0), point, np.random.default_rng(k), driving, 20.0, 3)
+        even = harmonics(even, point.speed_rpm)[2]
+        cells = [f"{x:.1%}" for v in (plain, at_mean) for x in apart(v, even, orders)]
+        print("| " + " | ".join([str(k + 1), *cells]) + " |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
