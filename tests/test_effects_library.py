@@ -164,7 +164,7 @@ def test_unsteady_friction_replaces_steady():
 
 def test_short_branch_is_a_volume():
     """A branch much shorter than the wave stores like its volume (Wylie & Streeter, sec. 12.5)."""
-    values = {"position": 1.0, "length": 0.01, "diameter": 0.01, "loss": 1.0}
+    values = {"position": 1.0, "length": 0.01, "diameter": 0.01, "viscosity_ratio": 1.0}
     volume = 0.25 * np.pi * 0.01**2 * 0.01
     readings = []
     for name, own in (

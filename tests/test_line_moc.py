@@ -151,7 +151,7 @@ def short_line(steps, friction="unsteady", pipes=SHORT, inserts=(), source=0.0):
     positions = [0.1234, 0.9, sum(p.length for p in pipes)]
     net = network(s, pipes, friction, source_flow=ripple(orders, corner_hz=3000.0))
     net.load = ("impedance", 4e9 + 0 * s)
-    net.inserts = [in_the_chain(insert, s) for insert in inserts]
+    net.inserts = [in_the_chain(insert, s, friction) for insert in inserts]
     net.source_admittance = source * s
     line = Line(
         pipes,
@@ -167,12 +167,12 @@ def short_line(steps, friction="unsteady", pipes=SHORT, inserts=(), source=0.0):
     return simulate(line, periods=200, tolerance=1e-7).harmonics(orders), net, positions
 
 
-def in_the_chain(insert, s):
+def in_the_chain(insert, s, friction):
     """The same for the frequency domain."""
     if isinstance(insert, Branch):
-        pipe = insert.pipe
+        pipe, thicker = insert.pipe, insert.viscosity_ratio * VISCOSITY
         y = branch_admittance(
-            s, pipe.length, pipe.diameter, pipe.wave_speed, DENSITY, VISCOSITY, insert.loss
+            s, pipe.length, pipe.diameter, pipe.wave_speed, DENSITY, thicker, friction
         )
         return Insert(insert.position, "shunt", y)
     return Insert(insert.position, insert.kind, insert.immittance(s))

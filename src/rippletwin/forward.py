@@ -166,6 +166,7 @@ class Forward:
             recording=self.recording,
             mean_flow=self.mean_flow,
             load_passes_flow=self.twin.rig.load.passes_flow and not self.twin.guessed_load,
+            friction=self.twin.friction_law,
         )
 
     def _orifice_admittance(self, factor: float) -> np.ndarray:

@@ -145,6 +145,11 @@ class Twin:
             k += len(own)
         return out
 
+    @property
+    def friction_law(self) -> str:
+        """Of the line, with what the effects make of it."""
+        return next((e.friction for e, _ in self.effects if e.friction), self.friction)
+
     # predictions
 
     def predict(self, observations: Sequence, theta: np.ndarray | None = None) -> list[np.ndarray]:

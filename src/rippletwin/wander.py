@@ -37,18 +37,23 @@ def at_mean_speed(
     it positive definite where there are few revolutions.
     """
     count, sensors, _ = spectra.shape
-    weights = np.full(spectra.shape[1:] + (count,), 1 / count, dtype=complex)
-    unknown = np.zeros(spectra.shape[1:])
-    residual = spectra - spectra.mean(axis=0)
+    data = spectra.reshape(count, -1)
+    weights = np.full((data.shape[1], count), 1 / count, dtype=complex)
+    unknown = np.zeros(data.shape[1])
+    residual = data - data.mean(axis=0)
     freedom = max(count - 1, 1)
     if count >= ENOUGH:
         mean = mean_speed(speed_hz)
         deviation = speed_hz / mean - 1
         rate = np.gradient(deviation, np.cumsum(1 / speed_hz))
-        band = np.round(BANDS * np.log2(orders * mean)).astype(int)
+        band = np.tile(np.round(BANDS * np.log2(orders * mean)).astype(int), sensors)
         for each in np.unique(band):
-            own, chirp = band == each, rate / (4 * np.pi * 2.0 ** (each / BANDS))
-            _regress(spectra, own, deviation, chirp, (weights, unknown, residual))
+            own, chirp = np.flatnonzero(band == each), rate / (4 * np.pi * 2.0 ** (each / BANDS))
+            for which, *found in _regress(data[:, own], deviation, chirp):
+                weights[own[which]], unknown[own[which]], residual[:, own[which]] = found
+    weights = weights.reshape(*spectra.shape[1:], count)
+    unknown = unknown.reshape(spectra.shape[1:])
+    residual = residual.reshape(spectra.shape)
     scatter = np.einsum("rsf,rtf->fst", residual, residual.conj())
     typical = np.median(np.einsum("fss->fs", scatter).real, axis=0) / freedom
     prior = sensors + 2
@@ -65,17 +70,14 @@ def mean_speed(speed_hz: np.ndarray) -> float:
     return float(1 / np.mean(1 / speed_hz))
 
 
-def _regress(spectra, own, deviation, chirp, out):
-    """Fill the `own` orders of weights, variance of the unknown, and residual.
+def _regress(data, deviation, chirp):
+    """Columns of data (R, N) that depend on the speed: (which, weights, variance of the unknown,
+    residual) of each group of them that takes one covariance.
 
     chirp (R,) is the rate of the relative deviation over twice the angular frequency.
     """
-    weights, unknown, residual = out
     count = len(deviation)
-    data = spectra[:, :, own].reshape(count, -1)
-    contrasts = np.linalg.svd(np.ones((1, count)))[2][
-        1:
-    ].T  # (R, R - 1), orthonormal, free of the mean
+    contrasts = np.linalg.svd(np.ones((1, count)))[2][1:].T  # (R, R - 1), free of the mean
     plain = (count - 1) * np.log(np.sum(np.abs(contrasts.T @ data) ** 2, axis=0) + 1e-300)
     best = -plain + GAIN
     chosen = np.full(data.shape[1], -1)
@@ -93,10 +95,6 @@ def _regress(spectra, own, deviation, chirp, out):
             chosen[likelihood > best] = len(tried)
             best = np.maximum(best, likelihood)
             tried.append((kernel, to_mean, size, basis, ratio))
-    shape = (spectra.shape[1], int(own.sum()))
-    rows = np.full((data.shape[1], count), 1 / count, dtype=complex)
-    variance = np.zeros(data.shape[1])
-    left = data - data.mean(axis=0)
     for k in np.unique(chosen[chosen >= 0]):
         kernel, to_mean, size, basis, ratio = tried[k]
         which = chosen == k
@@ -104,7 +102,6 @@ def _regress(spectra, own, deviation, chirp, out):
         system[:count, :count] = ratio * kernel + np.eye(count)
         system[count, count] = 0.0
         row = np.linalg.solve(system, np.append(ratio * to_mean, 1.0))[:count]
-        rows[which] = row.conj()
         part = basis.conj().T @ data[:, which]
         shrink = (1 / (1 + ratio * size))[:, None]
         noise = np.sum(shrink * np.abs(part) ** 2, axis=0) / (count - 1)
@@ -112,12 +109,8 @@ def _regress(spectra, own, deviation, chirp, out):
         noise *= _dependence(rest)
         # as large as the noise is, for some of it went into the function
         rest *= np.sqrt(noise * (count - 1) / (np.sum(np.abs(rest) ** 2, axis=0) + 1e-300))
-        left[:, which] = rest
         missed = 1 + np.vdot(row, kernel @ row - 2 * to_mean).real
-        variance[which] = noise * ratio * max(missed, 0.0)
-    weights[:, own] = rows.reshape(*shape, count)
-    unknown[:, own] = variance.reshape(shape)
-    residual[:, :, own] = left.reshape(count, *shape)
+        yield which, row.conj(), noise * ratio * max(missed, 0.0), rest
 
 
 def _dependence(rest):

@@ -44,7 +44,8 @@ def conceal(drawn: Drawn, folder: Path, rng: np.random.Generator) -> dict:
     rig = build(drawn.sheet, drawn.seal | {"numerics": NUMERICS})
     entries = []
     for point in drawn.points:
-        take = record(rig, point, rng, driving(rig, point), SETTLED * rig.noise, REFINE, True)
+        flow, tolerance = driving(rig, point), SETTLED * rig.noise
+        take = record(rig, point, rng, flow, tolerance, REFINE, marched=True)
         write_recording(folder / "recordings" / f"{point.label}.h5", take)
         write_ripple(folder / ripple_name(point), *nominal_flow(drawn.sheet, point))
         entries.append(listed(point, with_ripple=True))

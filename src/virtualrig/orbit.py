@@ -82,8 +82,7 @@ class Bench:
         (orifice coefficient) is given. Raises RuntimeError where it does not settle.
         """
         speed = 2 * np.pi * speed_rpm / 60
-        every, dt = self._steps(speed)
-        steps = every * RECORDS
+        _, dt = self._steps(speed)
         cut = line(self.rig.network, dt)
         given = self._given(speed_rpm)
         flow = 0.97 * self.rig.pump.displacement * speed_rpm / 60
@@ -95,15 +94,9 @@ class Bench:
         load = self.nodes[self.rig.load_node]
         load[stepper.VALVE_SET] = load_pressure
         load[stepper.ORIFICE] = valve if valve is not None else self._valve(flow, load_pressure)
-        crank = (speed, self._ripple, np.zeros(0))
         before = np.inf
         for revolution in range(1, most + 1):
-            pressure, outlet, nodal, newton = stepper.run(
-                cut, self.nodes, self.chambers, self.ports, given, crank, self.state,
-                0, steps, every, dt, self.sensors,
-            )  # fmt: skip
-            if newton > pump.MOST_NEWTON_STEPS:
-                raise RuntimeError("the pump's chambers did not converge; refine the time step")
+            pressure, outlet, nodal = self._run(cut, given, speed, np.zeros(0), RECORDS)
             residual = np.abs(pressure - before).max()
             before = pressure
             # a given flow tells the valve at once
@@ -140,14 +133,19 @@ class Bench:
         speed = 2 * np.pi * speed_rpm / 60
         every, dt = self._steps(speed)
         ahead = np.concatenate([[0.0], np.cumsum(deviation)]) * speed * every * dt
-        pressure, _, _, newton = stepper.run(
-            line(self.rig.network, dt), self.nodes, self.chambers, self.ports,
-            self._given(speed_rpm), (speed, self._ripple, ahead), self.state,
-            0, every * len(deviation), every, dt, self.sensors,
+        cut = line(self.rig.network, dt)
+        return self._run(cut, self._given(speed_rpm), speed, ahead, len(deviation))[0]
+
+    def _run(self, cut, given: np.ndarray, speed: float, ahead: np.ndarray, records: int):
+        """`stepper.run` from the present state; RuntimeError where the chambers do not converge."""
+        every, dt = self._steps(speed)
+        pressure, outlet, nodal, newton = stepper.run(
+            cut, self.nodes, self.chambers, self.ports, given, (speed, self._ripple, ahead),
+            self.state, 0, every * records, every, dt, self.sensors,
         )  # fmt: skip
         if newton > pump.MOST_NEWTON_STEPS:
             raise RuntimeError("the pump's chambers did not converge; refine the time step")
-        return pressure
+        return pressure, outlet, nodal
 
     def _steps(self, speed: float) -> tuple[int, float]:
         """Steps from record to record at a `speed` in rad/s, and their size in s."""

@@ -104,6 +104,7 @@ class LineState:
 
     density          kg/m3
     viscosity        kinematic, m2/s
+    friction         law of the line with all its effects, as in `segment.series_impedance`
     diameters        (n,) of m, wave_speeds (n,) of m/s: one entry a segment, pump first
     mean_pressure    Pa absolute, (F,) or scalar: of the operating point each frequency belongs to
     load_resistance  static dp/dq of the load in Pa s/m3, (F,) or scalar; None where it has none
@@ -126,6 +127,7 @@ class LineState:
     recording: np.ndarray | None = None
     mean_flow: np.ndarray | None = None
     load_passes_flow: bool = False
+    friction: str = "steady"
 
     def area(self, k: int):
         """Cross section of segment k, m2."""
@@ -148,6 +150,7 @@ class Effect:
     named       False for a passive network that stands in for physics without a name
     certain     no real line is without it: where something is missing at all, it is taken in
                 unless the data speak against it
+    friction    law that it puts in place of the line's, as in `segment.series_impedance`
     """
 
     name: str
@@ -161,6 +164,7 @@ class Effect:
     in_time: Callable[[object, LineState, Mapping[str, float], Place], None]
     certain: bool = False
     named: bool = True
+    friction: str | None = None
 
     def __reduce__(self):
         """Pickled by name, for the registry has it in every process."""

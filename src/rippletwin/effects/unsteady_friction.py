@@ -43,4 +43,5 @@ EFFECT = Effect(
     places=line_place,
     apply=_apply,
     in_time=_in_time,
+    friction="unsteady",
 )

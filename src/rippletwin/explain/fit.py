@@ -186,10 +186,7 @@ def _about(posterior: Posterior, states, above: Posterior, draws: int, tried: in
         prediction = posterior.predict(theta)
         posterior.estimate_errors(prediction, theta)
         posterior.floor = MOST  # as far as a line may be off that is not yet the right one
-        jacobian = posterior.linearise(theta, prediction)[1]
-        hessian = jacobian.T @ jacobian
-        hessian[~posterior.prior, ~posterior.prior] += 1e-9
-        root = np.linalg.inv(np.linalg.cholesky(hessian)).T
+        root = np.linalg.inv(np.linalg.cholesky(_hessian(posterior, theta, prediction))).T
         spread = root @ rng.normal(size=(len(theta), draws))
         found += [align(above, theta + step) for step in spread.T]
     return sorted(found, key=lambda g: g[0])[:tried]
@@ -272,11 +269,7 @@ def conclude(posterior: Posterior, hypothesis: Hypothesis, theta: np.ndarray) ->
     prediction = posterior.predict(theta)
     posterior.estimate_errors(prediction, theta)
     objective = posterior.objective(theta, prediction)
-    jacobian = posterior.linearise(theta, prediction)[1]
-    hessian = jacobian.T @ jacobian
-    # Shaft angles have no prior. Blind to the source they have no say either, hence the 1.
-    flat = ~posterior.prior
-    hessian[flat, flat] += 1.0 if posterior.source_free else 1e-9
+    hessian = _hessian(posterior, theta, prediction)
     log_det = np.linalg.slogdet(hessian)[1]
     return Fit(
         hypothesis,
@@ -289,6 +282,16 @@ def conclude(posterior: Posterior, hypothesis: Hypothesis, theta: np.ndarray) ->
         posterior.smooth_sd,
         posterior.source_free,
     )
+
+
+def _hessian(posterior: Posterior, theta: np.ndarray, prediction: np.ndarray) -> np.ndarray:
+    """Of minus the log posterior (P, P), to first order in the prediction."""
+    jacobian = posterior.linearise(theta, prediction)[1]
+    hessian = jacobian.T @ jacobian
+    # Shaft angles have no prior. Blind to the source they have no say either, hence the 1.
+    flat = ~posterior.prior
+    hessian[flat, flat] += 1.0 if posterior.source_free else 1e-9
+    return hessian
 
 
 def descend(posterior: Posterior, theta: np.ndarray, max_steps: int):

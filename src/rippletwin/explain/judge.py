@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from rippletwin.explain.bootstrap import Chance
 from rippletwin.explain.detect import Alarms
 from rippletwin.explain.fit import Fit
 from rippletwin.explain.locate import extent
@@ -44,12 +45,12 @@ def judge(
     alarms: Alarms,
     validation: Validation | None,
     contradiction: str = "",
-    threshold: float = ACCEPT,
+    by_chance: Chance | None = None,
 ) -> Judgement:
     """Weigh the search's best explanation against the base, its rivals and the nameless networks.
 
-    `contradiction` says why the data contradict themselves, if they do; `threshold` is the log
-    evidence that an explanation must have over the base, where chance gives more than ACCEPT.
+    `contradiction` says why the data contradict themselves, if they do; `by_chance` what draws
+    without an effect gave, where they were asked for.
     """
     best, other = search.best, search.others[0] if search.others else None
     if contradiction:
@@ -59,7 +60,7 @@ def judge(
         return Judgement("unexplained", other)
     if not best.hypothesis:
         return _nothing_missing(best, alarms)
-    if search.gain(best) < threshold:
+    if by_chance is not None and search.gain(best) < by_chance.threshold:
         return _nothing_missing(search.base, alarms)
     fails = validation is not None and not validation.holds
     if fails and search.base.floor <= GOOD and search.gain(best) < SURE:

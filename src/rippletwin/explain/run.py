@@ -148,8 +148,7 @@ def explain_observations(
         by_chance = None
         if draws and found.best.hypothesis:
             by_chance = chance(found.base, data, draws, processes, progress)
-        threshold = ACCEPT if by_chance is None else max(ACCEPT, by_chance.threshold)
-        judgement = judge(found, alarms, checked, reason, threshold)
+        judgement = judge(found, alarms, checked, reason, by_chance)
         without = without_each(pool, found.base, judgement.accepted)
     return Explanation(
         rig=rig,

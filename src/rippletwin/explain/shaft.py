@@ -161,12 +161,11 @@ def _modulation(even, orders, flow, unit, pistons):
         rest = target - root * peaks(swung(even, complex(*b), 4 * len(even)))[orders]
         return np.concatenate([rest.real, rest.imag])
 
-    step, best = 1e-6, None
+    none, step, found = left((0, 0)), 1e-6, []
+    slope = np.stack([(left(d) - none) / step for d in ((step, 0), (0, step))], axis=1)
     for most in LOW:
         low = np.tile(orders < most * pistons, 2)
-        slope = np.stack([(left(d) - left((0, 0))) / step for d in ((step, 0), (0, step))], axis=1)
-        start = np.linalg.lstsq(-slope[low], left((0, 0))[low], rcond=None)[0]
-        found = least_squares(left, start, x_scale=1e-3)
-        if best is None or found.cost < best.cost:
-            best = found
+        start = np.linalg.lstsq(-slope[low], none[low], rcond=None)[0]
+        found.append(least_squares(left, start, x_scale=1e-3))
+    best = min(found, key=lambda f: f.cost)
     return complex(*best.x), 2.0 * float(best.cost), float(np.sum(np.abs(target) ** 2))

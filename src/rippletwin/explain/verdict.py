@@ -40,7 +40,6 @@ def verdict(explanation: Explanation) -> dict:
         intervals(accepted) if judgement.verdict in ("named", "ambiguous", "unexplained") else []
     )
     chances = probabilities(e.search, accepted)
-    by_chance = e.chance
     present = judgement.verdict not in ("consistent", "calibration_only")
     tried = len(e.search.singles) + 1
     gain = max([0.0, *(e.search.gain(f) for f in e.search.singles), e.search.gain(accepted)])
@@ -78,9 +77,7 @@ def verdict(explanation: Explanation) -> dict:
         "verdict": kind,
         "mismatch": {
             "present": present,
-            "p_value": detect.p_value(gain, tried)
-            if by_chance is None
-            else by_chance.p_value(gain),
+            "p_value": detect.p_value(gain, tried) if e.chance is None else e.chance.p_value(gain),
             "where": _where(e, found) if present else None,
         },
         "effects": effects,
@@ -92,11 +89,11 @@ def verdict(explanation: Explanation) -> dict:
     }
     if kind == "unexplained" and found and not found[-1]["effect"].named:
         result["stand_in"] = _stand_in(e, found[-1])
-    if by_chance is not None:
+    if e.chance is not None:
         result["mismatch"]["by_chance"] = {
-            "draws": len(by_chance.gains),
-            "largest": max(by_chance.gains),
-            "threshold": by_chance.threshold,
+            "draws": len(e.chance.gains),
+            "largest": max(e.chance.gains),
+            "threshold": e.chance.threshold,
         }
     result["sentence"] = sentence(e, result, found, base)
     return result

@@ -17,7 +17,6 @@ from rippletwin.line.segment import series_impedance, shunt_admittance
 
 SHORTEST = 3  # cells
 TOUCH = 1e-9  # m: closer than this is the same place
-BRANCH_STEADY = 8.0 - 3.0  # s I0/I2 = s (1 + 2/r + 3/r^2 ...): without the 3, first order in 1/r
 
 
 class Grid:
@@ -28,7 +27,7 @@ class Grid:
         self.mean = float(np.mean(line.flow))
         self.pipes, self.starts, joints = _cut(line, self.dt)
         self.main = len(self.pipes)
-        self.thicker = [1.0] * self.main  # than the line's oil: what friction of a branch is worth
+        self.thicker = [1.0] * self.main  # than the line's oil
         self._rungs(joints)
         self._lay()
         self._losses()
@@ -45,7 +44,7 @@ class Grid:
             if isinstance(rung, Branch):
                 self.kinds[r] = kernel.BRANCH, len(self.pipes)
                 self.pipes.append(rung.pipe)
-                self.thicker.append(rung.loss**2)
+                self.thicker.append(rung.viscosity_ratio)
                 self.starts.append(rung.position)
             else:
                 self.kinds[r, 0] = {"shunt": kernel.SHUNT, "series": kernel.SERIES}[rung.kind]
@@ -84,9 +83,6 @@ class Grid:
         terms = max(len(pipe.creep) for pipe in self.pipes)
         self.keep, self.follow, self.share = np.zeros((3, len(self.pipes), terms))
         for k, pipe in enumerate(self.pipes):
-            friction, steady = line.friction, 8.0
-            if k >= self.main:
-                friction, steady = "unsteady", BRANCH_STEADY
             area, radius = 0.25 * np.pi * pipe.diameter**2, 0.5 * pipe.diameter
             inertance = line.density / area * pipe.wave_speed * self.dt
             rate = self.thicker[k] * line.viscosity / radius**2
@@ -101,8 +97,8 @@ class Grid:
             rows.append(
                 (
                     line.density * pipe.wave_speed / area,
-                    0.0 if friction == "none" else 0.5 * inertance * steady * rate,
-                    0.5 * inertance * 4.0 * rate if friction == "unsteady" else 0.0,
+                    0.0 if line.friction == "none" else 0.5 * inertance * 8.0 * rate,
+                    0.5 * inertance * 4.0 * rate if line.friction == "unsteady" else 0.0,
                     soft,
                 )
             )

@@ -63,13 +63,12 @@ class Element:
 class Branch:
     """A `pipe` with its far end closed, at `position` (m).
 
-    Its friction is the boundary layer to first order, `loss` times:
-    Z' = (rho/A) s (1 + 2 loss/r), r = R sqrt(s/nu).
+    Its friction follows the line's law, in oil `viscosity_ratio` times as viscous as the line's.
     """
 
     position: float
     pipe: Pipe
-    loss: float = 1.0
+    viscosity_ratio: float = 1.0
 
 
 @dataclass(frozen=True)
