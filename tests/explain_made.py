@@ -24,18 +24,20 @@ def rig(sensors=3):
     return Rig(Fluid(870.0, 3.2e-5), {"pistons": 9}, line, named, Load("orifice"))
 
 
-def ripple(speed_hz, pressure):
-    """Kinematic ripple of nine pistons with a backflow at the opening of each, 40 cc/rev."""
+def ripple(speed_hz, pressure, depth=1.0):
+    """Kinematic ripple of nine pistons with a backflow at the opening of each, 40 cc/rev, or
+    `depth` of that ripple."""
     angle = 2 * np.pi * np.arange(3072) / 3072
     flow = np.zeros_like(angle)
     for k in range(9):
         own = (angle + 2 * np.pi * k / 9) % (2 * np.pi)
         flow += np.where(own < np.pi, np.sin(own), 0.0)
         flow -= 0.5 * np.exp(-0.5 * ((own - 0.12) / 0.04) ** 2) * pressure / 1e7
-    return FlowRipple(np.rad2deg(angle), flow / flow.mean() * 40e-6 * speed_hz, pressure)
+    flow = 1.0 + depth * (flow / flow.mean() - 1.0)
+    return FlowRipple(np.rad2deg(angle), flow * 40e-6 * speed_hz, pressure)
 
 
-def make(rng, effects=(), values=None, sensors=3, points=POINTS, source=0.03, noise=2e3):
+def make(rng, effects=(), values=None, sensors=3, points=POINTS, source=0.03, noise=2e3, depth=1.0):
     """(rig, observations, true twin): nominal values off by their uncertainty, a smooth relative
     error `source` of the flow ripple, white sensor noise of `noise` Pa over 160 revolutions."""
     values, bench, observations = values or {}, rig(sensors), []
@@ -55,7 +57,7 @@ def make(rng, effects=(), values=None, sensors=3, points=POINTS, source=0.03, no
                 shaft,
                 pressure,
                 "nominal",
-                ripple(shaft, pressure),
+                ripple(shaft, pressure, depth),
                 bench.sensors,
             )
         )

@@ -21,6 +21,7 @@ from rippletwin.twin import Twin
 VOLUME = ((EFFECTS["line_volume"], Place("position")),)
 HOSE = ((EFFECTS["viscoelastic_wall"], Place("segment 2", 1)),)
 GAIN = ((EFFECTS["sensor_gain"], Place("sensor p2", 1)),)
+AIR = ((EFFECTS["entrained_air"], Place("line")),)
 LEAK = ((EFFECTS["leak"], Place("position")),)
 TRUTH = {
     "line_volume@position.position": 4.4,
@@ -28,12 +29,13 @@ TRUTH = {
     "viscoelastic_wall@segment 2.compliance_ratio": 0.2,
     "viscoelastic_wall@segment 2.retardation_time": 3e-4,
     "sensor_gain@sensor p2.gain_error": 0.08,
+    "entrained_air@line.gas_fraction": 3e-3,
     "leak@position.position": 5.0,
     "leak@position.conductance": 4e-11,
 }
 
 
-@pytest.mark.parametrize("hypothesis", [(), VOLUME, HOSE, GAIN])
+@pytest.mark.parametrize("hypothesis", [(), VOLUME, HOSE, GAIN, AIR])
 def test_derivatives_equal_difference_quotients(hypothesis):
     """All columns in one sweep agree with central differences of the whole nonlinear model to the
     2 % that holding the orifice's remainder costs."""

@@ -17,6 +17,7 @@ from rippletwin.effects.base import LineState
 from rippletwin.line.chain import Network
 from rippletwin.line.segment import series_impedance, shunt_admittance
 from rippletwin.orifice import Orifice
+from rippletwin.storage import FullAmplitude
 
 ATMOSPHERE = 101325.0  # Pa
 
@@ -90,6 +91,7 @@ class Forward:
         self._friction = {}
         self._orifice = None
         periodic = [r for r, point in enumerate(points) if point.ripple is not None]
+        self._full = FullAmplitude([self.slices[r] for r in periodic], self.order)
         if rig.load.kind == "orifice" and periodic:
             self._orifice = Orifice(
                 [self.slices[r] for r in periodic],
@@ -144,7 +146,7 @@ class Forward:
             line = self._line_state(v)
             for effect, place, values in twin.effect_values(theta):
                 effect.apply(network, line, values, place)
-        if self._orifice is not None:
+        if self._orifice is not None or (network.storage and self._full.recordings):
             self._balance(network, v.load)
         return network
 
@@ -195,16 +197,24 @@ class Forward:
         return kind, None
 
     def _balance(self, network: Network, factor: float) -> None:
-        """Put the orifice's full-amplitude state at the load of `network`.
+        """Put the full-amplitude state at the load of `network`, and what the line stores beyond.
 
         Where an effect changed the load, its linear part is the changed one.
         """
-        kind, value = network.load
-        if kind != "admittance":
-            p, q = network.load_state()
-            value = q / p
-        state = self._orifice.solve(*network.load_relation(), value, factor)
-        network.load = "state", state
+        linear = network.load_state()
+
+        def law(a, b, c):
+            if self._orifice is None:
+                scale = c / (a * linear[0] + b * linear[1])
+                return scale * linear[0], scale * linear[1]
+            return self._orifice.solve(a, b, c, linear[1] / linear[0], factor)
+
+        if network.storage:
+            state = self._full.drain(network, law)
+        else:
+            state = law(*network.load_relation())
+        if self._orifice is not None:
+            network.load = "state", state
 
 
 def characteristic_impedance(fluid, segment) -> float:

@@ -1,13 +1,22 @@
-"""Free air in the oil: a compressibility that falls with the mean pressure.
+"""Free air in the oil: a compressibility that falls with the pressure.
 
-At one mean pressure it is a slower wave and nothing else; at two it gives itself away.
+To a small ripple it is a slower wave at one mean pressure and gives itself away at two. A ripple of
+a tenth of the mean feels it stiffen in its crests: what it holds beyond proportion to the pressure
+couples the harmonics all along the line.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import binom
+
 from rippletwin.effects.base import Effect, Parameter, line_place, lognormal, normal
+from rippletwin.storage import Storage
 
 ATMOSPHERE = 1.01325e5  # Pa
+TERMS = 6  # of the series in x = p/mean: the next is 1e-3 of the second at x = 0.3
 
 
 def air_compressibility(gas_fraction, exponent, mean_pressure):
@@ -15,33 +24,38 @@ def air_compressibility(gas_fraction, exponent, mean_pressure):
 
     `gas_fraction` alpha is by volume at atmospheric pressure, `exponent` n the polytropic one.
     """
-    return (
-        gas_fraction * (ATMOSPHERE / mean_pressure) ** (1.0 / exponent) / (exponent * mean_pressure)
-    )
+    return gas_series(gas_fraction, exponent, mean_pressure, 1)[0] / mean_pressure
+
+
+def gas_series(gas_fraction, exponent, mean_pressure, count=TERMS):
+    """(c_1, c_2 ...), `count` of them, for the share sum_k c_k x^k of the volume by which free air
+    gives way to x times the mean pressure: of -alpha (p_atm/p)^(1/n) ((1 + x)^(-1/n) - 1).
+    """
+    share = gas_fraction * (ATMOSPHERE / mean_pressure) ** (1.0 / exponent)
+    return [-share * binom(-1.0 / exponent, k) for k in range(1, count + 1)]
 
 
 def _apply(network, line, values, place):
-    added = network.s * air_compressibility(
-        values["gas_fraction"], values["polytropic_exponent"], line.mean_pressure
-    )
+    mean = np.broadcast_to(line.mean_pressure, np.shape(network.s))
+    first, *beyond = gas_series(values["gas_fraction"], values["polytropic_exponent"], mean)
     for k in range(len(line.diameters)):
-        network.shunt[k] = network.shunt[k] + line.area(k) * added
+        network.shunt[k] = network.shunt[k] + line.area(k) * network.s * first / mean
+        network.storage.append(Storage(k, line.area(k), mean, np.array(beyond)))
 
 
 def _in_time(line, state, values, place):
-    # As compressible without delay as the oil itself: a slower wave.
-    added = air_compressibility(
-        values["gas_fraction"], values["polytropic_exponent"], state.mean_pressure
-    )
+    mean = float(state.mean_pressure)
+    series = gas_series(values["gas_fraction"], values["polytropic_exponent"], mean)
     for k, pipe in enumerate(line.pipes):
-        line.pipes[k] = pipe.softened(added * state.density * pipe.wave_speed**2)
+        line.pipes[k] = replace(pipe, law=(mean, *series))
 
 
 EFFECT = Effect(
     name="entrained_air",
     element="line",
     medium="liquid",
-    equation="Y' = A s (1/(rho a^2) + alpha (p_atm/p)^(1/n)/(n p))",
+    equation="dV/V = alpha ((p_atm/p)^(1/n) - (p_atm/(p + p'))^(1/n)) beside p'/(rho a^2); to a "
+    "small ripple Y' = A s (1/(rho a^2) + alpha (p_atm/p)^(1/n)/(n p))",
     source="Wylie & Streeter 1993, Fluid Transients in Systems, sec. 1.4; "
     "Merritt 1967, Hydraulic Control Systems, eq. 2-11",
     parameters=lambda rig, place: (

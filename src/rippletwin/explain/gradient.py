@@ -7,8 +7,8 @@ be told that way, because the sweep's steps are common to all copies, has exact 
     turning the shaft      dp/dangle = j k p at shaft order k, nonlinear load or not
     longer segment         Z' and Y' of it in proportion, then everything behind moved back
 
-Positions of inserts are moved one by one. The orifice's nonlinear remainder is held meanwhile: it
-is two orders below the linear part.
+Positions of inserts are moved one by one. The orifice's nonlinear remainder is held meanwhile, and
+what segments store beyond proportion to the pressure: an order or two below the linear part.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class DifferentiableForward(Forward):
         self._positions = [k for k, name in enumerate(names) if name.endswith(".position")]
         apart = {*self._sensors, *self._angles, *self._positions}
         self._together = [k for k in range(len(names)) if k not in apart]
-        self._remainder = self._held_at = None
+        self._remainder = self._drains = self._held_at = None
         self._hold = False
 
     def linear_load(self, theta: np.ndarray) -> np.ndarray | None:
@@ -95,13 +95,16 @@ class DifferentiableForward(Forward):
 
     def _balance(self, network, factor):
         if self._hold:
-            self._balance_held(network, factor, self._remainder)
+            network.drains = self._drains
+            if self._orifice is not None:
+                self._balance_held(network, factor, self._remainder)
             return
-        p, q = network.load_state()
-        value = q / p
+        linear = network.load_state()
         super()._balance(network, factor)
-        p, q = network.load[1]
-        self._remainder = (q - value * p) / factor
+        self._drains = network.drains
+        if self._orifice is not None:
+            p, q = network.load[1]
+            self._remainder = (q - linear[1] / linear[0] * p) / factor
 
     def __call__(self, theta):
         prediction = super().__call__(theta)

@@ -198,9 +198,16 @@ def extended(best: Fit, candidate, rig) -> dict:
 
 
 def polish(pool: Workers, fits: list[Fit], count: int = 3) -> list[Fit]:
-    """Fits again, from more starts, those of the best that may have stopped in a wrong valley."""
+    """Fits again, from more starts, those of the best that may have stopped in a wrong valley; of
+    one operating point, what acts along the whole line from draws too, as the base.
+    """
     again = [f for f in fits[:count] if f.floor > GOOD and f.hypothesis]
     jobs = [{"hypothesis": f.hypothesis, "starts": finer(pool.base.rig, f)} for f in again]
+    if len(pool.observations) == 1:
+        for job in jobs:
+            # Along the whole line an effect is as free as the line itself.
+            if job["hypothesis"][-1][0].element == "line":
+                job["draws"] = DRAWS
     better = {id(f): new for f, new in zip(again, pool.fit(jobs))}
     return _ranked([max(f, better.get(id(f), f), key=lambda x: x.evidence) for f in fits])
 

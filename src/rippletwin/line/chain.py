@@ -21,6 +21,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from rippletwin.line.drains import Basis
+
 LOADS = ("open", "closed", "anechoic", "impedance", "admittance", "state")
 
 
@@ -47,6 +49,8 @@ class Network:
                        order from pump to load
     sensor_positions   (S,) m from the pump outlet
     sensor_factor      (S, F) or broadcastable: what a sensor reads over the pressure at it
+    storage            what segments store beyond proportion to the pressure, at full amplitude
+    drains             (positions (N,), flows (N, F)) that leave the line whatever the pressure
     """
 
     s: np.ndarray
@@ -59,6 +63,8 @@ class Network:
     inserts: list = field(default_factory=list)
     sensor_positions: np.ndarray = ()
     sensor_factor: np.ndarray | complex = 1.0
+    storage: list = field(default_factory=list)
+    drains: tuple | None = None
 
     @property
     def length(self) -> float:
@@ -139,6 +145,15 @@ class Network:
 
     def _respond(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pressure and flow (S, F) at `positions` with the network's own source and load."""
+        if self.drains is not None:
+            at, leaving = self.drains
+            basis = Basis(self, np.concatenate([positions, at]))
+            leaving = np.concatenate([np.zeros((len(positions), len(self.s))), leaving])
+            a, b, c = basis.relation(leaving)
+            p, q = self.load_state()
+            scale = c / (a * p + b * q)
+            pressure, flow = basis.respond((scale * p, scale * q), leaving)
+            return pressure[: len(positions)], flow[: len(positions)]
         pressure, flow, entry, _ = self._sweep([self.load_state()], positions)
         p, q = entry[0]
         scale = self.source_flow / (q + self.source_admittance * p)

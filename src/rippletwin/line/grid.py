@@ -82,6 +82,7 @@ class Grid:
         line, rows, recursions = self.line, [], []
         terms = max(len(pipe.creep) for pipe in self.pipes)
         self.keep, self.follow, self.share = np.zeros((3, len(self.pipes), terms))
+        self.laws = np.zeros((len(self.pipes), max(1, *(len(pipe.law) for pipe in self.pipes))))
         for k, pipe in enumerate(self.pipes):
             area, radius = 0.25 * np.pi * pipe.diameter**2, 0.5 * pipe.diameter
             inertance = line.density / area * pipe.wave_speed * self.dt
@@ -94,6 +95,8 @@ class Grid:
                 self.follow[k, m] = -phi * np.expm1(-x)
                 self.share[k, m] = 0.5 * x * kappa
                 soft += self.share[k, m] * phi
+            self.laws[k, : len(pipe.law)] = pipe.law
+            self.laws[k, 1:] *= line.density * pipe.wave_speed**2
             rows.append(
                 (
                     line.density * pipe.wave_speed / area,
@@ -141,10 +144,10 @@ class Grid:
         """Steady flow of the mean."""
         reference = self.line.mean_flow if self.line.mean_flow is not None else self.mean
         count = self.offsets[-1]
-        self.pressure, self.flow = np.empty(count), np.zeros(count)
+        self.pressure, self.steady, self.flow = np.empty(count), np.empty(count), np.zeros(count)
         self.pressure[: self.load_node + 1] = self._steady(self.mean)
         self.flow[: self.load_node + 1] = self.mean
-        steady = self._steady(reference)
+        self.steady[: self.load_node + 1] = steady = self._steady(reference)
         self.references, self.state = np.zeros(len(self.ladder)), np.zeros((len(self.ladder), 2))
         for r, rung in enumerate(self.ladder):
             joint = int(np.searchsorted(self.rungs, r, side="right")) - 1
@@ -152,6 +155,7 @@ class Grid:
             if self.kinds[r, 0] == kernel.BRANCH:
                 k = self.kinds[r, 1]
                 self.pressure[self.offsets[k] : self.offsets[k + 1]] = self.pressure[node]
+                self.steady[self.offsets[k] : self.offsets[k + 1]] = steady[node]
                 continue
             now = self.mean, reference
             if rung.kind == "shunt":
@@ -164,6 +168,10 @@ class Grid:
         held = self.follow / np.where(self.share > 0.0, 1.0 - self.keep, 1.0)
         sizes = np.diff(self.offsets)
         self.strain = np.repeat(held.T, sizes, axis=1) * self.pressure
+        self.held = np.zeros((3, count))
+        x = (self.pressure - self.steady) / np.repeat(np.maximum(self.laws[:, 0], 1.0), sizes)
+        for power, c in enumerate(self.laws[:, 1:].T):
+            self.held[0] += np.repeat(c, sizes) * x ** (power + 1)
         self.memory = np.zeros((len(weighting.N), count))
         self.change, self.last_change = np.zeros(count), np.zeros(count)
         zc = np.repeat(self.parameters[:, 0], sizes)
@@ -192,6 +200,7 @@ class Grid:
             self.keep,
             self.follow,
             self.share,
+            self.laws,
             self.rungs,
             self.kinds,
             self.filters,
@@ -202,6 +211,8 @@ class Grid:
             self.forward,
             self.backward,
             self.strain,
+            self.steady,
+            self.held,
             self.memory,
             self.change,
             self.last_change,
@@ -225,7 +236,7 @@ class Grid:
 
     def shift(self, k, offset, pressure, flow):
         """Periodic pressure and flow (M,) a fraction of a cell further on, by the exact line."""
-        line, pipe = self.line, self.pipes[k]
+        line, pipe = self.line, self.pipes[k].linear(self.line.density)
         p, q = np.fft.rfft(pressure), np.fft.rfft(flow)
         s = 2j * np.pi * np.arange(1, len(p)) / line.period
         fluid = {"density": line.density, "diameter": pipe.diameter}
@@ -293,7 +304,7 @@ def _cut(line: Line, dt: float) -> tuple[list[Pipe], list[float], list[list]]:
 
 def _pi_section(piece: Pipe, line: Line) -> list[Element]:
     """A piece much shorter than the wave, its wall elastic and yielding."""
-    area = 0.25 * np.pi * piece.diameter**2
+    piece, area = piece.linear(line.density), 0.25 * np.pi * piece.diameter**2
     half = 0.5 * area * piece.length / (line.density * piece.wave_speed**2)
     mass = line.density * piece.length / area
     loss = 0.0 if line.friction == "none" else 32.0 * line.viscosity / piece.diameter**2

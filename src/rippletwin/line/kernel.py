@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 
 SHUNT, SERIES, BRANCH = range(3)  # kinds of a rung
+LATE = 0.501  # share of a step's end in the mean rate over it
 
 # Views of one pipe, indexed from 0: so the compiler knows that no index wraps, and vectorises.
 
@@ -43,6 +44,39 @@ def _creep(keep, follow, share, pressure, strain, lag):
 
 
 @njit(cache=True, error_model="numpy")
+def _follow_law(law, steady, pressure, held, soft, give, lag):
+    """Put what a pipe stores by `law` to first order about the pressure now on `give` and `lag`.
+
+    held (3, nodes) is, times rho a^2, the share stored, half a step times its rate, and what is
+    put on `lag`. What the tangent missed in one step is made good in the next, so that nothing is
+    lost. The rule is the trapezoidal one but for LATE, for that one never forgets a jump.
+    """
+    new, old = 0.5 / LATE, (1.0 - LATE) / LATE
+    for i in range(len(lag)):
+        x = (pressure[i] - steady[i]) / law[0]
+        share = slope = 0.0
+        for k in range(len(law) - 1, 0, -1):
+            slope = slope * x + k * law[k]
+            share = (share + law[k]) * x
+        slope /= law[0]
+        give[i] = soft + new * slope
+        held[2, i] = new * (slope * pressure[i] - share + held[0, i]) + old * held[1, i]
+        lag[i] += held[2, i]
+
+
+@njit(cache=True, error_model="numpy")
+def _hold(pressure, held, soft, give, lag):
+    """What has been stored by the new pressure; `give` and `lag` without the law's part but for
+    half a step's rate."""
+    for i in range(len(lag)):
+        rate = (give[i] - soft) * pressure[i] - held[2, i]
+        held[0, i] += 2.0 * (LATE * rate + (1.0 - LATE) * held[1, i])
+        held[1, i] = rate
+        give[i] = soft
+        lag[i] -= held[2, i] + rate
+
+
+@njit(cache=True, error_model="numpy")
 def _meet(b, pressure, flow, change, forward, backward, known):
     """Interior nodes between two ordinary cells."""
     over = 0.5 / b
@@ -55,21 +89,21 @@ def _meet(b, pressure, flow, change, forward, backward, known):
 
 
 @njit(cache=True, error_model="numpy")
-def _meet_yielding(b, soft, lag, pressure, flow, change, forward, backward, known):
-    """The same with a wall that creeps."""
-    half, over = 0.5 / (1.0 + soft), 0.5 / b
+def _meet_yielding(b, give, lag, pressure, flow, change, forward, backward, known):
+    """The same where more is stored than the elastic wall does: a wall that creeps, say."""
+    over = 0.5 / b
     for i in range(1, len(flow) - 2):
         up, down = forward[i - 1] - known[i], backward[i + 1] + known[i]
-        pressure[i] = half * (up + down + 2.0 * lag[i])
+        pressure[i] = 0.5 * (up + down + 2.0 * lag[i]) / (1.0 + give[i])
         new = over * (up - down)
         change[i] = new - flow[i]
         flow[i] = new
 
 
 @njit(cache=True, error_model="numpy")
-def _leave(carried, soft, lag, pressure, flow, known, forward, backward):
+def _leave(carried, yields, give, lag, pressure, flow, known, forward, backward):
     """Waves leaving every node, less half the losses of an ordinary cell."""
-    if soft == 0.0:
+    if not yields:
         for i in range(len(flow)):
             wave = carried * flow[i] - known[i]
             forward[i] = pressure[i] + wave
@@ -77,7 +111,7 @@ def _leave(carried, soft, lag, pressure, flow, known, forward, backward):
     else:
         for i in range(len(flow)):
             wave = carried * flow[i] - known[i]
-            still = pressure[i] - (soft * pressure[i] - lag[i])
+            still = pressure[i] - (give[i] * pressure[i] - lag[i])
             forward[i] = still + wave
             backward[i] = still - wave
 
@@ -161,6 +195,7 @@ def advance(
     keep,
     follow,
     share,
+    laws,
     rungs,
     kinds,
     filters,
@@ -171,6 +206,8 @@ def advance(
     forward,
     backward,
     strain,
+    steady,
+    held,
     memory,
     change,
     last_change,
@@ -185,7 +222,9 @@ def advance(
     law, coefficient, outside, constant, conductance = load
     seen_p, seen_q = np.empty((len(nodes), steps)), np.empty((len(nodes), steps))
     # (u/2)(sum e_k y_k - G q - H dq): friction of the past at the new point
-    known, lag = np.zeros(len(pressure)), np.zeros(len(pressure))
+    known, lag, give = np.zeros((3, len(pressure)))
+    for k in range(pipes):
+        give[offsets[k] : offsets[k + 1]] = parameters[k, 3]
     ends = np.zeros((2, pipes, 2))  # supply and slope that a pipe brings to the joint at each end
     joint = np.empty((pipes, 2))
     supply, slope, kept = np.empty(2), np.empty(2), np.empty((len(kinds), 2))
@@ -220,27 +259,31 @@ def advance(
 
             now = pressure[here], flow[here], change[here]
             waves = forward[here], backward[here], known[here]
-            if soft == 0.0:
+            lawful = laws[k, 0] > 0.0
+            if soft == 0.0 and not lawful:
                 _meet(b, *now, *waves)
             else:
                 _creep(keep[k], follow[k], share[k], pressure[here], strain[:, here], lag[here])
-                _meet_yielding(b, soft, lag[here], *now, *waves)
+                if lawful:
+                    more = held[:, here], soft, give[here], lag[here]
+                    _follow_law(laws[k], steady[here], pressure[here], *more)
+                _meet_yielding(b, give[here], lag[here], *now, *waves)
 
             # The node between an ordinary cell and the long one.
-            b_long, soft_long = zc + theta * (half_r + half_u * gain), theta * soft
+            b_long, give_long = zc + theta * (half_r + half_u * gain), theta * give[near]
             up = forward[near - 1] - known[near] + lag[near]
             down = to_near + theta * (known[near] + lag[near])
-            new = (b_long * up + b * down) / (b_long * (1.0 + soft) + b * (1.0 + soft_long))
+            new = (b_long * up + b * down) / (b_long * (1.0 + give[near]) + b * (1.0 + give_long))
             pressure[near] = new
-            new = (up - (1.0 + soft) * new) / b
+            new = (up - (1.0 + give[near]) * new) / b
             change[near] = new - flow[near]
             flow[near] = new
 
             # What each end brings to its junction: q = +-(supply - slope p).
             ends[0, k, 0] = (backward[first + 1] + known[first] + lag[first]) / b
-            ends[1, k, 0] = (1.0 + soft) / b
+            ends[1, k, 0] = (1.0 + give[first]) / b
             ends[0, k, 1] = (to_end - theta * (known[last] - lag[last])) / b_long
-            ends[1, k, 1] = (1.0 + soft_long) / b_long
+            ends[1, k, 1] = (1.0 + theta * give[last]) / b_long
 
         for j in range(main + 1):
             supply[:], slope[:] = 0.0, 0.0
@@ -252,9 +295,9 @@ def advance(
                 supply[1], slope[1] = -constant, conductance
             else:
                 supply[1], slope[1] = ends[0, j, 0], ends[1, j, 0]
-            beyond = (law if j == main else 0, coefficient, outside)
+            far_end = (law if j == main else 0, coefficient, outside)
             span = rungs[j], rungs[j + 1], kinds, filters, references, state
-            before, after = _join(supply, slope, *span, ends, kept, joint, beyond)
+            before, after = _join(supply, slope, *span, ends, kept, joint, far_end)
             if j > 0:
                 joint[j - 1, 1] = before
             if j < main:
@@ -268,11 +311,11 @@ def advance(
             zc, half_r, half_u, soft = parameters[k]
             gain = gains[k].sum()
             b = zc + half_r + half_u * gain
-            b_long, soft_long = zc + theta * (half_r + half_u * gain), theta * soft
+            b_long = zc + theta * (half_r + half_u * gain)
 
             arriving = backward[first + 1] + known[first] + lag[first]
             pressure[first] = joint[k, 0]
-            new = ((1.0 + soft) * pressure[first] - arriving) / b
+            new = ((1.0 + give[first]) * pressure[first] - arriving) / b
             change[first] = new - flow[first]
             flow[first] = new
 
@@ -281,16 +324,20 @@ def advance(
                 to_end += taps[k, age] * history[k, 0, age]
             arriving = to_end - theta * (known[last] - lag[last])
             pressure[last] = joint[k, 1]
-            new = (arriving - (1.0 + soft_long) * pressure[last]) / b_long
+            new = (arriving - (1.0 + theta * give[last]) * pressure[last]) / b_long
             change[last] = new - flow[last]
             flow[last] = new
 
             # Friction now: half_r q + half_u sum y_k, sum y_k from `known`.
             total = half_r + half_u * gain
             here = slice(first, last + 1)
+            lawful = laws[k, 0] > 0.0
+            if lawful:
+                _hold(pressure[here], held[:, here], soft, give[here], lag[here])
             _leave(
                 zc - total,
-                soft,
+                soft != 0.0 or lawful,
+                give[here],
                 lag[here],
                 pressure[here],
                 flow[here],
@@ -304,9 +351,9 @@ def advance(
                 history[k, 1, age] = history[k, 1, age - 1]
             for side, i in ((0, near), (1, last)):
                 wave, loss = zc * flow[i], theta * (known[i] + total * flow[i])
-                give = theta * (soft * pressure[i] - lag[i])
+                yielded = theta * (give[i] * pressure[i] - lag[i])
                 sign = 1.0 if side == 0 else -1.0
-                history[k, side, 0] = pressure[i] + sign * (wave - loss) - give
+                history[k, side, 0] = pressure[i] + sign * (wave - loss) - yielded
 
         for j in range(len(nodes)):
             seen_p[j, n], seen_q[j, n] = pressure[nodes[j]], flow[nodes[j]]

@@ -20,12 +20,16 @@ class Pipe:
     (kappa, tau in s) of what yields with delay:
 
         Y' = A s/(rho a^2) (1 + sum_k kappa_k/(1 + s tau_k))
+
+    and of its volume it stores the share sum_k c_k x^k besides, where the pressure is x P above
+    the steady state: `law` is (P in Pa, c_1, c_2 ...).
     """
 
     length: float
     diameter: float
     wave_speed: float
     creep: tuple[tuple[float, float], ...] = ()
+    law: tuple[float, ...] = ()
 
     def yielding(self, s: np.ndarray) -> np.ndarray:
         """1 + sum_k kappa_k/(1 + s tau_k), shape of `s` (1/s)."""
@@ -36,6 +40,13 @@ class Pipe:
         more = 1.0 + added
         creep = tuple((kappa / more, tau) for kappa, tau in self.creep)
         return replace(self, wave_speed=self.wave_speed / np.sqrt(more), creep=creep)
+
+    def linear(self, density: float) -> Pipe:
+        """The pipe for small ripple: what `law` stores is a slower wave."""
+        if not self.law:
+            return self
+        added = density * self.wave_speed**2 * self.law[1] / self.law[0]
+        return replace(self.softened(added), law=())
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,65 @@
+"""What a line stores beyond proportion to the pressure, against the second harmonic it makes."""
+
+import numpy as np
+import pytest
+
+from line_rig import DENSITY, network
+from rippletwin.line.parts import Pipe
+from rippletwin.storage import FullAmplitude, Storage
+
+LENGTH, DIAMETER, SPEED, PRESSURE = 6.25, 0.02, 1000.0, 1e7
+AREA = 0.25 * np.pi * DIAMETER**2
+ORDERS = np.arange(1, 9)
+IMPEDANCE = DENSITY * SPEED / AREA
+S = 2j * np.pi * 150.0 * ORDERS
+
+
+def driven(amplitude, curvature):
+    """A lossless pipe, endless both ways, that carries one harmonic of `amplitude` (Pa) and stores
+    c_2 x^2 over LENGTH, in thirty cells."""
+    source = np.where(ORDERS == 1, 2.0 * amplitude / IMPEDANCE, 0.0).astype(complex)
+    line = network(S, [Pipe(LENGTH, DIAMETER, SPEED)], "none", source_flow=source)
+    line.source_admittance = 1.0 / IMPEDANCE
+    line.load = "anechoic", None
+    line.storage = [
+        Storage(0, AREA, np.full(len(S), PRESSURE), np.full((1, len(S)), curvature, dtype=float))
+    ]
+    p, q = line.load_state()
+
+    def law(a, b, c):
+        scale = c / (a * p + b * q)
+        return scale * p, scale * q
+
+    FullAmplitude([slice(0, len(S))], ORDERS).drain(line, law)
+    return line
+
+
+@pytest.mark.parametrize("curvature", [-2e-4, 1e-4])
+def test_second_harmonic_grows_as_the_distance(curvature):
+    """Of a progressive wave p1 cos, storing c_2 (p/P)^2 besides makes to second order a second
+    harmonic rho a omega x |c_2| (p1/P)^2 / 2 (as Fubini's, Hamilton & Blackstock 1998, Nonlinear
+    Acoustics, sec. 4.2): an analytic solution, and the first is left alone."""
+    amplitude = 0.02 * PRESSURE
+    line, x = driven(amplitude, curvature), LENGTH * np.arange(5, 31, 5) / 30
+    forward = 0.5 * (line.pressure_at(x) + IMPEDANCE * line.flow_at(x))
+    omega = abs(S[0])
+    second = 0.5 * DENSITY * SPEED * omega * x * abs(curvature) * (amplitude / PRESSURE) ** 2
+    np.testing.assert_allclose(np.abs(forward[:, 1]), second, rtol=0.01)
+    np.testing.assert_allclose(np.abs(forward[:, 0]), amplitude, rtol=1e-3)
+
+
+def test_what_is_stored_is_not_lost():
+    """Lossless pipe: the mean power that enters leaves at the end, in whatever harmonic (energy
+    is conserved, for what is stored in a crest comes back)."""
+    line, ends = driven(0.2 * PRESSURE, -2e-3), [0.0, LENGTH]
+    power = 0.5 * np.real(line.pressure_at(ends) * line.flow_at(ends).conj())
+    assert np.sum(power[0]) == pytest.approx(np.sum(power[1]), rel=1e-3)
+    assert power[1, 0] < 0.995 * power[0, 0]  # some of it in other harmonics
+
+
+def test_nothing_stored_changes_nothing():
+    """Series of zeros: the linear line, to rounding."""
+    line = driven(0.05 * PRESSURE, 0.0)
+    drained = line.pressure_at([1.0])
+    line.drains = None
+    np.testing.assert_allclose(drained, line.pressure_at([1.0]), atol=1e-9 * np.abs(drained).max())
