@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rippletwin.case import FlowRipple, Load
-from rippletwin.effects import EFFECTS
+from rippletwin.effects import EFFECTS, Place
 from rippletwin.forward import Forward, flow_harmonics, reflection
 from rippletwin.likelihood import Likelihood
 from rippletwin.line.balance import balance_orifice
@@ -120,6 +120,22 @@ def test_an_effect_changes_the_prediction_and_brings_its_parameters():
     assert added == [f"viscoelastic_wall@{place}.{p.name}" for p in effect.parameters(rig, place)]
     change = creeping.predict([o])[0] - plain.predict([o])[0]
     assert np.linalg.norm(change) > 1e-3 * np.linalg.norm(plain.predict([o])[0])
+
+
+@pytest.mark.parametrize("turn", [1, -1])
+def test_a_branch_has_the_friction_of_the_line(turn):
+    """A steady line with unsteady friction for an effect, listed before the branch or after, is the
+    unsteady line with the branch; with the branch left steady it would not be."""
+    rig = paper_rig()
+    points = three_points(rig)[:1]
+    branch = (EFFECTS["side_branch"], Place("position"))
+    friction = (EFFECTS["unsteady_friction"], Place("line"))
+    twin = Twin(rig, points, effects=(branch, friction)[::turn])
+    (found,) = twin.predict(points)
+    (unsteady,) = Twin(rig, points, "unsteady", (branch,)).predict(points)
+    (steady,) = Twin(rig, points, effects=(branch,)).predict(points)
+    np.testing.assert_allclose(found, unsteady, rtol=1e-9)
+    assert misfit(steady, unsteady) > 0.01
 
 
 def test_calibrated_rig_is_the_twin_at_its_parameters():

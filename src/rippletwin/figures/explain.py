@@ -136,7 +136,8 @@ def evidence(e) -> Figure | None:
     fig, axes = style.figure(1, 1, height=0.9 + 0.24 * int(np.sum(lines)))
     ax = axes[0, 0]
     colours = [style.CORRECTED if g > e.threshold else style.NEUTRAL for g in gains]
-    ax.barh(places, gains, color=colours, height=0.6, label="source as stated")
+    ax.barh(places, gains, color=colours, height=0.6)
+    ax.barh(places[:1], 0.0, color=style.CORRECTED, label="source as stated")  # the legend's patch
     unseen = {row["effects"]: row["source_free"] for row in side_by_side(search, e.blind)}
     points = [(unseen[f.label], y) for y, f in zip(places, shown.values()) if f.label in unseen]
     if points:

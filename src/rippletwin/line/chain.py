@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from rippletwin.line.drains import Basis
+from rippletwin.line.drains import respond
 
 LOADS = ("open", "closed", "anechoic", "impedance", "admittance", "state")
 
@@ -146,14 +146,7 @@ class Network:
     def _respond(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pressure and flow (S, F) at `positions` with the network's own source and load."""
         if self.drains is not None:
-            at, leaving = self.drains
-            basis = Basis(self, np.concatenate([positions, at]))
-            leaving = np.concatenate([np.zeros((len(positions), len(self.s))), leaving])
-            a, b, c = basis.relation(leaving)
-            p, q = self.load_state()
-            scale = c / (a * p + b * q)
-            pressure, flow = basis.respond((scale * p, scale * q), leaving)
-            return pressure[: len(positions)], flow[: len(positions)]
+            return respond(self, positions)
         pressure, flow, entry, _ = self._sweep([self.load_state()], positions)
         p, q = entry[0]
         scale = self.source_flow / (q + self.source_admittance * p)
