@@ -16,8 +16,8 @@ from rippletwin.case import FlowRipple
 from rippletwin.effects.base import LineState
 from rippletwin.line.chain import Network
 from rippletwin.line.segment import series_impedance, shunt_admittance
+from rippletwin.line.storage import FullAmplitude
 from rippletwin.orifice import Orifice
-from rippletwin.storage import FullAmplitude
 
 ATMOSPHERE = 101325.0  # Pa
 

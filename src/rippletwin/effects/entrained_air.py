@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import binom
 
 from rippletwin.effects.base import Effect, Parameter, line_place, lognormal, normal
-from rippletwin.storage import Storage
+from rippletwin.line.storage import Storage
 
 ATMOSPHERE = 1.01325e5  # Pa
 TERMS = 6  # of the series in x = p/mean: the next is 1e-3 of the second at x = 0.3

@@ -5,7 +5,7 @@ import pytest
 
 from line_rig import DENSITY, network
 from rippletwin.line.parts import Pipe
-from rippletwin.storage import FullAmplitude, Storage
+from rippletwin.line.storage import FullAmplitude, Storage
 
 LENGTH, DIAMETER, SPEED, PRESSURE = 6.25, 0.02, 1000.0, 1e7
 AREA = 0.25 * np.pi * DIAMETER**2
