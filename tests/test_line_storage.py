@@ -7,9 +7,9 @@ from line_rig import DENSITY, network
 from rippletwin.line.parts import Pipe
 from rippletwin.line.storage import FullAmplitude, Storage
 
-LENGTH, DIAMETER, SPEED, PRESSURE = 6.25, 0.02, 1000.0, 1e7
+LENGTH, DIAMETER, SPEED, PRESSURE = 6.6, 0.02, 1000.0, 1e7
 AREA = 0.25 * np.pi * DIAMETER**2
-ORDERS = np.arange(1, 9)
+ORDERS = np.arange(1, 16)
 IMPEDANCE = DENSITY * SPEED / AREA
 S = 2j * np.pi * 150.0 * ORDERS
 

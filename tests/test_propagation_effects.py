@@ -158,7 +158,7 @@ def test_conducting_terms_are_the_boundary_layer():
 
 def test_radiating_element_is_the_open_end():
     """To second order in kR it is Levine and Schwinger's end, and passive at every frequency."""
-    state = LineState(1.2, 1.5e-5, np.array([0.01]), np.array([343.0]))
+    state = LineState(1.2, 1.5e-5, np.array([0.01]), np.array([343.0]), np.array([1.0]))
     characteristic = 1.2 * 343.0 / state.area(0)
     for end_correction in (0.5, 0.6133, 0.8217):
         element = radiation_element(state, end_correction)

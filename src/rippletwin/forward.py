@@ -8,18 +8,20 @@ own parameters stand still (as they do in most columns of a finite-difference Ja
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
 from rippletwin.case import FlowRipple
-from rippletwin.effects.base import LineState
+from rippletwin.effects.base import ATMOSPHERE, LineState
 from rippletwin.line.chain import Network
 from rippletwin.line.segment import series_impedance, shunt_admittance
 from rippletwin.line.storage import FullAmplitude
 from rippletwin.orifice import Orifice
 
-ATMOSPHERE = 101325.0  # Pa
+ABOVE = 2.0  # times the highest harmonic observed: those that reach it by way of the line
 
 
 def flow_harmonics(ripple: FlowRipple, orders: np.ndarray) -> np.ndarray:
@@ -90,14 +92,15 @@ class Forward:
             )
         self._friction = {}
         self._orifice = None
-        periodic = [r for r, point in enumerate(points) if point.ripple is not None]
-        self._full = FullAmplitude([self.slices[r] for r in periodic], self.order)
-        if rig.load.kind == "orifice" and periodic:
+        self._ripples = [point.ripple for point in points]
+        self._periodic = [r for r, ripple in enumerate(self._ripples) if ripple is not None]
+        self._full = FullAmplitude([self.slices[r] for r in self._periodic], self.order)
+        if rig.load.kind == "orifice" and self._periodic:
             self._orifice = Orifice(
-                [self.slices[r] for r in periodic],
+                [self.slices[r] for r in self._periodic],
                 self.order,
-                np.array([points[r].load_pressure for r in periodic]) - self.back_pressure,
-                np.array([points[r].coefficient for r in periodic]),
+                np.array([points[r].load_pressure for r in self._periodic]) - self.back_pressure,
+                np.array([points[r].coefficient for r in self._periodic]),
             )
 
     def __call__(self, theta: np.ndarray) -> list[np.ndarray]:
@@ -116,6 +119,13 @@ class Forward:
 
     def network(self, theta: np.ndarray) -> Network:
         """The line with source, effects and load at `theta`; an orifice's ripple is solved."""
+        network = self._linear(theta)
+        if self._orifice is not None or (network.storage and self._periodic):
+            self._balance(network, theta)
+        return network
+
+    def _linear(self, theta: np.ndarray) -> Network:
+        """The same with a load for small ripple."""
         twin, rig = self.twin, self.twin.rig
         v = twin.arrays(theta)
         series = np.array(
@@ -146,8 +156,6 @@ class Forward:
             line = self._line_state(v)
             for effect, place, values in twin.effect_values(theta):
                 effect.apply(network, line, values, place)
-        if self._orifice is not None or (network.storage and self._full.recordings):
-            self._balance(network, v.load)
         return network
 
     def _line_state(self, v) -> LineState:
@@ -160,7 +168,8 @@ class Forward:
             viscosity=v.viscosity,
             diameters=v.diameters,
             wave_speeds=v.wave_speeds,
-            mean_pressure=np.where(np.isnan(self.load_pressure), ATMOSPHERE, self.load_pressure),
+            lengths=v.lengths,
+            mean_pressure=np.nan_to_num(self.load_pressure) + ATMOSPHERE,
             load_resistance=resistance,
             heat_capacity_ratio=fluid.heat_capacity_ratio,
             prandtl=fluid.prandtl,
@@ -196,25 +205,49 @@ class Forward:
             return "impedance", factor * self.load_impedance
         return kind, None
 
-    def _balance(self, network: Network, factor: float) -> None:
-        """Put the full-amplitude state at the load of `network`, and what the line stores beyond.
+    def _balance(self, network: Network, theta: np.ndarray) -> None:
+        """Give `network` the full-amplitude state at its load, and what its line stores beyond."""
+        if network.storage:
+            wide, seen = self._wide
+            whole = wide._linear(theta)
+            whole.source_flow[seen] = network.source_flow
+            state = [x[seen] for x in wide._full.drain(whole, wide._law(whole, theta))]
+            positions, leaving = whole.drains
+            network.drains = positions, leaving[:, seen]
+        else:
+            state = self._law(network, theta)(*network.load_relation())
+        if self._orifice is not None:
+            network.load = "state", tuple(state)
+
+    def _law(self, network: Network, theta: np.ndarray):
+        """The load of `network`, (a, b, c) -> (p, q) where a p + b q = c; an orifice is not linear.
 
         Where an effect changed the load, its linear part is the changed one.
         """
-        linear = network.load_state()
+        p, q = network.load_state()
+        factor = self.twin.arrays(theta).load
 
         def law(a, b, c):
-            if self._orifice is None:
-                scale = c / (a * linear[0] + b * linear[1])
-                return scale * linear[0], scale * linear[1]
-            return self._orifice.solve(a, b, c, linear[1] / linear[0], factor)
+            if self._orifice is not None:
+                return self._orifice.solve(a, b, c, q / p, factor)
+            scale = c / (a * p + b * q)
+            return scale * p, scale * q
 
-        if network.storage:
-            state = self._full.drain(network, law)
-        else:
-            state = law(*network.load_relation())
-        if self._orifice is not None:
-            network.load = "state", state
+        return law
+
+    @cached_property
+    def _wide(self) -> tuple[Forward, np.ndarray]:
+        """The same with the harmonics above, and where those observed are among its columns."""
+        wide = list(self.observations)
+        for r in self._periodic:
+            o = wide[r]
+            step, top = np.gcd.reduce(np.asarray(o.orders, int)), np.max(o.orders)
+            most = min(ABOVE * top, 0.5 * len(self._ripples[r].angle_deg))
+            orders = np.append(o.orders, np.arange(top + step, most, step))
+            wide[r] = replace(o, orders=orders, frequency_hz=orders * o.speed_hz)
+        forward = Forward(self.twin, wide)
+        own = [np.r_[b][: a.stop - a.start] for a, b in zip(self.slices, forward.slices)]
+        return forward, np.concatenate(own)
 
 
 def characteristic_impedance(fluid, segment) -> float:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import resample
 
-from rippletwin.effects.base import LineState
+from rippletwin.effects.base import ATMOSPHERE, LineState
 from rippletwin.errors import InputError
 from rippletwin.line import moc
 from rippletwin.line.parts import End, Line, Pipe, capacitance
@@ -84,7 +84,8 @@ def line_in_time(twin, flow, healthy_flow, speed_hz, load_pressure, source_capac
         viscosity=line.viscosity,
         diameters=np.array([s.diameter for s in rig.line]),
         wave_speeds=np.array([s.wave_speed for s in rig.line]),
-        mean_pressure=load_pressure,
+        lengths=np.array([s.length for s in rig.line]),
+        mean_pressure=load_pressure + ATMOSPHERE,
         load_resistance=resistance,
         heat_capacity_ratio=rig.fluid.heat_capacity_ratio,
         prandtl=rig.fluid.prandtl,

@@ -183,7 +183,8 @@ def load_dynamics(bare: Bare, level: float) -> Concealed:
         "load",
         {"gain": gain, "frequency_hz": frequency, "damping": damping},
         level,
-        parameters={"gain": gain, "natural_frequency": frequency, "damping_ratio": damping},
+        # relative to the slope of the fixed orifice, which is half of flow over pressure
+        parameters={"gain": 2 * gain, "natural_frequency": frequency, "damping_ratio": damping},
     )
 
 

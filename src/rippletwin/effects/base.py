@@ -18,6 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr, ndtri
 
+ATMOSPHERE = 1.01325e5  # Pa; pressures of a case are above it
+
 
 @dataclass(frozen=True)
 class Prior:
@@ -105,8 +107,9 @@ class LineState:
     density          kg/m3
     viscosity        kinematic, m2/s
     friction         law of the line with all its effects, as in `segment.series_impedance`
-    diameters        (n,) of m, wave_speeds (n,) of m/s: one entry a segment, pump first
-    mean_pressure    Pa absolute, (F,) or scalar: of the operating point each frequency belongs to
+    diameters, lengths   (n,) of m, wave_speeds (n,) of m/s: one entry a segment, pump first
+    mean_pressure    Pa absolute at the load, (F,) or scalar: of the operating point each frequency
+                     belongs to
     load_resistance  static dp/dq of the load in Pa s/m3, (F,) or scalar; None where it has none
     heat_capacity_ratio, prandtl   of a gas, else None
     orders, recording, mean_flow   shaft order, recording's number and mean flow (m3/s) of each
@@ -119,7 +122,8 @@ class LineState:
     viscosity: float
     diameters: np.ndarray
     wave_speeds: np.ndarray
-    mean_pressure: np.ndarray | float = 1.01325e5
+    lengths: np.ndarray
+    mean_pressure: np.ndarray | float = ATMOSPHERE
     load_resistance: np.ndarray | float | None = None
     heat_capacity_ratio: float | None = None
     prandtl: float | None = None
@@ -132,6 +136,22 @@ class LineState:
     def area(self, k: int):
         """Cross section of segment k, m2."""
         return 0.25 * np.pi * self.diameters[k] ** 2
+
+    def pressure_in(self, k: int):
+        """Mean pressure in the middle of segment k, Pa absolute.
+
+        Steady laminar friction of the mean flow lifts it above that at the load (Hagen-Poiseuille).
+        """
+        if self.mean_flow is None or self.friction == "none":
+            return self.mean_pressure
+        behind = sum(self._fall(j) for j in range(k + 1, len(self.lengths)))
+        rise = (0.5 * self._fall(k) + behind) * np.nan_to_num(self.mean_flow)
+        return self.mean_pressure + rise
+
+    def _fall(self, k: int):
+        """Pressure that a flow loses in segment k, over the flow, Pa s/m3."""
+        dynamic = self.density * self.viscosity
+        return 32.0 * dynamic * self.lengths[k] / (self.area(k) * self.diameters[k] ** 2)
 
 
 @dataclass(frozen=True, eq=False)

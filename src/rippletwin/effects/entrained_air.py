@@ -12,41 +12,42 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import binom
 
-from rippletwin.effects.base import Effect, Parameter, line_place, lognormal, normal
+from rippletwin.effects.base import (
+    ATMOSPHERE,
+    Effect,
+    Parameter,
+    line_place,
+    lognormal,
+    normal,
+)
 from rippletwin.line.storage import Storage
 
-ATMOSPHERE = 1.01325e5  # Pa
 TERMS = 6  # of the series in x = p/mean: the next is 1e-3 of the second at x = 0.3
 
 
-def air_compressibility(gas_fraction, exponent, mean_pressure):
-    """Added compressibility alpha (p_atm/p)^(1/n)/(n p), 1/Pa, of free air.
+def gas_series(gas_fraction, exponent, mean_pressure):
+    """[c_1, c_2 ...] of the share sum_k c_k x^k of the volume by which free air gives way to x
+    times the mean pressure p, of -alpha (p_atm/p)^(1/n) ((1 + x)^(-1/n) - 1).
 
-    `gas_fraction` alpha is by volume at atmospheric pressure, `exponent` n the polytropic one.
-    """
-    return gas_series(gas_fraction, exponent, mean_pressure, 1)[0] / mean_pressure
-
-
-def gas_series(gas_fraction, exponent, mean_pressure, count=TERMS):
-    """(c_1, c_2 ...), `count` of them, for the share sum_k c_k x^k of the volume by which free air
-    gives way to x times the mean pressure: of -alpha (p_atm/p)^(1/n) ((1 + x)^(-1/n) - 1).
+    `gas_fraction` alpha is by volume at the atmosphere's pressure, `exponent` n the polytropic one,
+    `mean_pressure` in Pa absolute.
     """
     share = gas_fraction * (ATMOSPHERE / mean_pressure) ** (1.0 / exponent)
-    return [-share * binom(-1.0 / exponent, k) for k in range(1, count + 1)]
+    return [-share * binom(-1.0 / exponent, k) for k in range(1, TERMS + 1)]
 
 
 def _apply(network, line, values, place):
-    mean = np.broadcast_to(line.mean_pressure, np.shape(network.s))
-    first, *beyond = gas_series(values["gas_fraction"], values["polytropic_exponent"], mean)
     for k in range(len(line.diameters)):
+        mean = np.broadcast_to(line.pressure_in(k), np.shape(network.shunt[k]))
+        first, *beyond = gas_series(values["gas_fraction"], values["polytropic_exponent"], mean)
         network.shunt[k] = network.shunt[k] + line.area(k) * network.s * first / mean
         network.storage.append(Storage(k, line.area(k), mean, np.array(beyond)))
 
 
 def _in_time(line, state, values, place):
-    mean = float(state.mean_pressure)
-    series = gas_series(values["gas_fraction"], values["polytropic_exponent"], mean)
     for k, pipe in enumerate(line.pipes):
+        mean = float(state.pressure_in(k))
+        series = gas_series(values["gas_fraction"], values["polytropic_exponent"], mean)
         line.pipes[k] = replace(pipe, law=(mean, *series))
 
 

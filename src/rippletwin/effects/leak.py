@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from rippletwin.effects.base import (
+    ATMOSPHERE,
     Effect,
     Parameter,
     lognormal,
@@ -18,16 +19,20 @@ from rippletwin.effects.base import (
 from rippletwin.line.chain import Insert
 from rippletwin.line.parts import Element
 
-ATMOSPHERE = 1.01325e5  # Pa
 MOST_DRAWN = 0.5  # of the mean flow: more is no leak
 REFERENCE_PRESSURE = 1e7  # Pa, at which the conductance is stated
 
 
-def leak_conductance(conductance, pressure_exponent, mean_pressure):
-    """dq/dp, m3/(Pa s), at `mean_pressure` (Pa) of a leak of `conductance` at 10 MPa."""
-    # Spectra may come without a mean pressure: then as at the atmosphere.
-    relative = np.maximum(mean_pressure, ATMOSPHERE) / REFERENCE_PRESSURE
+def leak_conductance(conductance, pressure_exponent, pressure):
+    """dq/dp, m3/(Pa s), of a leak across `pressure` (Pa) whose `conductance` is that at 10 MPa."""
+    # Spectra may come without a mean pressure: then as at one atmosphere.
+    relative = np.maximum(pressure, ATMOSPHERE) / REFERENCE_PRESSURE
     return conductance * relative ** (-pressure_exponent)
+
+
+def _across(state):
+    """Mean pressure from the line to the atmosphere, Pa; the load's, wherever the leak is."""
+    return state.mean_pressure - ATMOSPHERE
 
 
 def drawn_share(values, state):
@@ -39,14 +44,14 @@ def drawn_share(values, state):
     """
     if not state.load_passes_flow:
         return 0.0
-    exponent, pressure = values["pressure_exponent"], state.mean_pressure
+    exponent, pressure = values["pressure_exponent"], _across(state)
     slope = leak_conductance(values["conductance"], exponent, pressure)
     return np.minimum(slope * pressure / (1.0 - exponent) / state.mean_flow, MOST_DRAWN)
 
 
 def _apply(network, line, values, place):
     conductance = leak_conductance(
-        values["conductance"], values["pressure_exponent"], line.mean_pressure
+        values["conductance"], values["pressure_exponent"], _across(line)
     )
     network.inserts.append(
         Insert(on_line(network, values["position"]), "shunt", conductance + 0.0 * network.s)
@@ -70,7 +75,7 @@ def _parameters(rig, place):
 
 def _in_time(line, state, values, place):
     conductance = leak_conductance(
-        values["conductance"], values["pressure_exponent"], state.mean_pressure
+        values["conductance"], values["pressure_exponent"], _across(state)
     )
     line.inserts.append(Element(on_line(line, values["position"]), "shunt", (conductance,)))
     # An element answers to what differs from the steady state, so the draw leaves by the source.

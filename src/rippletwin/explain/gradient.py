@@ -93,14 +93,15 @@ class DifferentiableForward(Forward):
         self._hold = False
         return out
 
-    def _balance(self, network, factor):
+    def _balance(self, network, theta):
+        factor = self.twin.arrays(theta).load
         if self._hold:
             network.drains = self._drains
             if self._orifice is not None:
                 self._balance_held(network, factor, self._remainder)
             return
         linear = network.load_state()
-        super()._balance(network, factor)
+        super()._balance(network, theta)
         self._drains = network.drains
         if self._orifice is not None:
             p, q = network.load[1]

@@ -16,7 +16,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 
 from rippletwin.line.drains import Basis
 
-A_WAVE = 4  # places on the shortest wave: eight move the ripple by less than 1e-4
+A_WAVE = 2  # places on the shortest wave: what it takes up itself hardly matters
 PASSES, TOLERANCE = 20, 0.02  # the next pass would change a tenth of that
 FURTHEST = 0.9  # of the law's pressure: there it is held
 
