@@ -21,6 +21,7 @@ from rippletwin.line.segment import series_impedance, shunt_admittance
 from rippletwin.line.storage import FullAmplitude
 from rippletwin.orifice import Orifice
 
+ROUGH = 1e-4  # of the pressure at an orifice, while the line's storage is known to less
 ABOVE = 2.0  # times the highest harmonic observed: those that reach it by way of the line
 
 
@@ -211,7 +212,8 @@ class Forward:
             wide, seen = self._wide
             whole = wide._linear(theta)
             whole.source_flow[seen] = network.source_flow
-            state = [x[seen] for x in wide._full.drain(whole, wide._law(whole, theta))]
+            law = wide._law(whole, theta, tolerance=ROUGH)
+            state = [x[seen] for x in wide._full.drain(whole, law)]
             positions, leaving = whole.drains
             network.drains = positions, leaving[:, seen]
         else:
@@ -219,7 +221,7 @@ class Forward:
         if self._orifice is not None:
             network.load = "state", tuple(state)
 
-    def _law(self, network: Network, theta: np.ndarray):
+    def _law(self, network: Network, theta: np.ndarray, **accuracy: float):
         """The load of `network`, (a, b, c) -> (p, q) where a p + b q = c; an orifice is not linear.
 
         Where an effect changed the load, its linear part is the changed one.
@@ -229,7 +231,7 @@ class Forward:
 
         def law(a, b, c):
             if self._orifice is not None:
-                return self._orifice.solve(a, b, c, q / p, factor)
+                return self._orifice.solve(a, b, c, q / p, factor, **accuracy)
             scale = c / (a * p + b * q)
             return scale * p, scale * q
 

@@ -42,22 +42,25 @@ class Orifice:
         self._cos, self._sin = np.cos(phase), np.sin(phase)
         self._drop, self._coefficient = drop, coefficient
 
-    def solve(self, a, b, c, admittance, factor: float) -> tuple[np.ndarray, np.ndarray]:
+    def solve(
+        self, a, b, c, admittance, factor: float, tolerance: float = TOLERANCE
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Pressure and flow (F,) at the load for line relation a, b, c (F,) and `admittance` (F,).
 
         `factor` multiplies the coefficients. Columns of no recording get the linear answer.
+        `tolerance` is of the largest pressure.
         """
         total = a + b * admittance
         coefficient = factor * self._coefficient
         p, n = _substitute(
             b / total, c / total, self._edges, self._harmonic, self._cos, self._sin, self._drop,
-            coefficient,
+            coefficient, tolerance,
         )  # fmt: skip
         return p, admittance * p + n
 
 
 @njit(cache=True)
-def _substitute(b, c, edges, harmonic, cos, sin, drop, coefficient):
+def _substitute(b, c, edges, harmonic, cos, sin, drop, coefficient, tolerance):
     """p = c - b n(p) by repeated substitution, and n, both (F,)."""
     p, n = c.copy(), np.zeros_like(c)
     samples = len(cos)
@@ -87,6 +90,6 @@ def _substitute(b, c, edges, harmonic, cos, sin, drop, coefficient):
                 change = max(change, abs(new - p[k]))
                 largest = max(largest, abs(new))
                 p[k] = new
-            if change <= TOLERANCE * largest:
+            if change <= tolerance * largest:
                 break
     return p, n

@@ -2,8 +2,9 @@
 
 Where the compressibility depends on the pressure itself, a length dx stores g(p) dx beyond its
 linear part, the harmonics of one recording couple all along the line, and s g(p) dx leaves it as
-a flow of its own (`rippletwin.line.drains`). Repeated substitution, together with the load's law:
-g is a tenth or less of what the line stores in proportion, and each pass gains a digit.
+a flow of its own (`rippletwin.line.drains`). Substitution, together with the load's law, mixed as
+Anderson (1965, J. ACM 12:547) does: g is a tenth or less of what the line stores in proportion, but
+at a sharp resonance the flows of one pass move the pressure as much as the source does.
 """
 
 from __future__ import annotations
@@ -12,12 +13,15 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from scipy.fft import irfft, next_fast_len, rfft
 
 from rippletwin.line.drains import Basis
 
 A_WAVE = 2  # places on the shortest wave: what it takes up itself hardly matters
-PASSES, TOLERANCE = 20, 0.02  # the next pass would change a tenth of that
+PASSES, TOLERANCE = 30, 0.005  # of the largest flow: what a pass still changes
+MIXED = 4  # passes before, at most
+FINE = 3  # samples a wave of the highest harmonic: what is folded of its square stays above half
 FURTHEST = 0.9  # of the law's pressure: there it is held
 
 
@@ -42,7 +46,7 @@ class FullAmplitude:
         for part in slices:
             own = np.asarray(orders[part]).astype(int)
             harmonic = own // np.gcd.reduce(own)
-            self.recordings.append((part, harmonic, next_fast_len(4 * int(harmonic.max()) + 4)))
+            self.recordings.append((part, harmonic, next_fast_len(FINE * int(harmonic.max() + 1))))
 
     def drain(self, network, law: Callable) -> tuple[np.ndarray, np.ndarray]:
         """Give `network` the drains that its `storage` amounts to; returns the load's (p, q).
@@ -51,33 +55,60 @@ class FullAmplitude:
         """
         x, volume, of = _cells(network)
         basis = Basis(network, x)
-        leaving = np.zeros((len(x), len(network.s)), complex)
         laws = []
         for part, _, _ in self.recordings:
             own = [(s.pressure[part][0], *s.series[:, part][:, 0]) for s in network.storage]
-            laws.append(np.array(own)[of].T[..., None])
-        for _ in range(PASSES):
+            laws.append(np.array(own)[of])
+
+        def stored(leaving):
             pressure = basis.respond(law(*basis.relation(leaving)), leaving)[0]
-            before, leaving = leaving, np.zeros_like(leaving)
+            flow = np.zeros_like(leaving)
             for own, (part, harmonic, samples) in zip(laws, self.recordings):
                 share = _share(own, pressure[:, part], harmonic, samples)
-                leaving[:, part] = network.s[part] * volume[:, None] * share
-            if not np.abs(leaving - before).max() > TOLERANCE * np.abs(leaving).max():
-                break
+                flow[:, part] = network.s[part] * volume[:, None] * share
+            return flow
+
+        leaving = _fixed_point(stored, np.zeros((len(x), len(network.s)), complex))
         network.drains = x, leaving
         return law(*basis.relation(leaving))
 
 
+def _fixed_point(function: Callable, x: np.ndarray) -> np.ndarray:
+    """x (complex) with function(x) = x, to TOLERANCE or as near as PASSES come."""
+    tried, given = [], []
+    for _ in range(PASSES):
+        value = function(x)
+        tried = [*tried[1 - MIXED :], x]
+        given = [*given[1 - MIXED :], value]
+        if not np.abs(value - x).max() > TOLERANCE * np.abs(value).max():
+            break
+        left = np.array([(b - a).view(float).ravel() for a, b in zip(tried, given)])
+        change = left[-1] - left[:-1]
+        share = np.linalg.lstsq(change @ change.T, change @ left[-1], rcond=1e-12)[0]
+        x = value - sum(c * (value - before) for c, before in zip(share, given))
+    return value
+
+
 def _share(law, pressure, harmonic, samples):
-    """Harmonics (cells, H) of the share stored, for those of the pressure; `law` (1 + K, cells, 1)
+    """Harmonics (cells, H) of the share stored, for those of the pressure; `law` (cells, 1 + K)
     holds P and the c_k."""
     spectrum = np.zeros((len(pressure), samples // 2 + 1), complex)
     spectrum[:, harmonic] = 0.5 * samples * pressure
-    x = np.clip(irfft(spectrum, samples) / law[0], -FURTHEST, FURTHEST)
-    share = law[-1] * x
-    for c in law[-2:0:-1]:
-        share = (share + c) * x
-    return rfft(share * x)[:, harmonic] * (2.0 / samples)
+    wave = irfft(spectrum, samples)
+    _follow(law, wave)
+    return rfft(wave)[:, harmonic] * (2.0 / samples)
+
+
+@njit(cache=True)
+def _follow(law, wave):
+    """Pressures (cells, samples) become the shares stored."""
+    for law_here, row in zip(law, wave):
+        for i in range(len(row)):
+            x = min(max(row[i] / law_here[0], -FURTHEST), FURTHEST)
+            share = 0.0
+            for k in range(len(law_here) - 1, 0, -1):
+                share = (share + law_here[k]) * x
+            row[i] = share * x
 
 
 def _cells(network):
