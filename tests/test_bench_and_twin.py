@@ -117,6 +117,7 @@ def misfit(read, said):
 def test_an_effect_on_the_bench_is_the_effect_in_the_twin(name):
     """It changes the ripple by more than three per cent, and the twin reads it to LEFT."""
     read, said = both(name)
+    print(f"{name}: left {misfit(read, said):.4f} of {misfit(read, both_bare()[1]):.2f}")
     assert misfit(read, both_bare()[1]) > 0.03
     assert misfit(read, said) < (LEFT_OF_AIR if name == "entrained_air" else LEFT)
 

@@ -227,7 +227,7 @@ def truth(**changes):
     }
     base = {
         "kind": "single", "effects": [leak], "classes": [], "change": 0.2, "noise": 1e3,
-        "points": 1, "sensors": 2, "length": 5.0, "source_error": 0.03,
+        "points": 1, "sensors": 2, "length": 5.0, "floor": 0.03,
         "segments": [{"delay": 1.0, "impedance": 4.0}],
     }  # fmt: skip
     return base | changes

@@ -98,6 +98,7 @@ def test_effect_is_the_same_in_both_domains(effect, place, load):
         1e5 if load == "open" else PRESSURE,
         ORDERS,
     )
+    print(f"{effect.name} {place}: {misfit(moc, chain):.1e} of {misfit(bare, chain):.2g}")
     assert misfit(moc, chain) < 0.005
     assert misfit(bare, chain) > 3 * misfit(moc, chain)
 

@@ -67,7 +67,7 @@ def score(truth: dict, verdict: dict, baselines: dict) -> dict:
         "swallowed": max(0.0, 1.0 - after / before),
         "held_out_before": verdict["fit"]["before"]["held_out"],
         "held_out_after": verdict["fit"]["after"]["held_out"],
-        "floor": truth["source_error"],
+        "floor": truth["floor"],
         "bias": {
             which: bias(truth["segments"], rows) for which, rows in baselines["segments"].items()
         },

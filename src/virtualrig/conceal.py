@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from virtualrig.draw import Drawn
+from virtualrig.draw import Drawn, difference
 from virtualrig.folder import (
     listed,
     prepare,
@@ -37,8 +37,9 @@ _ROWS = 1536  # of a nominal flow ripple
 def conceal(drawn: Drawn, folder: Path, rng: np.random.Generator) -> dict:
     """Record a drawn case into `folder` (new or empty); returns its truth.
 
-    The truth gains `change`: the norm of what its effects change in the sensors' ripple at the
-    first operating point, over the norm of the ripple.
+    The truth gains, of the sensors' ripple at the first operating point, `change`: the norm of
+    what its effects change over that of the ripple without them; and `floor`: that of what the
+    nominal flow's error makes over that of the ripple, which the best twin must leave.
     """
     prepare(folder, None)
     rig = build(drawn.sheet, drawn.seal | {"numerics": NUMERICS})
@@ -50,7 +51,7 @@ def conceal(drawn: Drawn, folder: Path, rng: np.random.Generator) -> dict:
         write_ripple(folder / ripple_name(point), *nominal_flow(drawn.sheet, point))
         entries.append(listed(point, with_ripple=True))
     write_sheet(folder, drawn.sheet, entries)
-    return drawn.truth | {"change": _change(drawn, rig)}
+    return drawn.truth | _compared(drawn, rig)
 
 
 def driving(rig: Rig, point: Point):
@@ -77,15 +78,24 @@ def nominal_flow(sheet: dict, point: Point) -> tuple[np.ndarray, np.ndarray]:
     return 360 * np.arange(_ROWS) / _ROWS, np.fft.irfft(spectrum, n=_ROWS)
 
 
-def _change(drawn: Drawn, rig: Rig) -> float:
-    if not drawn.seal["effects"]:
-        return 0.0
-    plain = build(drawn.sheet, drawn.seal | {"numerics": NUMERICS, "effects": []})
+def _compared(drawn: Drawn, rig: Rig) -> dict[str, float]:
+    """`change` and `floor` of `conceal`."""
     point = replace(drawn.points[0], seconds=0.0)
-    ripples = []
-    for each in (rig, plain):
-        bench = Bench(each, flow=driving(each, point), refine=REFINE)
-        orbit = bench.settle(point.speed_rpm, point.load_pressure, tolerance=SETTLED * rig.noise)
-        sensed = sense(orbit, each.sensing)
-        ripples.append(sensed - sensed.mean(axis=1, keepdims=True))
-    return float(np.linalg.norm(ripples[0] - ripples[1]) / np.linalg.norm(ripples[1]))
+
+    def ripple(which: Rig, flow) -> np.ndarray:
+        orbit = Bench(which, flow=flow, refine=REFINE).settle(
+            point.speed_rpm, point.load_pressure, tolerance=SETTLED * rig.noise
+        )
+        sensed = sense(orbit, which.sensing)
+        return sensed - sensed.mean(axis=1, keepdims=True)
+
+    true = ripple(rig, driving(rig, point))
+    change = 0.0
+    if drawn.seal["effects"]:
+        plain = build(drawn.sheet, drawn.seal | {"numerics": NUMERICS, "effects": []})
+        without = ripple(plain, driving(plain, point))
+        change = float(np.linalg.norm(true - without) / np.linalg.norm(without))
+    # The shaft's swing is the tool's to find: the nominal flow with it is the best it can have.
+    nominal = replace(rig, pump=Pump(**drawn.sheet["pump"]))
+    floor = difference(ripple(rig, driving(nominal, point)), true, rig.pump.pistons, point)
+    return {"change": change, "floor": floor}

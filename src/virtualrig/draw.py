@@ -296,14 +296,13 @@ def _wrong_pump(sheet: dict, point: Point, error: float, rng: np.random.Generato
     return changes(float(np.exp(brentq(excess, low, high, xtol=0.02))))
 
 
-def difference(flow: np.ndarray, other: np.ndarray, pistons: int, point: Point) -> float:
-    """Relative difference of two flow ripples' piston harmonics, shaft angle free."""
+def difference(wave: np.ndarray, other: np.ndarray, pistons: int, point: Point) -> float:
+    """Relative difference of two ripples' (..., N) piston harmonics, shaft angle free."""
     top = int(HIGHEST_HZ / (point.speed_rpm / 60 * pistons))
-    a, b = (np.fft.rfft(x)[pistons : top * pistons + 1 : pistons] for x in (flow, other))
+    a, b = (np.fft.rfft(x)[..., pistons : top * pistons + 1 : pistons] for x in (wave, other))
     order = np.arange(1, top + 1)
-    turns = np.linspace(-0.02, 0.02, 801)
-    turned = b * np.exp(-2j * np.pi * np.outer(turns, order))
-    return float(np.linalg.norm(a - turned, axis=1).min() / np.linalg.norm(b))
+    turned = (b * np.exp(-2j * np.pi * t * order) for t in np.linspace(-0.02, 0.02, 801))
+    return float(min(np.linalg.norm(a - x) for x in turned) / np.linalg.norm(b))
 
 
 def _rounded(value: float) -> float:

@@ -7,8 +7,9 @@ be told that way, because the sweep's steps are common to all copies, has exact 
     turning the shaft      dp/dangle = j k p at shaft order k, nonlinear load or not
     longer segment         Z' and Y' of it in proportion, then everything behind moved back
 
-Positions of inserts are moved one by one. The orifice's nonlinear remainder is held meanwhile, and
-what segments store beyond proportion to the pressure: an order or two below the linear part.
+Positions of inserts are moved one by one. The orifice's nonlinear remainder is held meanwhile, two
+orders below the linear part, and what segments store beyond proportion to the pressure: next to a
+sharp resonance that is no small part, and a fit takes more steps.
 """
 
 from __future__ import annotations
