@@ -32,7 +32,7 @@ def test_air_at_one_pressure_is_a_slower_wave():
     more compressible, so that a falls by the root of one plus that. A sheet that may move takes it
     all up, and how far it moves is known."""
     values = {"gas_fraction": 0.02, "polytropic_exponent": 1.2}
-    small = {"points": ((1000, PRESSURE),), "depth": 0.02, "noise": 1.0}
+    small = {"points": ((1000, PRESSURE),), "depth": 0.002, "noise": 0.1}
     fit, pool = accepted(EFFECTS["entrained_air"], values, **small)
     (base,) = pool.fit([{"hypothesis": ()}])
     (found,) = without_each(pool, base, fit)
