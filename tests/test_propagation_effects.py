@@ -110,6 +110,7 @@ def test_effects_together_are_the_same_in_both_domains():
     effects = [next(pair for key, pair in some.items() if key[0] == name) for name in names]
     effects += [some["load_dynamics", "spool"], some["sensor_delay", "sensor p2"]]
     moc, chain = both(corrected(*effects))
+    print(f"together: {misfit(moc, chain):.1e}")
     assert misfit(moc, chain) < 0.005
 
 
