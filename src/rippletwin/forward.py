@@ -227,7 +227,7 @@ class Forward:
         Where an effect changed the load, its linear part is the changed one.
         """
         p, q = network.load_state()
-        factor = self.twin.arrays(theta).load
+        factor = self.twin.load_factor(theta)
 
         def law(a, b, c):
             if self._orifice is not None:

@@ -132,9 +132,12 @@ class Twin:
         a, d, lengths = u[: 3 * n].reshape(3, n)
         # A sensor stays on the line however the fit stretches it.
         x = np.clip(u[3 * n : k], 0.0, np.sum(lengths))
-        load = self.index.get("load")
-        factor = 1.0 if load is None else self.parameters[load].value(theta[load])
-        return Arrays(a, d, lengths, x, u[k], factor)
+        return Arrays(a, d, lengths, x, u[k], self.load_factor(theta))
+
+    def load_factor(self, theta: np.ndarray) -> float:
+        """What the load's coefficient is multiplied by at `theta`; 1 where it is no parameter."""
+        k = self.index.get("load")
+        return 1.0 if k is None else self.parameters[k].value(theta[k])
 
     def effect_values(self, theta: np.ndarray) -> list[tuple]:
         """(effect, place, values by name) of each effect at `theta`."""

@@ -95,7 +95,7 @@ class DifferentiableForward(Forward):
         return out
 
     def _balance(self, network, theta):
-        factor = self.twin.arrays(theta).load
+        factor = self.twin.load_factor(theta)
         if self._hold:
             network.drains = self._drains
             if self._orifice is not None:
