@@ -24,7 +24,7 @@ TESTED_AGAIN = {
 }
 # Samples and images are temporary: who needs them again makes them again.
 TIME_AGAIN = {"augment", "train"} | TESTED_AGAIN
-IMAGES_AGAIN = {"augment", "pair", "image", "train"} | TESTED_AGAIN
+IMAGES_AGAIN = {"augment", "pair", "image", "image_seeds", "train"} | TESTED_AGAIN
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,10 @@ whose effect is drawn at random, its truth sealed (docs/concealed.md).
 import argparse
 import json
 import sys
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +28,7 @@ from virtualrig.folder import (
     write_truth,
 )
 from virtualrig.recorder import Point, nominal_ripple, record
-from virtualrig.rig import SEAL, SHEET, RigError, read_rig, read_yaml
+from virtualrig.rig import SEAL, SHEET, Rig, RigError, read_rig, read_yaml
 from virtualrig.seal import new_key, seal
 
 _STATES = tuple(
@@ -62,6 +65,7 @@ def _parser() -> argparse.ArgumentParser:
     make = commands.add_parser("record", help="record operating points into a new case folder")
     make.add_argument("--out", type=Path, required=True, help="case folder to write (new or empty)")
     make.add_argument("--seed", type=int, default=0, help="noise, wander, settings, shaft angles")
+    make.add_argument("--processes", type=int, default=1, help="operating points at a time")
     make.add_argument("--seconds", type=float, help="length of every recording")
     make.add_argument(
         "--points", default="full", help="full, smoke, or a YAML file with a list `points`"
@@ -112,16 +116,23 @@ def _record(options: argparse.Namespace) -> None:
     if unknown:
         raise RigError(f"{options.sealed}: field faults: no {', '.join(sorted(unknown))}")
     prepare(options.out, options.true_flow)
-    for index, point in enumerate(points):
-        print(f"virtualrig: {index + 1}/{len(points)} {point.label}", file=sys.stderr, flush=True)
-        take = record(rig, point, np.random.default_rng([options.seed, index]))
-        write_recording(options.out / "recordings" / f"{point.label}.h5", take)
-        if options.true_flow is not None:
-            write_truth(options.true_flow / f"{point.label}.h5", take)
-        if options.flow_ripple and not point.faults:
-            write_ripple(options.out / ripple_name(point), *nominal_ripple(known, point))
+    work = partial(_record_point, options, known, rig)
+    with ProcessPoolExecutor(options.processes, get_context("fork")) as pool:
+        for number, label in enumerate(pool.map(work, range(len(points)), points), 1):
+            print(f"virtualrig: {number}/{len(points)} {label}", file=sys.stderr, flush=True)
     entries = [listed(point, options.flow_ripple and not point.faults) for point in points]
     write_sheet(options.out, known, entries)
+
+
+def _record_point(options: argparse.Namespace, known: dict, rig: Rig, index: int, point: Point):
+    """Record and write one operating point; returns its label."""
+    take = record(rig, point, np.random.default_rng([options.seed, index]))
+    write_recording(options.out / "recordings" / f"{point.label}.h5", take)
+    if options.true_flow is not None:
+        write_truth(options.true_flow / f"{point.label}.h5", take)
+    if options.flow_ripple and not point.faults:
+        write_ripple(options.out / ripple_name(point), *nominal_ripple(known, point))
+    return point.label
 
 
 def _check(options: argparse.Namespace) -> None:

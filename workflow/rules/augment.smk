@@ -1,15 +1,16 @@
 # Signals -> labelled samples: seeds shifted and noisy (one store a seed), recordings as they are.
+# One job makes all seeds of a dataset: starting Python costs more than a seed does.
 rule augment:
     input:
         signals=f"{RESULTS}/seeds/{{dataset}}.zarr",
         recorded=recorded_signal_of,
         source=library("augment.py"),
     output:
-        temp(directory(f"{RESULTS}/samples/{{dataset}}/{{seed}}x{{revolutions}}.zarr")),
+        temp(directory(every_seed("samples/{dataset}/{seed}x{revolutions}.zarr"))),
     log:
-        f"{RESULTS}/logs/augment/{{dataset}}/{{seed}}x{{revolutions}}.log",
+        f"{RESULTS}/logs/augment/{{dataset}}/x{{revolutions}}.log",
     benchmark:
-        f"{RESULTS}/benchmarks/augment/{{dataset}}/{{seed}}x{{revolutions}}.tsv"
+        f"{RESULTS}/benchmarks/augment/{{dataset}}/x{{revolutions}}.tsv"
     threads: 1
     resources:
         mem_mb=2000,

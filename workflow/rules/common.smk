@@ -101,9 +101,13 @@ wildcard_constraints:
     dataset=rf"(?:{ASIDE})?(?:CFD-P|CFD-MOC-P\+?|CFD-Q\+?)|{EXPERIMENTAL}",
     plus=r"\+?",
     architecture="[a-z0-9_]+",
-    seed="[0-9]+",
     revolutions="1|2",
-    windows="[0-9]+|recorded|probe",
+    windows="recorded|probe",
+
+
+def every_seed(path):
+    """A pattern of stores with one for each {seed}; other wildcards stay."""
+    return [f"{RESULTS}/{path}".replace("{seed}", str(seed)) for seed in SEEDS]
 
 
 def signal_of(dataset):
@@ -168,8 +172,8 @@ def samples_of(wildcards):
     if wildcards.dataset == EXPERIMENTAL:
         return [recorded_of(wildcards)]
     if domain_of(wildcards.architecture) == "image":
-        return [f"{RESULTS}/images/{wildcards.dataset}/{seed}.zarr" for seed in SEEDS]
-    return [f"{RESULTS}/samples/{wildcards.dataset}/{seed}x1.zarr" for seed in SEEDS]
+        return every_seed("images/{dataset}/{seed}.zarr")
+    return every_seed("samples/{dataset}/{seed}x1.zarr")
 
 
 def compound_samples_of(wildcards):

@@ -2,7 +2,7 @@
 # Recordings are scaled as the simulation that learns from them, or as themselves.
 rule image:
     input:
-        samples=f"{RESULTS}/samples/{{dataset}}/{{windows}}x2.zarr",
+        samples=[f"{RESULTS}/samples/{{dataset}}/{{windows}}x2.zarr"],
         reference=reference_of,
         source=library("image.py"),
     output:
@@ -22,3 +22,16 @@ rule image:
         k=config["sst"]["k"],
     script:
         "../scripts/image.py"
+
+
+use rule image as image_seeds with:
+    input:
+        samples=every_seed("samples/{dataset}/{seed}x2.zarr"),
+        reference=reference_of,
+        source=library("image.py"),
+    output:
+        temp(directory(every_seed("images/{dataset}/{seed}.zarr"))),
+    log:
+        f"{RESULTS}/logs/image/{{dataset}}/seeds.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/image/{{dataset}}/seeds.tsv"

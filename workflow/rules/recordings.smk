@@ -11,7 +11,7 @@ if RECORDED_HERE:
             f"{RESULTS}/logs/record.log",
         benchmark:
             f"{RESULTS}/benchmarks/record.tsv"
-        threads: 1
+        threads: 2
         resources:
             mem_mb=2000,
         params:
@@ -20,7 +20,7 @@ if RECORDED_HERE:
             seed=config["virtualrig"]["seed"],
         shell:
             "virtualrig record --out {params.case} --points {params.points} --seed {params.seed}"
-            " > {log} 2>&1"
+            " --processes {threads} > {log} 2>&1"
 
 
 rule ingest:

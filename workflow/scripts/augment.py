@@ -1,4 +1,4 @@
-"""Labelled samples of one seed: every state shifted and noisy."""
+"""Labelled samples of every seed: each state shifted and noisy."""
 
 import numpy as np
 import xarray as xr
@@ -11,24 +11,26 @@ tell = start(snakemake)
 params, wildcards = snakemake.params, snakemake.wildcards
 signals = store.load(snakemake.input.signals)
 recorded = store.load(snakemake.input.recorded)
-samples, labels = augment(
-    signals.signal.values,
-    params.samples_per_class,
-    recorded.noise_std.values,
-    np.random.default_rng([int(wildcards.seed), int(wildcards.revolutions)]),
-    int(wildcards.revolutions),
-    params.noise,
-)
-store.save(
-    xr.Dataset(
-        {
-            "signal": (("sample", "channel", "time"), samples, signals.signal.attrs),
-            "label": ("sample", labels, {"classes": signals.state.values.tolist()}),
-        },
-        coords={"channel": signals.channel.values},
-        attrs=signals.attrs | {"seed": int(wildcards.seed)},
-    ),
-    snakemake.output[0],
-    compressed=False,
-)
-tell(f"{len(labels)} samples")
+revolutions = int(wildcards.revolutions)
+for seed, path in enumerate(snakemake.output):
+    samples, labels = augment(
+        signals.signal.values,
+        params.samples_per_class,
+        recorded.noise_std.values,
+        np.random.default_rng([seed, revolutions]),
+        revolutions,
+        params.noise,
+    )
+    store.save(
+        xr.Dataset(
+            {
+                "signal": (("sample", "channel", "time"), samples, signals.signal.attrs),
+                "label": ("sample", labels, {"classes": signals.state.values.tolist()}),
+            },
+            coords={"channel": signals.channel.values},
+            attrs=signals.attrs | {"seed": seed},
+        ),
+        path,
+        compressed=False,
+    )
+tell(f"{len(labels)} samples a seed, {len(snakemake.output)} seeds")

@@ -10,7 +10,6 @@ from rippletwin.imaging import SstSettings, amplitude_scale, sst_images
 
 tell = start(snakemake)
 params = snakemake.params
-samples = store.load(snakemake.input.samples)
 reference = store.load(snakemake.input.reference)
 rate = reference.sizes["time"] * reference.speed_hz
 settings = SstSettings(
@@ -22,11 +21,15 @@ settings = SstSettings(
 )
 healthy = reference.signal.values[reference.state.values == "H"][:1]
 settings = replace(settings, scale=amplitude_scale(np.tile(healthy, 2), rate, settings))
-images = sst_images(samples.signal.values, rate, settings)
-axes = (samples.signal.dims[0], "channel", "frequency", "column")
-store.save(
-    samples.drop_vars("signal").assign(signal=(axes, images, {"units": "1"})),
-    snakemake.output[0],
-    compressed=False,
+for source, target in zip(snakemake.input.samples, snakemake.output, strict=True):
+    samples = store.load(source)
+    images = sst_images(samples.signal.values, rate, settings)
+    axes = (samples.signal.dims[0], "channel", "frequency", "column")
+    store.save(
+        samples.drop_vars("signal").assign(signal=(axes, images, {"units": "1"})),
+        target,
+        compressed=False,
+    )
+tell(
+    f"{len(images)} images of {settings.size} x {settings.size} a store, scale {settings.scale:.3g}"
 )
-tell(f"{len(images)} images of {settings.size} x {settings.size}, scale {settings.scale:.3g}")
