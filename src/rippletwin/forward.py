@@ -118,6 +118,11 @@ class Forward:
                 predicted.append(pressure[rows, part])
         return predicted
 
+    @cached_property
+    def stores(self) -> bool:
+        """Whether the line stores something beyond proportion to the pressure."""
+        return bool(self._periodic and self._linear(self.twin.theta).storage)
+
     def network(self, theta: np.ndarray) -> Network:
         """The line with source, effects and load at `theta`; an orifice's ripple is solved."""
         network = self._linear(theta)
@@ -216,9 +221,15 @@ class Forward:
             state = [x[seen] for x in wide._full.drain(whole, law)]
             positions, leaving = whole.drains
             network.drains = positions, leaving[:, seen]
+            if self._orifice is not None:
+                network.load = "state", tuple(state)
         else:
-            state = self._law(network, theta)(*network.load_relation())
+            self._balance_load(network, theta)
+
+    def _balance_load(self, network: Network, theta: np.ndarray) -> None:
+        """Give `network` the full-amplitude state at its load, its drains as they are."""
         if self._orifice is not None:
+            state = self._law(network, theta)(*network.load_relation())
             network.load = "state", tuple(state)
 
     def _law(self, network: Network, theta: np.ndarray, **accuracy: float):

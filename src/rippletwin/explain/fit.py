@@ -4,6 +4,8 @@ Two rules keep the optimiser out of wrong valleys (5 % of wave speed is two turn
 5 kHz over 9 m). All operating points are fitted together and in absolute frequency, first below
 800 Hz, then higher; and every candidate is fitted that way from the nominal values with the
 effect in the model from the first step, because a fit without it has been bent by its absence.
+What a line stores beyond proportion to the pressure, slow to work out, is left out or held on the
+way and followed from the mode that this leads to.
 
 The evidence is Laplace's (MacKay 2003, Information Theory, Inference, and Learning Algorithms,
 ch. 27): all parameters of effects have proper priors N(0, 1) in their coordinates, so
@@ -155,11 +157,13 @@ def fit_hypothesis(
     twin = base.with_(effects=hypothesis)
     stages = limits(observations)
     posterior = Posterior(twin, observations, stages[0], source_free)
+    posterior.forward.hold_storage = True
     many = len(starts) > FEW or not hypothesis
     states = _first_states(posterior, starts, TRIED[many])
     for stage, limit in enumerate(stages):
         last = stage == len(stages) - 1
         posterior = Posterior(twin, observations, limit, source_free)
+        posterior.forward.hold_storage = True
         posterior.most = np.inf if last else MOST
         fits = []
         for _, theta in states:
@@ -170,8 +174,9 @@ def fit_hypothesis(
         states = _distinct(fits)[: 1 if last else kept[min(stage, len(kept) - 1)]]
         if draws and not last:
             above = Posterior(twin, observations, stages[stage + 1], source_free)
+            above.forward.hold_storage = True
             states = states + _about(posterior, states[:SPREAD], above, draws, TRIED[many])
-    return conclude(posterior, hypothesis, states[0][1])
+    return conclude(posterior, hypothesis, _followed(posterior, states[0][1]))
 
 
 def _about(posterior: Posterior, states, above: Posterior, draws: int, tried: int) -> list:
@@ -257,11 +262,20 @@ def refine(
     twin = base.with_(effects=hypothesis)
     posterior = Posterior(twin, observations, None, source_free)
     thetas = [np.asarray(theta, dtype=float) for theta in thetas]
+    posterior.predict(thetas[-1])  # the weakest: nearest to the fit that they set out from
+    posterior.forward.hold_storage = True
     if len(thetas) > 2:
         tried = [descend(posterior, theta, STEPS[-1]) for theta in thetas]
         thetas = [theta for theta, _ in sorted(tried, key=lambda t: t[1])[:REFINED]]
     fits = [descend(posterior, theta, LAST_STEPS) for theta in thetas]
-    return conclude(posterior, hypothesis, min(fits, key=lambda f: f[1])[0])
+    best = min(fits, key=lambda f: f[1])[0]
+    return conclude(posterior, hypothesis, _followed(posterior, best))
+
+
+def _followed(posterior: Posterior, theta: np.ndarray) -> np.ndarray:
+    """The mode near theta, where what the line stores beyond proportion was held: it followed."""
+    posterior.forward.hold_storage = False
+    return descend(posterior, theta, LAST_STEPS)[0] if posterior.forward.stores else theta
 
 
 def conclude(posterior: Posterior, hypothesis: Hypothesis, theta: np.ndarray) -> Fit:

@@ -8,8 +8,9 @@ be told that way, because the sweep's steps are common to all copies, has exact 
     longer segment         Z' and Y' of it in proportion, then everything behind moved back
 
 Positions of inserts are moved one by one. The orifice's nonlinear remainder is held meanwhile, two
-orders below the linear part, and what segments store beyond proportion to the pressure: next to a
-sharp resonance that is no small part, and a fit takes more steps.
+orders below the linear part, and so is what segments store beyond proportion to the pressure: next
+to a sharp resonance that is no small part, and a fit takes more steps. With `hold_storage` the
+latter is held in predictions too, which is all that makes them slow.
 """
 
 from __future__ import annotations
@@ -39,21 +40,21 @@ class DifferentiableForward(Forward):
         self._together = [k for k in range(len(names)) if k not in apart]
         self._remainder = self._drains = self._held_at = None
         self._hold = False
+        self.hold_storage = False
 
     def linear_load(self, theta: np.ndarray) -> np.ndarray | None:
-        """Readings (S, F) with the orifice linear; None where it is no orifice or is so already."""
+        """Readings (S, F) with the orifice linear and what segments store beyond proportion as it
+        is; None where there is no orifice or it is so already."""
         if self._orifice is None:
             return None
-        held, self._orifice = self._orifice, None
-        try:
-            return self.network(theta).readings()
-        finally:
-            self._orifice = held
+        self._predicted(theta)
+        network = self._linear(theta)
+        self._drain_as_held(network)
+        return network.readings()
 
     def derivatives(self, theta: np.ndarray) -> np.ndarray:
         """d readings/d theta, (P, S, F); rows S are the rig's sensors, F all frequencies."""
-        if not np.array_equal(self._held_at, theta):
-            self(theta)
+        self._predicted(theta)
         self._hold = True
         base = self.network(theta)
         pressure, flow = base._respond(base.sensor_positions)
@@ -94,16 +95,27 @@ class DifferentiableForward(Forward):
         self._hold = False
         return out
 
+    def _predicted(self, theta):
+        """What is held is that of theta from here on."""
+        if not np.array_equal(self._held_at, theta):
+            self(theta)
+
     def _balance(self, network, theta):
         factor = self.twin.load_factor(theta)
         if self._hold:
-            network.drains = self._drains
+            self._drain_as_held(network)
             if self._orifice is not None:
                 self._balance_held(network, factor, self._remainder)
             return
         linear = network.load_state()
-        super()._balance(network, theta)
-        self._drains = network.drains
+        if self.hold_storage:
+            self._drain_as_held(network)
+            self._balance_load(network, theta)
+        else:
+            super()._balance(network, theta)
+        if network.drains is not None:
+            positions, leaving = network.drains
+            self._drains = positions / network.length, leaving
         if self._orifice is not None:
             p, q = network.load[1]
             self._remainder = (q - linear[1] / linear[0] * p) / factor
@@ -112,6 +124,12 @@ class DifferentiableForward(Forward):
         prediction = super().__call__(theta)
         self._held_at = np.array(theta)
         return prediction
+
+    def _drain_as_held(self, network):
+        """The flows held leave `network`, where they did in shares of its length."""
+        if self._drains is not None:
+            shares, leaving = self._drains
+            network.drains = shares * network.length, leaving
 
     @staticmethod
     def _balance_held(network, factor, remainder):
@@ -185,6 +203,9 @@ class DifferentiableForward(Forward):
         )
         p, q = network.load_state()
         side_by_side.load = "state", (flat(p), flat(q))
+        if base.drains is not None:
+            at, leaving = base.drains
+            side_by_side.drains = at, np.tile(leaving, count)
         if self._orifice is not None:
             self._balance_held(side_by_side, flat(v.load), flat(self._remainder))
         readings = side_by_side.readings().reshape(-1, *shape)

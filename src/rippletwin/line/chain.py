@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from rippletwin.line.drains import respond
+from rippletwin.line.drains import relation, respond
 
 LOADS = ("open", "closed", "anechoic", "impedance", "admittance", "state")
 
@@ -113,6 +113,8 @@ class Network:
 
         This is Thévenin's theorem without its division, so it holds at resonance too.
         """
+        if self.drains is not None:
+            return relation(self)
         _, _, entry, decay = self._sweep([(1.0, 0.0), (0.0, 1.0)])
         a, b = entry[:, 1] + self.source_admittance * entry[:, 0]
         return a, b, self.source_flow * decay

@@ -26,6 +26,12 @@ def respond(network, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return pressure[: len(positions)], flow[: len(positions)]
 
 
+def relation(network) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`Network.load_relation` with the drains."""
+    at, leaving = network.drains
+    return Basis(network, at).relation(leaving)
+
+
 class Basis:
     """Both solutions of `network` at `positions` (N,), among which flows may leave it.
 
