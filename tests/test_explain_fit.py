@@ -12,8 +12,9 @@ from rippletwin.explain.fit import fit_hypothesis, refine
 from rippletwin.explain.locate import locate
 from rippletwin.explain.posterior import FLOOR, SIZE, Posterior, source_scale
 from rippletwin.explain.search import ACCEPT, search
+from rippletwin.explain.starts import PROMISING, promising
 from rippletwin.explain.validate import validate
-from rippletwin.explain.workers import Workers, scan
+from rippletwin.explain.workers import Workers, carry, scan, weak
 from rippletwin.forward import Forward
 from rippletwin.misfit import relative_misfit
 from rippletwin.twin import Twin
@@ -50,6 +51,26 @@ def test_derivatives_equal_difference_quotients(hypothesis):
         up, down = (np.concatenate(forward(theta + side * step), 1) for side in (1, -1))
         quotient = (up - down) / 2e-5
         assert np.linalg.norm(column - quotient) < 0.02 * np.linalg.norm(quotient) + 1e-6
+
+
+@pytest.mark.parametrize("place", [1.3, 4.4, 7.7])
+def test_starts_at_the_effect_promise_most(place):
+    """Of starts all along the line, from a good fit without the effect, the score test keeps one
+    within a sixteenth of the shortest wave of a volume of 0.4 cm3, whose place it is not told."""
+    values = {"line_volume@position.position": place, "line_volume@position.volume": 4e-7}
+    bench, observations, truth = make(np.random.default_rng(6), VOLUME, values, source=0.02)
+    base = Twin(bench, observations)
+    without = refine(base, (), observations, [truth.theta[: len(base.parameters)]])
+    twin = base.with_(effects=VOLUME)
+    thetas = []
+    for start in weak(bench, VOLUME, 270):
+        thetas.append(carry(without, VOLUME, base))
+        for name, u in start.items():
+            thetas[-1][twin.index[name]] = u
+    kept = promising(base, Posterior(twin, observations), thetas)
+    found = [twin.values(theta)["line_volume@position.position"] for theta in kept]
+    assert len(kept) == PROMISING
+    assert min(abs(x - place) for x in found) < 1000 / 4000 / 16
 
 
 def test_whitened_residual_of_the_truth_has_unit_variance():

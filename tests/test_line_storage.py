@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from line_rig import DENSITY, network
+from rippletwin.line.drains import Basis
 from rippletwin.line.parts import Pipe
 from rippletwin.line.storage import FullAmplitude, Storage
 
@@ -63,3 +64,40 @@ def test_nothing_stored_changes_nothing():
     drained = line.pressure_at([1.0])
     line.drains = None
     np.testing.assert_allclose(drained, line.pressure_at([1.0]), atol=1e-9 * np.abs(drained).max())
+
+
+def lossy():
+    """Two segments with unsteady friction, a load that reflects and an impedance at the source."""
+    pipes = [Pipe(3.1, DIAMETER, SPEED), Pipe(2.2, 0.6 * DIAMETER, 1.2 * SPEED)]
+    line = network(S, pipes, "unsteady", source_flow=1e-4 / ORDERS)
+    line.source_admittance = 0.3 / IMPEDANCE
+    line.load = "admittance", 0.2 / IMPEDANCE
+    return line
+
+
+def test_a_drain_is_the_branch_that_takes_as_much():
+    """What a shunt admittance takes where it sits, drained there instead: the same pressure and
+    flow all along the line, and the same relation at the load."""
+    branched, drained, x = lossy(), lossy(), np.array([0.4, 2.0, 3.5, 5.0])
+    places = np.array([1.3, 4.1])
+    admittances = [2.0 / IMPEDANCE * (0.1 + 0.02j * ORDERS), S * 1e-13]
+    branched.inserts = [(at, "shunt", y) for at, y in zip(places, admittances)]
+    drained.drains = places, branched.pressure_at(places) * admittances
+    np.testing.assert_allclose(drained.pressure_at(x), branched.pressure_at(x), rtol=1e-10)
+    np.testing.assert_allclose(drained.flow_at(x), branched.flow_at(x), rtol=1e-10)
+    a, b, c = drained.load_relation()
+    p, q = branched.pressure_at([5.3])[0], branched.flow_at([5.3])[0]
+    np.testing.assert_allclose(a * p + b * q, c, rtol=1e-10)
+
+
+def test_variation_of_constants_is_the_sweep():
+    """Two ways to the same pressure with drains: from both solutions without, and in one sweep."""
+    line, x = lossy(), np.array([0.4, 2.0, 3.5, 5.0])
+    leaving = 1e-5 * np.exp(1j * np.outer(np.arange(1, 5), ORDERS))
+    basis = Basis(line, x)
+    a, b, c = basis.relation(leaving)
+    p, q = line.load_state()
+    scale = c / (a * p + b * q)
+    pressure, _ = basis.respond((scale * p, scale * q), leaving)
+    line.drains = x, leaving
+    np.testing.assert_allclose(line.pressure_at(x), pressure, rtol=1e-10)

@@ -17,6 +17,8 @@ rule explain:
         f"{RESULTS}/logs/explain.log",
     benchmark:
         f"{RESULTS}/benchmarks/explain.tsv"
+    # As soon as there are recordings: later it would wait for both cores to be idle at once.
+    priority: 50
     threads: 2
     resources:
         mem_mb=3000,

@@ -42,6 +42,10 @@ class DifferentiableForward(Forward):
         self._hold = False
         self.hold_storage = False
 
+    def hold_as(self, other: DifferentiableForward) -> None:
+        """Hold in predictions what `other`, of the same recordings, has found to be stored."""
+        self.hold_storage, self._drains = True, other._drains
+
     def linear_load(self, theta: np.ndarray) -> np.ndarray | None:
         """Readings (S, F) with the orifice linear and what segments store beyond proportion as it
         is; None where there is no orifice or it is so already."""

@@ -210,25 +210,27 @@ class Posterior:
             sds, taus = sds[source : source + 1], taus[smooth : smooth + 1]
         self.floor = min(self.floor, self.most)
 
-    def linearise(self, theta: np.ndarray, prediction: np.ndarray):
+    def linearise(self, theta: np.ndarray, prediction: np.ndarray, besides: np.ndarray = ()):
         """Residual (N,) and its Jacobian (N, P) at the present errors, their covariance held.
 
         Of the N residuals 2 S F are the whitened ones, of unit variance; theta follows where it
-        has a prior.
+        has a prior. `besides` (B, S, F) are further directions in which the prediction may go,
+        B more columns of the Jacobian.
         """
         if self._pressures:
             slopes = self.forward.derivatives(theta)
         else:
             moved = [self.predict(theta + STEP * e) for e in np.eye(len(theta))]
             slopes = (np.stack(moved) - prediction) / STEP
+        slopes = np.concatenate([slopes, *np.asarray(besides)[:, None]])
         metric = self._metric(prediction)
         whitened = metric.apply(self._rotated - self._rotate(prediction))
         # The sum of squares is least over the source's error, so its gradient is that with the
         # source held at its most likely value, which every slope therefore carries.
         slopes = slopes * self._source(prediction, metric, whitened)
-        columns = -_real(metric.apply(self._rotate(slopes))).reshape(len(theta), -1)
+        columns = -_real(metric.apply(self._rotate(slopes))).reshape(len(slopes), -1)
         r = np.concatenate([_real(whitened).ravel(), theta[self.prior]])
-        return r, np.concatenate([columns.T, np.eye(len(theta))[self.prior]])
+        return r, np.concatenate([columns.T, np.eye(len(theta), len(slopes))[self.prior]])
 
     def best_source(self, prediction: np.ndarray) -> np.ndarray:
         """The prediction with every free source at its most likely amplitude, (S, F)."""

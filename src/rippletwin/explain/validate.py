@@ -10,9 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rippletwin.explain.fit import Fit, align, select
+from rippletwin.explain.fit import Fit, select
 from rippletwin.explain.posterior import Posterior
 from rippletwin.explain.search import SURE
+from rippletwin.explain.starts import align
 from rippletwin.explain.workers import Workers, dropping
 from rippletwin.misfit import relative_misfit, theil
 

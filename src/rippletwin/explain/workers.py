@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from itertools import pairwise, product
+from itertools import product
 from multiprocessing import get_context
 
 import numpy as np
@@ -14,30 +14,38 @@ from rippletwin.explain.fit import Fit, Hypothesis, fit_hypothesis, refine
 from rippletwin.twin import Twin
 
 WEAK = -2.0  # of a weak effect's parameters, in prior standard deviations
+PLACES = 8  # on the shortest wave
 
 
-def scan(rig, hypothesis: Hypothesis, weak: bool = False) -> list[dict[str, float]]:
-    """Starts for the newest effect of a hypothesis: all combinations of its parameters' scans.
+def scan(rig, hypothesis: Hypothesis) -> list[dict[str, float]]:
+    """Starts for the newest effect of a hypothesis: all combinations of its parameters' scans."""
+    return _combined(rig, hypothesis, lambda parameter: parameter.scan)
 
-    With `weak` the positive parameters that have no scan of their own start at WEAK, and places
-    along the line twice as densely: about a good fit the valleys are narrow.
+
+def weak(rig, hypothesis: Hypothesis, places: int) -> list[dict[str, float]]:
+    """Starts for the newest effect where it does little: positive parameters that have no scan of
+    their own at WEAK, and as many `places` along the line, about a good fit the valleys are narrow.
     """
+
+    def coordinates(parameter):
+        prior = parameter.prior
+        if prior.kind == "lognormal" and len(parameter.scan) == 1:
+            return (WEAK,)
+        if prior.kind == "uniform":
+            share = (np.arange(places) + 0.5) / places
+            return tuple(prior.coordinate(prior.centre + prior.scale * share))
+        return parameter.scan
+
+    return _combined(rig, hypothesis, coordinates)
+
+
+def _combined(rig, hypothesis: Hypothesis, coordinates: Callable) -> list[dict[str, float]]:
     if not hypothesis:
         return [{}]
     effect, place = hypothesis[-1]
     parameters = effect.parameters(rig, place)
     names = [f"{effect.name}@{place}.{p.name}" for p in parameters]
-    scans = [_weak(p) if weak else p.scan for p in parameters]
-    return [dict(zip(names, us)) for us in product(*scans)]
-
-
-def _weak(parameter) -> tuple[float, ...]:
-    if parameter.prior.kind == "lognormal" and len(parameter.scan) == 1:
-        return (WEAK,)
-    if parameter.prior.kind == "uniform":
-        between = [0.5 * (a + b) for a, b in pairwise(parameter.scan)]
-        return tuple(sorted([*parameter.scan, *between]))
-    return parameter.scan
+    return [dict(zip(names, us)) for us in product(*map(coordinates, parameters))]
 
 
 def carry(fit: Fit, hypothesis: Hypothesis, base: Twin) -> np.ndarray:
@@ -112,7 +120,7 @@ def _prepare(base, observations):
 def work(job: dict) -> Fit:
     """Fit `hypothesis` to the observations with the indices `use` (all by default).
 
-    With `theta` from there; with `fit` from where that ended and the newest effect's scan, as
+    With `theta` from there; with `fit` from where that ended and the newest effect's starts, as
     strong as its prior and weak; else by continuation from the starts `starts` or the newest
     effect's scan; `source_free` and `draws` as in `fit_hypothesis`.
     """
@@ -124,7 +132,11 @@ def work(job: dict) -> Fit:
         return refine(base, hypothesis, observations, [job["theta"]], free)
     if "fit" in job:
         twin, thetas = base.with_(effects=hypothesis), []
-        for start in scan(base.rig, hypothesis) + scan(base.rig, hypothesis, weak=True):
+        delay = sum(segment.delay for segment in base.rig.line)
+        places = int(np.ceil(PLACES * delay * max(o.frequency_hz[-1] for o in observations)))
+        starts = scan(base.rig, hypothesis)
+        starts += [u for u in weak(base.rig, hypothesis, places) if u not in starts]
+        for start in starts:
             theta = carry(job["fit"], hypothesis, base)
             for name, u in start.items():
                 theta[twin.index[name]] = u

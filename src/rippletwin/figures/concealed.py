@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from rippletwin.figures import style
 
 LEAST_CHANGE = 1e-4
+STATED = (0.5, 0.9, 0.99)  # between pooled probabilities; most names are stated as all but sure
 
 
 def draw(rows: list[dict], folder: str | Path, suffix: str = ".png") -> list[Path]:
@@ -108,17 +109,20 @@ def bias(rows: list[dict]) -> Figure:
 
 
 def probabilities(rows: list[dict]) -> Figure:
-    """Stated probability of each named effect against how often such a name is right."""
-    stated = sorted(pair for r in rows for pair in r["stated"])
+    """Stated probability of named effects against how often such a name is right, pooled between
+    the values of STATED."""
+    stated = np.array([pair for r in rows for pair in r["stated"]], float).reshape(-1, 2)
+    pool = np.digitize(stated[:, 0], STATED)
     fig, axes = style.figure(1, 1, height=2.6)
     ax = axes[0, 0]
     ax.plot([0, 1], [0, 1], color=style.NEUTRAL, lw=0.8)
-    for group in np.array_split(np.array(stated, float).reshape(-1, 2), 5):
+    for k in range(len(STATED) + 1):
+        group = stated[pool == k]
         if len(group):
             p, right = group.mean(axis=0)
             spread = np.sqrt(max(right * (1 - right), 0.25 / len(group)) / len(group))
             ax.errorbar(p, right, spread, fmt="o", color=style.CORRECTED, ms=4, capsize=2)
-    ax.set_xlabel("stated probability, mean of a fifth of the names")
+    ax.set_xlabel("stated probability, pooled at 0.5, 0.9 and 0.99")
     ax.set_ylabel("share that is right")
     ax.set_xlim(0, 1.03)
     ax.set_ylim(-0.03, 1.05)

@@ -21,8 +21,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from rippletwin.line.drains import relation, respond
-
 LOADS = ("open", "closed", "anechoic", "impedance", "admittance", "state")
 
 
@@ -50,7 +48,8 @@ class Network:
     sensor_positions   (S,) m from the pump outlet
     sensor_factor      (S, F) or broadcastable: what a sensor reads over the pressure at it
     storage            what segments store beyond proportion to the pressure, at full amplitude
-    drains             (positions (N,), flows (N, F)) that leave the line whatever the pressure
+    drains             (positions (N,), flows (N, F)) that leave the line whatever the pressure; for
+                       lines that let the ripple through, as with them no scale can be taken out
     """
 
     s: np.ndarray
@@ -113,11 +112,9 @@ class Network:
 
         This is Thévenin's theorem without its division, so it holds at resonance too.
         """
-        if self.drains is not None:
-            return relation(self)
         _, _, entry, decay = self._sweep([(1.0, 0.0), (0.0, 1.0)])
-        a, b = entry[:, 1] + self.source_admittance * entry[:, 0]
-        return a, b, self.source_flow * decay
+        a, b, *drained = entry[:, 1] + self.source_admittance * entry[:, 0]
+        return a, b, self.source_flow * decay - sum(drained)
 
     def thevenin_at_load(self) -> tuple[np.ndarray, np.ndarray]:
         """Open-circuit pressure (F,) Pa and source impedance (F,) Pa s/m3 seen by the load."""
@@ -147,22 +144,25 @@ class Network:
 
     def _respond(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pressure and flow (S, F) at `positions` with the network's own source and load."""
-        if self.drains is not None:
-            return respond(self, positions)
-        pressure, flow, entry, _ = self._sweep([self.load_state()], positions)
-        p, q = entry[0]
-        scale = self.source_flow / (q + self.source_admittance * p)
-        return pressure[:, 0] * scale, flow[:, 0] * scale
+        pressure, flow, entry, decay = self._sweep([self.load_state()], positions)
+        own, *drained = entry[:, 1] + self.source_admittance * entry[:, 0]
+        if not drained:
+            scale = self.source_flow / own
+            return pressure[:, 0] * scale, flow[:, 0] * scale
+        scale = (self.source_flow * decay - drained[0]) / own
+        return tuple((x[:, 0] * scale + x[:, 1]) / decay for x in (pressure, flow))
 
     def _sweep(self, states: list, positions: np.ndarray = ()) -> tuple[np.ndarray, ...]:
         """Carry m load states (p, q) up to x = 0: pressure and flow (S, m, F) at the positions,
         the pairs (m, 2, F) at x = 0, and the decay (F,) of the line.
 
         What is met at x is scaled so that dividing by the decay of the whole line would give it
-        in the scale of `states`.
+        in the scale of `states`. Where there are drains, one more state follows: what they alone
+        make of a load at rest.
         """
         count = len(self.s)
-        load = np.empty((len(states), 2, count), complex)
+        at, leaving = self.drains or ((), np.empty((0, count), complex))
+        load = np.zeros((len(states) + (self.drains is not None), 2, count), complex)
         for given, (p, q) in zip(load, states):
             given[0], given[1] = p, q
         values = np.empty((len(self.inserts), count), complex)
@@ -171,19 +171,21 @@ class Network:
         return _sweep(
             np.ascontiguousarray(self.series, complex),
             np.ascontiguousarray(self.shunt, complex),
-            np.array(self._plan(positions)),
+            np.array(self._plan(positions, at)),
             values,
             load,
+            np.ascontiguousarray(leaving, complex),
             len(positions),
         )
 
-    def _plan(self, positions: np.ndarray) -> list[tuple[int, int, float]]:
+    def _plan(self, positions: np.ndarray, drains: np.ndarray) -> list[tuple[int, int, float]]:
         """Steps (what, index, distance) from the load to x = 0, for `_sweep`."""
         starts = np.cumsum(self.lengths) - self.lengths
         starts, here = starts.tolist(), self.length
         # At one place inserts come before positions, the last of the list first.
         order = [(-float(x), 0, -k) for k, (x, _, _) in enumerate(self.inserts)]
         order += [(-float(x), 1, k) for k, x in enumerate(positions)]
+        order += [(-float(x), 2, k) for k, x in enumerate(drains)]
         order.sort()
         if order and (order[0][0] < -here * (1 + 1e-12) or order[-1][0] > 0.0):
             raise ValueError(f"a position lies outside the line of {here} m")
@@ -200,6 +202,8 @@ class Network:
             here = min(x, here)
             if what == 1:
                 plan.append((_RECORD, index, 0.0))
+            elif what == 2:
+                plan.append((_DRAIN, index, 0.0))
             elif what == 0:
                 kind = self.inserts[-index][1]
                 if kind not in ("shunt", "series"):
@@ -209,11 +213,11 @@ class Network:
         return plan
 
 
-_ENTER, _WALK, _RECORD, _SHUNT, _SERIES = range(5)
+_ENTER, _WALK, _RECORD, _SHUNT, _SERIES, _DRAIN = range(6)
 
 
 @njit(cache=True, error_model="numpy")
-def _sweep(series, shunt, plan, values, load, stops):
+def _sweep(series, shunt, plan, values, load, leaving, stops):
     """Follow `plan` at every frequency for every load state; see `Network._sweep`."""
     states, count = load.shape[0], load.shape[2]
     pressure = np.empty((stops, states, count), np.complex128)
@@ -226,6 +230,7 @@ def _sweep(series, shunt, plan, values, load, stops):
     for i in range(count):
         p[:], q[:] = load[:, 0, i], load[:, 1, i]
         gamma = zc = 0j
+        behind = 1.0 + 0j  # the factors taken out so far
         for n in range(len(plan)):
             what, index = int(plan[n, 0]), int(plan[n, 1])
             if what == _ENTER:
@@ -236,9 +241,15 @@ def _sweep(series, shunt, plan, values, load, stops):
                     f[m], b[m] = 0.5 * (p[m] + zq), 0.5 * (p[m] - zq)
             elif what == _WALK:
                 factors[n] = np.exp(-gamma * plan[n, 2])
+                behind *= factors[n]
                 for m in range(states):
                     b[m] *= factors[n] * factors[n]
                     p[m], q[m] = f[m] + b[m], (f[m] - b[m]) / zc
+            elif what == _DRAIN:
+                gone = leaving[index, i] * behind
+                q[-1] += gone
+                f[-1] += 0.5 * zc * gone
+                b[-1] -= 0.5 * zc * gone
             elif what == _SHUNT:
                 for m in range(states):
                     q[m] += values[index, i] * p[m]

@@ -14,24 +14,6 @@ from __future__ import annotations
 import numpy as np
 
 
-def respond(network, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pressure and flow (S, F) at `positions` (S,) of a `network` with drains."""
-    at, leaving = network.drains
-    basis = Basis(network, np.concatenate([positions, at]))
-    leaving = np.concatenate([np.zeros((len(positions), leaving.shape[1])), leaving])
-    a, b, c = basis.relation(leaving)
-    p, q = network.load_state()
-    scale = c / (a * p + b * q)
-    pressure, flow = basis.respond((scale * p, scale * q), leaving)
-    return pressure[: len(positions)], flow[: len(positions)]
-
-
-def relation(network) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """`Network.load_relation` with the drains."""
-    at, leaving = network.drains
-    return Basis(network, at).relation(leaving)
-
-
 class Basis:
     """Both solutions of `network` at `positions` (N,), among which flows may leave it.
 

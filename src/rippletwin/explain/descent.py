@@ -1,0 +1,52 @@
+"""The way down to a posterior mode, and the curvature there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rippletwin.explain.posterior import Posterior
+
+CONVERGED = 1e-2  # change of minus the log posterior: evidence is judged in whole units
+REACH = 1.5  # longest step of a coordinate, in prior standard deviations
+
+
+def descend(posterior: Posterior, theta: np.ndarray, max_steps: int):
+    """Levenberg-Marquardt: theta (P,) and minus the log posterior; sets the posterior's errors."""
+    prediction = posterior.predict(theta)
+    posterior.estimate_errors(prediction, theta)
+    value = posterior.objective(theta, prediction)
+    damping = 1e-2
+    for _ in range(max_steps):
+        r, jacobian = posterior.linearise(theta, prediction)
+        gradient, hessian = jacobian.T @ r, jacobian.T @ jacobian
+        scale = np.maximum(np.diag(hessian), 1e-6)
+        accepted = False
+        while damping < 1e6:
+            step = -np.linalg.solve(hessian + np.diag(damping * scale), gradient)
+            step = np.clip(step, -REACH, REACH)
+            new = theta + step
+            new_prediction = posterior.predict(new)
+            new_value = posterior.objective(new, new_prediction)
+            if new_value < value:
+                accepted = True
+                break
+            damping *= 6.0
+        if not accepted:
+            break
+        damping = max(damping / 8.0, 1e-9)
+        theta, prediction = new, new_prediction
+        posterior.estimate_errors(prediction, theta)
+        last, value = value, min(new_value, posterior.objective(theta, prediction))
+        if last - value < CONVERGED:
+            break
+    return theta, value
+
+
+def hessian(posterior: Posterior, theta: np.ndarray, prediction: np.ndarray) -> np.ndarray:
+    """Of minus the log posterior (P, P), to first order in the prediction."""
+    jacobian = posterior.linearise(theta, prediction)[1]
+    second = jacobian.T @ jacobian
+    # Shaft angles have no prior. Blind to the source they have no say either, hence the 1.
+    flat = ~posterior.prior
+    second[flat, flat] += 1.0 if posterior.source_free else 1e-9
+    return second
