@@ -56,7 +56,7 @@ def test_derivatives_equal_difference_quotients(hypothesis):
 @pytest.mark.parametrize("place", [1.3, 4.4, 7.7])
 def test_starts_at_the_effect_promise_most(place):
     """Of starts all along the line, from a good fit without the effect, the score test keeps one
-    within a sixteenth of the shortest wave of a volume of 0.4 cm3, whose place it is not told."""
+    within an eighth of the shortest wave of a volume of 0.4 cm3, whose place it is not told."""
     values = {"line_volume@position.position": place, "line_volume@position.volume": 4e-7}
     bench, observations, truth = make(np.random.default_rng(6), VOLUME, values, source=0.02)
     base = Twin(bench, observations)
@@ -70,7 +70,7 @@ def test_starts_at_the_effect_promise_most(place):
     kept = promising(base, Posterior(twin, observations), thetas)
     found = [twin.values(theta)["line_volume@position.position"] for theta in kept]
     assert len(kept) == PROMISING
-    assert min(abs(x - place) for x in found) < 1000 / 4000 / 16
+    assert min(abs(x - place) for x in found) < 1000 / 4000 / 8
 
 
 def test_whitened_residual_of_the_truth_has_unit_variance():

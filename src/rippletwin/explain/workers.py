@@ -9,6 +9,7 @@ from itertools import product
 from multiprocessing import get_context
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from rippletwin.explain.fit import Fit, Hypothesis, fit_hypothesis, refine
 from rippletwin.twin import Twin
@@ -96,17 +97,22 @@ class Workers:
 
 @contextmanager
 def workers(base: Twin, observations: Sequence, count: int) -> Iterator[Workers]:
-    """`Workers` with `count` processes; an interrupt ends them."""
-    if count < 2:
-        yield Workers(base, observations)
-        return
-    pool = ProcessPoolExecutor(
-        count, get_context("fork"), initializer=_prepare, initargs=(base, observations)
-    )
-    try:
-        yield Workers(base, observations, pool)
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+    """`Workers` with `count` processes; an interrupt ends them.
+
+    Linear algebra gets one thread in each: more of them wait for each other where the processes
+    already fill the machine.
+    """
+    with threadpool_limits(1):
+        if count < 2:
+            yield Workers(base, observations)
+            return
+        pool = ProcessPoolExecutor(
+            count, get_context("fork"), initializer=_prepare, initargs=(base, observations)
+        )
+        try:
+            yield Workers(base, observations, pool)
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
 
 
 _DATA: tuple = ()  # of a worker process: base twin and observations
