@@ -32,7 +32,7 @@ def weak(rig, hypothesis: Hypothesis, places: int) -> list[dict[str, float]]:
         prior = parameter.prior
         if prior.kind == "lognormal" and len(parameter.scan) == 1:
             return (WEAK,)
-        if prior.kind == "uniform":
+        if parameter.name == "position":
             share = (np.arange(places) + 0.5) / places
             return tuple(prior.coordinate(prior.centre + prior.scale * share))
         return parameter.scan
