@@ -98,6 +98,6 @@ def test_variation_of_constants_is_the_sweep():
     a, b, c = basis.relation(leaving)
     p, q = line.load_state()
     scale = c / (a * p + b * q)
-    pressure, _ = basis.respond((scale * p, scale * q), leaving)
+    pressure = basis.respond((scale * p, scale * q), leaving)
     line.drains = x, leaving
     np.testing.assert_allclose(line.pressure_at(x), pressure, rtol=1e-10)

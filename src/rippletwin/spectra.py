@@ -157,7 +157,7 @@ def reference_spectra(
     is kept, so that neighbours are almost independent.
     """
     samples = pressure.shape[1]
-    round_trip = 2 * sum(segment.delay for segment in rig.line)
+    round_trip = 2 * rig.delay
     wanted = max(ROUND_TRIPS * round_trip * sampling_rate_hz, 256)
     length = min(2 ** int(np.ceil(np.log2(wanted))), 2 ** int(np.log2(samples / 8)))
     window = np.hanning(length + 1)[:-1]

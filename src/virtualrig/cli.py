@@ -117,9 +117,12 @@ def _record(options: argparse.Namespace) -> None:
         raise RigError(f"{options.sealed}: field faults: no {', '.join(sorted(unknown))}")
     prepare(options.out, options.true_flow)
     work = partial(_record_point, options, known, rig)
-    with ProcessPoolExecutor(options.processes, get_context("fork")) as pool:
+    pool = ProcessPoolExecutor(options.processes, get_context("fork"))
+    try:
         for number, label in enumerate(pool.map(work, range(len(points)), points), 1):
             print(f"virtualrig: {number}/{len(points)} {label}", file=sys.stderr, flush=True)
+    finally:
+        pool.shutdown(cancel_futures=True)
     entries = [listed(point, options.flow_ripple and not point.faults) for point in points]
     write_sheet(options.out, known, entries)
 

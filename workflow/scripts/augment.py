@@ -8,10 +8,9 @@ from rippletwin import store
 from rippletwin.dataset import augment
 
 tell = start(snakemake)
-params, wildcards = snakemake.params, snakemake.wildcards
+params, revolutions = snakemake.params, int(snakemake.wildcards.revolutions)
 signals = store.load(snakemake.input.signals)
 recorded = store.load(snakemake.input.recorded)
-revolutions = int(wildcards.revolutions)
 for seed, path in enumerate(snakemake.output):
     samples, labels = augment(
         signals.signal.values,

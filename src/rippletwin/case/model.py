@@ -153,6 +153,11 @@ class Rig:
         """Length of the whole line, m."""
         return sum(segment.length for segment in self.line)
 
+    @property
+    def delay(self) -> float:
+        """Time of a wave from the pump to the load, s."""
+        return sum(segment.delay for segment in self.line)
+
 
 @dataclass(frozen=True)
 class Case:

@@ -44,7 +44,7 @@ def find(
     `recordings` as read, `observations` of them with all their orders, `early` and `late` of the
     halves of periodic ones. Any of them may be left out, and is not looked at then.
     """
-    delay = sum(segment.delay for segment in rig.line)
+    delay = rig.delay
     pressures = [o for o in observations if o.kind != "input_impedance"]
     reasons = [plateau(r, s, row) for r in recordings for s, row in _rows(rig, r)]
     reasons += [check(o) for o in pressures for check in (dead, duplicated, noiseless, growing)]

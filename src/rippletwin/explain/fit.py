@@ -89,8 +89,7 @@ def prepare(observations: Sequence, rig, highest_hz: float | None = None) -> lis
     dense spectrum twelve frequencies a resonance of the line: a model's error has the bandwidth of
     the line's own resonances, so that closer points are no further evidence.
     """
-    delay = sum(segment.length / segment.wave_speed for segment in rig.line)
-    spacing = 1.0 / (24.0 * delay)
+    spacing = 1.0 / (24.0 * rig.delay)
     prepared = []
     for o in observations:
         o = cut(o, highest_hz)

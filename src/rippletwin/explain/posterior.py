@@ -210,7 +210,7 @@ class Posterior:
             sds, taus = sds[source : source + 1], taus[smooth : smooth + 1]
         self.floor = min(self.floor, self.most)
 
-    def linearise(self, theta: np.ndarray, prediction: np.ndarray, besides: np.ndarray = ()):
+    def linearise(self, theta: np.ndarray, prediction: np.ndarray, besides=None):
         """Residual (N,) and its Jacobian (N, P) at the present errors, their covariance held.
 
         Of the N residuals 2 S F are the whitened ones, of unit variance; theta follows where it
@@ -222,7 +222,8 @@ class Posterior:
         else:
             moved = [self.predict(theta + STEP * e) for e in np.eye(len(theta))]
             slopes = (np.stack(moved) - prediction) / STEP
-        slopes = np.concatenate([slopes, *np.asarray(besides)[:, None]])
+        if besides is not None:
+            slopes = np.concatenate([slopes, besides])
         metric = self._metric(prediction)
         whitened = metric.apply(self._rotated - self._rotate(prediction))
         # The sum of squares is least over the source's error, so its gradient is that with the

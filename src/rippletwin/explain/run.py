@@ -139,7 +139,7 @@ def explain_observations(
             found.base.floor,
             detect.pull(found.base),
             detect.disagreement(single),
-            detect.drift(early, late, sum(segment.delay for segment in rig.line)),
+            detect.drift(early, late, rig.delay),
         )
         explanation = found.others[0] if _prefers_other(found) else found.best
         blind = locate.blind(pool, found)

@@ -28,7 +28,7 @@ never leave a wrong valley."""
 def first_states(posterior: Posterior, starts, tried: int) -> list:
     """(misfit, theta) to set out from, `tried`: the best of each start, then the best overall."""
     twin = posterior.twin
-    delays = [segment.length / segment.wave_speed for segment in twin.rig.line]
+    delays = [segment.delay for segment in twin.rig.line]
     longest = int(np.argmax(delays))
     speeds = [twin.index[f"wave_speed[{k + 1}]"] for k in range(len(delays))]
     # Every pair, or, where there are many starts already, all wave speeds together.

@@ -138,8 +138,9 @@ def work(job: dict) -> Fit:
         return refine(base, hypothesis, observations, [job["theta"]], free)
     if "fit" in job:
         twin, thetas = base.with_(effects=hypothesis), []
-        delay = sum(segment.delay for segment in base.rig.line)
-        places = int(np.ceil(PLACES * delay * max(o.frequency_hz[-1] for o in observations)))
+        places = int(
+            np.ceil(PLACES * base.rig.delay * max(o.frequency_hz[-1] for o in observations))
+        )
         starts = scan(base.rig, hypothesis)
         starts += [u for u in weak(base.rig, hypothesis, places) if u not in starts]
         for start in starts:

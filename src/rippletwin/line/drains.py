@@ -21,9 +21,8 @@ class Basis:
     """
 
     def __init__(self, network, positions: np.ndarray):
-        pressure, flow, entry, decay = network._sweep([(1.0, 0.0), (0.0, 1.0)], positions)
+        pressure, _, entry, decay = network._sweep([(1.0, 0.0), (0.0, 1.0)], positions)
         self.pressure = pressure.swapaxes(0, 1) / decay  # (2, N, F)
-        self.flow = flow.swapaxes(0, 1) / decay
         self.a, self.b = (entry[:, 1] + network.source_admittance * entry[:, 0]) / decay
         self.c = network.source_flow
         self._from_load = np.argsort(-np.asarray(positions))
@@ -38,11 +37,11 @@ class Basis:
         )
 
     def respond(self, load: tuple, leaving: np.ndarray):
-        """Pressure and flow (N, F) at the positions for the load's (p, q), each (F,)."""
+        """Pressure (N, F) at the positions for the load's (p, q), each (F,)."""
         first, second = self.pressure
         one = load[0] - self._beyond(leaving * second)
         two = load[1] + self._beyond(leaving * first)
-        return one * first + two * second, one * self.flow[0] + two * self.flow[1]
+        return one * first + two * second
 
     def _beyond(self, terms):
         """Sum over the places nearer the load, the own one too: there both sums cancel."""

@@ -61,7 +61,7 @@ class FullAmplitude:
             laws.append(np.array(own)[of])
 
         def stored(leaving):
-            pressure = basis.respond(law(*basis.relation(leaving)), leaving)[0]
+            pressure = basis.respond(law(*basis.relation(leaving)), leaving)
             flow = np.zeros_like(leaving)
             for own, (part, harmonic, samples) in zip(laws, self.recordings):
                 share = _share(own, pressure[:, part], harmonic, samples)
