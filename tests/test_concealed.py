@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from concealed import jail
 from concealed.commitments import digests
 from concealed.score import score
 from concealed.summary import Rate, failed, rate
+from virtualrig.conceal import NUMERICS, compared
 from virtualrig.draw import MIX, UNCERTAINTY, draw, generator, kinds
 from virtualrig.pump import Pump
 from virtualrig.rig import build
@@ -94,6 +96,18 @@ def test_flow_ripple_is_wrong_by_what_was_drawn():
     misfits = [np.linalg.norm(a - b * np.exp(-1j * order * x)) for x in angles]
     assert 0.01 <= d.truth["source_error"] <= 0.04
     assert min(misfits) / np.linalg.norm(b) == pytest.approx(d.truth["source_error"], rel=0.1)
+
+
+@pytest.mark.long
+def test_floor_is_what_the_wrong_pump_leaves(drawn):
+    """A true pump that is the sheet's leaves nothing, exactly; the one drawn leaves an error of the
+    size of its flow's, which a line's resonances turn into a few times more or less."""
+    d = next(d for d in drawn if d.truth["kind"] == "none" and len(d.points) == 1)
+    right = replace(d, seal=d.seal | {"pump": {}})
+    exact = compared(right, build(right.sheet, right.seal | {"numerics": NUMERICS}))
+    assert exact == {"change": 0.0, "floor": 0.0}
+    wrong = compared(d, build(d.sheet, d.seal | {"numerics": NUMERICS}))
+    assert d.truth["source_error"] / 5 < wrong["floor"] < 5 * d.truth["source_error"]
 
 
 def test_flow_into_a_constant_pressure_is_displacement_less_losses():

@@ -52,7 +52,7 @@ def conceal(drawn: Drawn, folder: Path, rng: np.random.Generator) -> dict:
         write_ripple(folder / ripple_name(point), *nominal_flow(drawn.sheet, point))
         entries.append(listed(point, with_ripple=True))
     write_sheet(folder, drawn.sheet, entries)
-    return drawn.truth | _compared(drawn, rig)
+    return drawn.truth | compared(drawn, rig)
 
 
 def driving(rig: Rig, point: Point):
@@ -79,8 +79,8 @@ def nominal_flow(sheet: dict, point: Point) -> tuple[np.ndarray, np.ndarray]:
     return 360 * np.arange(_ROWS) / _ROWS, np.fft.irfft(spectrum, n=_ROWS)
 
 
-def _compared(drawn: Drawn, rig: Rig) -> dict[str, float]:
-    """`change` and `floor` of `conceal`."""
+def compared(drawn: Drawn, rig: Rig) -> dict[str, float]:
+    """`change` and `floor` of `conceal`, by runs of the rig built from the drawn case."""
     points = [replace(point, seconds=0.0) for point in drawn.points]
 
     def ripple(which: Rig, point: Point, flow) -> np.ndarray:
