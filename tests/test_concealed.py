@@ -261,6 +261,7 @@ def verdict(kind, *claims, equivalents=()):
         "verdict": kind, "effects": list(claims), "equivalents": [list(e) for e in equivalents],
         "mismatch": {"present": bool(claims), "where": where}, "sentence": "",
         "fit": {"before": misfits, "after": misfits},
+        "without": [{"effect": "leak", "evidence": 20.0}],
     }  # fmt: skip
 
 
@@ -278,6 +279,7 @@ def test_right_name_place_and_interval():
     row = marked(truth(), verdict("named", claim("leak", conductance=(1.5, 2.5))))
     assert row["right"] and row["clean"] and row["in_place"] == [True] and failed(row) is None
     assert row["intervals"] == [True] and row["stated"] == [(0.9, True)]
+    assert row["evidence"] == [20.0]
     assert row["swallowed"] == pytest.approx(0.8)
     far = marked(truth(), verdict("named", claim("leak", position=(4.0, 4.5), conductance=(3, 4))))
     assert far["right"] and far["in_place"] == [False] and far["intervals"] == [False]

@@ -29,6 +29,7 @@ def score(truth: dict, verdict: dict, baselines: dict) -> dict:
         if not any(alike(claim["name"], effect["name"], classes) for effect in true)
     ]
     loud = verdict["verdict"] not in SILENT
+    evidence = {each["effect"]: each["evidence"] for each in verdict["without"]}
     before, after = baselines["nominal"], baselines["calibrated"]
     return {
         "kind": truth["kind"],
@@ -61,6 +62,7 @@ def score(truth: dict, verdict: dict, baselines: dict) -> dict:
             (claim["probability"], not any(claim["name"] == name for name in wrong))
             for claim in said
         ],
+        "evidence": [evidence.get(claim["name"]) for claim in said],
         "misfit_nominal": before,
         "misfit_calibrated": after,
         "misfit_corrected": baselines["corrected"],

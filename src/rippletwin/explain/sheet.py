@@ -27,7 +27,8 @@ class WithoutEffect:
     """A fit without one effect, the data sheet being free.
 
     effect     name of what was left out
-    misfit     relative, in sample
+    evidence   log evidence lost with it, the data sheet as stated
+    misfit     relative, in sample, the data sheet free
     parameter  the line's parameter that goes furthest from the sheet
     value, nominal   its values, `unit`
     pull       how far that is, in standard deviations as stated
@@ -35,6 +36,7 @@ class WithoutEffect:
     """
 
     effect: str
+    evidence: float
     misfit: float
     parameter: str
     value: float
@@ -56,15 +58,16 @@ def without_each(pool: Workers, base: Fit, accepted: Fit) -> tuple[WithoutEffect
         held = pool.fit([{"hypothesis": r, "starts": [in_common(accepted, r)]} for r in rests])
     limit = NEARLY * score(accepted, pool.observations).misfit
     found = []
-    for (effect, _), fit in zip(accepted.hypothesis, held):
-        fit = _free(fit, accepted, pool.observations)
+    for (effect, _), stated in zip(accepted.hypothesis, held):
+        fit = _free(stated, accepted, pool.observations)
         misfit = score(fit, pool.observations).misfit
-        stated = coordinates(pool.base.parameters, fit.twin.values())
-        pull, name = detect.pull(replace(fit, twin=pool.base.with_(theta=stated)))
+        theta = coordinates(pool.base.parameters, fit.twin.values())
+        pull, name = detect.pull(replace(fit, twin=pool.base.with_(theta=theta)))
         parameter = pool.base.parameters[pool.base.index[name]]
         found.append(
             WithoutEffect(
                 effect=effect.name,
+                evidence=accepted.evidence - stated.evidence,
                 misfit=misfit,
                 parameter=parameter.name,
                 value=fit.twin.values()[parameter.name],
