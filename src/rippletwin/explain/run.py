@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -85,15 +87,11 @@ def explain(
             "none has state: healthy",
             "explaining needs at least one healthy recording",
         )
-    observations, early, late = [], [], []
-    for recording in case.healthy:
-        if recording.kind == "periodic":
-            whole, first, second = _periodic(recording, case.rig)
-            observations.append(whole)
-            early.append(first)
-            late.append(second)
-        else:
-            observations.append(observe(recording, case.rig, HIGHEST_HZ))
+    # Linear algebra on large arrays: threads suffice.
+    with ThreadPoolExecutor(max(processes, 1)) as pool:
+        read = list(pool.map(partial(_observed, rig=case.rig), case.healthy))
+    observations = [parts[0] for parts in read]
+    early, late = ([parts[k] for parts in read if len(parts) > 1] for k in (1, 2))
     reason = contradiction.find(case.rig, case.healthy, observations, early, late)
     return explain_observations(
         case.rig, observations, early, late, processes, progress, reason, draws
@@ -207,8 +205,11 @@ def _alone(pool: Workers, base: Fit) -> list[Fit]:
     )
 
 
-def _periodic(recording, rig):
-    """Observations of a periodic recording: whole, first half, second half of its revolutions."""
+def _observed(recording, rig) -> list:
+    """The observation of a recording; of a periodic one then those of both halves of its
+    revolutions."""
+    if recording.kind != "periodic":
+        return [observe(recording, rig, HIGHEST_HZ)]
     revolutions = revolutions_of(recording, rig)
     count = len(revolutions.windows)
     cuts = [slice(None), slice(0, count // 2), slice(count // 2, None)]
