@@ -18,6 +18,7 @@ from concealed.score import score
 from concealed.summary import Rate, failed, rate
 from virtualrig.conceal import NUMERICS, compared
 from virtualrig.draw import MIX, UNCERTAINTY, draw, generator, kinds
+from virtualrig.draw_effects import Bare, load_dynamics
 from virtualrig.pump import Pump
 from virtualrig.rig import build
 from virtualrig.seal import new_key, open_seal, seal
@@ -74,6 +75,16 @@ def test_nominal_values_are_off_by_their_stated_uncertainty(drawn):
             pulls[d.truth["kind"] == "off"].append(pull)
     assert np.std(pulls[False]) == pytest.approx(0.95, abs=0.2)
     assert (np.abs(pulls[True]) >= 2).all() and (np.abs(pulls[True]) <= 3).all()
+
+
+def test_drawn_valves_feed_the_line_at_no_frequency():
+    """The real part of flow over pressure is positive at all frequencies, by evaluation, also of
+    the strongest; an active valve may chatter instead of settling into a ripple."""
+    ratio = np.linspace(0.01, 10.0, 5000)  # of the valve's own frequency
+    for k in range(300):
+        valve = load_dynamics(Bare(np.random.default_rng(k), [], 2, 870.0, 1.5e9, 1e-3, 1e7), 1.0)
+        gain, damping = valve.arguments["gain"], valve.arguments["damping"]
+        assert np.min((0.5 + gain / (1 - ratio**2 + 2j * damping * ratio)).real) > 0.0
 
 
 def test_flow_ripple_is_wrong_by_what_was_drawn():

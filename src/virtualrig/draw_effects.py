@@ -13,6 +13,8 @@ import numpy as np
 AT_LEAST = 0.2
 """Metres that a place keeps from joints, ends and other places: short pipes cost small steps."""
 
+PASSIVE = 0.9  # of the gain at which a valve begins to feed the line at some frequency
+
 
 @dataclass(frozen=True)
 class Concealed:
@@ -178,6 +180,9 @@ def source_impedance(bare: Bare, level: float) -> Concealed:
 def load_dynamics(bare: Bare, level: float) -> Concealed:
     gain = bare.between(0.03, 2.0, level)
     frequency, damping = bare.log_uniform(100.0, 1200.0), bare.log_uniform(0.2, 0.8)
+    # A valve that feeds the line may chatter, and nothing is periodic then. The real part of its
+    # 1/2 + gain H is least above resonance, by gain/(4 damping (1 + damping)).
+    gain = min(gain, PASSIVE * 2 * damping * (1 + damping))
     return Concealed(
         "load_dynamics",
         "load",
