@@ -9,7 +9,7 @@ from explain_made import make, rig
 from rippletwin.case import Uncertainty
 from rippletwin.effects import EFFECTS, Place
 from rippletwin.explain.fit import prepare, refine
-from rippletwin.explain.sheet import _free, loosened, without_each
+from rippletwin.explain.sheet import freed, loosened, without_each
 from rippletwin.explain.workers import Workers
 from rippletwin.twin import Twin
 
@@ -37,7 +37,7 @@ def test_air_at_one_pressure_is_a_slower_wave():
     (base,) = pool.fit([{"hypothesis": ()}])
     (found,) = without_each(pool, base, fit)
     assert found.effect == "entrained_air" and found.rivals
-    free = _free(base, fit, pool.observations).twin.values()
+    free = freed(pool, [base], fit)[0].twin.values()
     with_air = fit.twin.values()
     fraction, n = (v for p, v in with_air.items() if p.startswith("entrained_air"))
     pressure = PRESSURE + ATMOSPHERE

@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields, replace
 
 from rippletwin.case import Rig, Uncertainty
 from rippletwin.explain import detect
-from rippletwin.explain.fit import Fit, refine
+from rippletwin.explain.fit import Fit
 from rippletwin.explain.validate import score
 from rippletwin.explain.workers import Workers, in_common
 from rippletwin.parameters import coordinates
@@ -58,8 +58,7 @@ def without_each(pool: Workers, base: Fit, accepted: Fit) -> tuple[WithoutEffect
         held = pool.fit([{"hypothesis": r, "starts": [in_common(accepted, r)]} for r in rests])
     limit = NEARLY * score(accepted, pool.observations).misfit
     found = []
-    for (effect, _), stated in zip(accepted.hypothesis, held):
-        fit = _free(stated, accepted, pool.observations)
+    for (effect, _), stated, fit in zip(accepted.hypothesis, held, freed(pool, held, accepted)):
         misfit = score(fit, pool.observations).misfit
         theta = coordinates(pool.base.parameters, fit.twin.values())
         pull, name = detect.pull(replace(fit, twin=pool.base.with_(theta=theta)))
@@ -80,19 +79,27 @@ def without_each(pool: Workers, base: Fit, accepted: Fit) -> tuple[WithoutEffect
     return tuple(found)
 
 
-def _free(held: Fit, accepted: Fit, observations: Sequence) -> Fit:
-    """`held` fitted again with a sheet that is hardly known."""
-    old = held.twin
-    base = Twin(
-        loosened(old.rig),
-        observations,
-        friction=old.friction,
-        source_sd=old.source_sd,
-        guessed_load=old.guessed_load,
-    )
-    parameters = base.with_(effects=held.hypothesis).parameters
-    starts = [coordinates(parameters, twin.values()) for twin in (old, accepted.twin)]
-    return refine(base, held.hypothesis, observations, starts, held.source_free)
+def freed(pool: Workers, held: Sequence[Fit], accepted: Fit) -> list[Fit]:
+    """Each of `held` fitted again with a sheet that is hardly known, from where it is and from
+    where `accepted` is: the one that misfits less, for that is what it is asked for."""
+    jobs = []
+    for fit in held:
+        old = fit.twin
+        base = Twin(
+            loosened(old.rig),
+            pool.observations,
+            friction=old.friction,
+            source_sd=old.source_sd,
+            guessed_load=old.guessed_load,
+        )
+        parameters = base.with_(effects=fit.hypothesis).parameters
+        for twin in (old, accepted.twin):
+            theta = coordinates(parameters, twin.values())
+            jobs.append({"base": base, "hypothesis": fit.hypothesis, "theta": theta})
+            jobs[-1]["source_free"] = fit.source_free
+    fits = pool.fit(jobs)
+    misfits = [score(fit, pool.observations).misfit for fit in fits]
+    return [fits[k + int(misfits[k + 1] < misfits[k])] for k in range(0, len(fits), 2)]
 
 
 def loosened(rig: Rig) -> Rig:
