@@ -37,7 +37,7 @@ def test_air_at_one_pressure_is_a_slower_wave():
     (base,) = pool.fit([{"hypothesis": ()}])
     (found,) = without_each(pool, base, fit)
     assert found.effect == "entrained_air" and found.rivals
-    free = freed(pool, [base], fit)[0].twin.values()
+    free = freed(pool, [base], fit)[0][1].twin.values()
     with_air = fit.twin.values()
     fraction, n = (v for p, v in with_air.items() if p.startswith("entrained_air"))
     pressure = PRESSURE + ATMOSPHERE

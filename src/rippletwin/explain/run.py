@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from rippletwin.case import Case
 from rippletwin.effects import candidates
@@ -87,8 +88,8 @@ def explain(
             "none has state: healthy",
             "explaining needs at least one healthy recording",
         )
-    # Linear algebra on large arrays: threads suffice.
-    with ThreadPoolExecutor(max(processes, 1)) as pool:
+    # Linear algebra on large arrays: threads suffice, each with one of its own.
+    with threadpool_limits(1), ThreadPoolExecutor(max(processes, 1)) as pool:
         read = list(pool.map(partial(_observed, rig=case.rig), case.healthy))
     observations = [parts[0] for parts in read]
     early, late = ([parts[k] for parts in read if len(parts) > 1] for k in (1, 2))

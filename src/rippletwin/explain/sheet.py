@@ -58,8 +58,8 @@ def without_each(pool: Workers, base: Fit, accepted: Fit) -> tuple[WithoutEffect
         held = pool.fit([{"hypothesis": r, "starts": [in_common(accepted, r)]} for r in rests])
     limit = NEARLY * score(accepted, pool.observations).misfit
     found = []
-    for (effect, _), stated, fit in zip(accepted.hypothesis, held, freed(pool, held, accepted)):
-        misfit = score(fit, pool.observations).misfit
+    free = freed(pool, held, accepted)
+    for (effect, _), stated, (misfit, fit) in zip(accepted.hypothesis, held, free):
         theta = coordinates(pool.base.parameters, fit.twin.values())
         pull, name = detect.pull(replace(fit, twin=pool.base.with_(theta=theta)))
         parameter = pool.base.parameters[pool.base.index[name]]
@@ -79,9 +79,9 @@ def without_each(pool: Workers, base: Fit, accepted: Fit) -> tuple[WithoutEffect
     return tuple(found)
 
 
-def freed(pool: Workers, held: Sequence[Fit], accepted: Fit) -> list[Fit]:
-    """Each of `held` fitted again with a sheet that is hardly known, from where it is and from
-    where `accepted` is: the one that misfits less, for that is what it is asked for."""
+def freed(pool: Workers, held: Sequence[Fit], accepted: Fit) -> list[tuple[float, Fit]]:
+    """(misfit, fit) of each of `held` fitted again with a sheet that is hardly known, from where
+    it is and from where `accepted` is: the one that misfits less, for that is what is asked."""
     jobs = []
     for fit in held:
         old = fit.twin
@@ -93,13 +93,13 @@ def freed(pool: Workers, held: Sequence[Fit], accepted: Fit) -> list[Fit]:
             guessed_load=old.guessed_load,
         )
         parameters = base.with_(effects=fit.hypothesis).parameters
-        for twin in (old, accepted.twin):
-            theta = coordinates(parameters, twin.values())
-            jobs.append({"base": base, "hypothesis": fit.hypothesis, "theta": theta})
-            jobs[-1]["source_free"] = fit.source_free
-    fits = pool.fit(jobs)
-    misfits = [score(fit, pool.observations).misfit for fit in fits]
-    return [fits[k + int(misfits[k + 1] < misfits[k])] for k in range(0, len(fits), 2)]
+        job = {"base": base, "hypothesis": fit.hypothesis, "source_free": fit.source_free}
+        jobs += [
+            {**job, "theta": coordinates(parameters, twin.values())}
+            for twin in (old, accepted.twin)
+        ]
+    found = [(score(fit, pool.observations).misfit, fit) for fit in pool.fit(jobs)]
+    return [min(pair, key=lambda f: f[0]) for pair in zip(found[::2], found[1::2])]
 
 
 def loosened(rig: Rig) -> Rig:

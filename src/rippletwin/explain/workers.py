@@ -126,10 +126,10 @@ def _prepare(base, observations):
 def work(job: dict) -> Fit:
     """Fit `hypothesis` to the observations with the indices `use` (all by default).
 
-    `base` takes the place of the pool's base twin where the sheet is another.
-    With `theta` from there; with `fit` from where that ended and the newest effect's starts, as
-    strong as its prior and weak; else by continuation from the starts `starts` or the newest
-    effect's scan; `source_free` and `draws` as in `fit_hypothesis`.
+    `base` takes the place of the pool's, as where the sheet is another. With `theta` from there;
+    with `fit` from where that ended and the newest effect's starts, as strong as its prior and
+    weak; else by continuation from the starts `starts` or the newest effect's scan; `source_free`
+    and `draws` as in `fit_hypothesis`.
     """
     base, observations = _DATA
     base = job.get("base", base)
