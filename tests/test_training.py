@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 import torch
@@ -104,11 +107,13 @@ def test_too_few_epochs_are_not_called_converged():
 
 
 def test_a_plateau_at_chance_is_not_convergence():
-    """A network that learns nothing (silent inputs) stops, and is not called converged."""
+    """A network that learns nothing (silent inputs) stops, is not called converged, and its history
+    can be written: one such training must not take a run down."""
     x, y = np.zeros((40, 1, 3072), dtype=np.float32), np.repeat(np.arange(4), 10)
     settings = TrainingSettings(max_epochs=30, plateau=3)
     _, history = train(build("cnn1d_341_100", 1), x, y, settings, 0)
     assert history.reason == "plateau" and not history.converged
+    assert json.loads(json.dumps(asdict(history)))["converged"] is False
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ lowest validation loss are kept.
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -108,7 +109,7 @@ def train(
             progress(epoch, history)
         reason = stopping_reason(history.validation_loss, settings)
         if reason:
-            guessing = np.log(len(np.unique(y)))
+            guessing = math.log(len(np.unique(y)))  # numpy's scalars do not go into JSON
             learned = history.validation_loss[history.best_epoch] < guessing / 2
             history.converged, history.reason = reason == "target" or learned, reason
             break
