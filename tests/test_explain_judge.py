@@ -27,8 +27,12 @@ def fit(evidence, *hypothesis):
     return Fit(hypothesis, None, 0.0, evidence, None, 0.004, 0.01, 0.01)
 
 
-def validation(after, disagreement=1.0):
-    scores = [{"held_out": Score(m, 0.5 * m)} for m in (0.02, after)]
+def validation(after, disagreement=1.0, in_sample=0.01):
+    """Of 2 % both in sample and held out, `in_sample` and `after` are left."""
+    scores = [
+        {"held_out": Score(m, 0.5 * m), "in_sample": Score(n, 0.5 * n)}
+        for m, n in ((0.02, 0.02), (after, in_sample))
+    ]
     return Validation(*scores, ("recording 1",), disagreement)
 
 
@@ -45,6 +49,24 @@ def test_an_explanation_must_hold_where_it_was_not_fitted(gain, after, verdict):
     found = judge(Search(base, [best], best), QUIET, validation(after))
     assert found.verdict == verdict
     assert found.accepted is (base if verdict == "consistent" else best)
+
+
+@pytest.mark.parametrize(
+    ("in_sample", "after", "floor", "verdict"),
+    [
+        (0.021, 0.03, 0.004, "calibration_only"),
+        (0.019, 0.03, 0.004, "unexplained"),  # it fits something: the data speak for it
+        (0.021, 0.03, 0.03, "unexplained"),  # the line alone does not fit either
+    ],
+)
+def test_an_explanation_that_fits_nothing_better_speaks_of_the_sheet(
+    in_sample, after, floor, verdict
+):
+    """Evidence above SURE that comes from the priors alone: the nominal values are off."""
+    base, best = replace(fit(0.0), floor=floor), fit(SURE + 10, HOSE)
+    found = judge(Search(base, [best], best), QUIET, validation(after, in_sample=in_sample))
+    assert found.verdict == verdict
+    assert found.accepted is (base if verdict == "calibration_only" else best)
 
 
 @pytest.mark.parametrize(("large", "small"), [(LARGE, SMALL), (VOLUME, END)])

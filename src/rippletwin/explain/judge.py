@@ -66,6 +66,9 @@ def judge(
     if fails and search.base.floor <= GOOD and search.gain(best) < SURE:
         # A line that fits without it, and data left out that speak against it: an absorber.
         return _nothing_missing(search.base, alarms)
+    if fails and search.base.floor <= GOOD and not validation.gains:
+        # Nor does it fit anything better: the data sheet alone speaks for it, and that may be off.
+        return _nothing_missing(search.base, alarms, "calibration_only")
     if best.floor > ADEQUATE or fails:
         # Without a name it is modelled all the same, by whatever describes the data best.
         stands_in = other is not None and other.evidence > best.evidence
@@ -74,12 +77,12 @@ def judge(
     return Judgement("ambiguous" if classes else "named", best, classes)
 
 
-def _nothing_missing(base: Fit, alarms: Alarms) -> Judgement:
-    """The line alone, if no alarm says that it does not fit."""
+def _nothing_missing(base: Fit, alarms: Alarms, verdict: str = "consistent") -> Judgement:
+    """The line alone, if no alarm says that it does not fit; `verdict` where none rings."""
     if "misfit" in alarms.ringing or "drift" in alarms.ringing:
         return Judgement("unexplained", base)
     calibrated = {"pull", "disagreement"} & set(alarms.ringing)
-    return Judgement("calibration_only" if calibrated else "consistent", base)
+    return Judgement("calibration_only" if calibrated else verdict, base)
 
 
 def needed_over(best: Fit, search: Search) -> float:

@@ -54,6 +54,15 @@ class Validation:
         before, after = (which["held_out"].misfit for which in (self.before, self.after))
         return after < LITTLE * before or (after < before and self.disagreement < AGREE)
 
+    @property
+    def gains(self) -> bool:
+        """Whether the explanation fits better than the base anywhere, in sample or held out.
+
+        What does not, and has log evidence all the same, only spares the line's numbers a way from
+        the data sheet.
+        """
+        return any(self.after[k].misfit < self.before[k].misfit for k in ("in_sample", "held_out"))
+
 
 def score(fit: Fit, observations: Sequence, turn: bool = False) -> Score:
     """Misfits of a fit's predictions; free sources get their most likely amplitude.

@@ -235,7 +235,8 @@ def sentence(e: Explanation, result: dict, found: list[dict], base) -> str:
         )
     if "drift" in e.alarms.ringing:
         words.append(f"Early and late windows of {e.alarms.drift[1]} differ: the state drifted.")
-    if "pull" in e.alarms.ringing and not e.judgement.accepted.hypothesis:
+    told = "pull" in e.alarms.ringing or kind == "calibration_only"
+    if told and not e.judgement.accepted.hypothesis:
         size, name = e.alarms.pull
         words.append(f"{name} is {size:.1f} standard deviations from the data sheet.")
     pulled = detect.pull(e.judgement.accepted)
