@@ -2,6 +2,8 @@
 
 from types import SimpleNamespace
 
+import pytest
+
 from rippletwin.explain.verdict import sentence
 
 
@@ -18,3 +20,21 @@ def test_shaft_orders_alone_need_no_effect_of_the_line():
     words = sentence(e, result, [], None)
     assert "pistons' harmonics the twin lacks nothing" in words
     assert "2.0% of the ripple show piston spread" in words
+
+
+@pytest.mark.parametrize(
+    ("ringing", "told"), [((), True), (("pull",), True), (("disagreement",), False)]
+)
+def test_calibration_only_names_the_value_that_is_off(ringing, told):
+    """The value furthest from the data sheet, unless points disagree rather than the sheet."""
+    e = SimpleNamespace(
+        shaft=None,
+        alarms=SimpleNamespace(ringing=ringing, pull=(2.9, "diameter[4]")),
+        judgement=SimpleNamespace(accepted=SimpleNamespace(hypothesis=())),
+    )
+    e.judgement.accepted.twin = SimpleNamespace(parameters=(), theta=())
+    misfits = {"before": {"held_out": 0.01}, "after": {"held_out": 0.01}}
+    result = {"verdict": "calibration_only", "fit": misfits, "next_recording": None}
+    words = sentence(e, result, [], None)
+    assert words.startswith("The line's nominal values are off")
+    assert ("diameter[4] is 2.9 standard deviations from the data sheet" in words) is told

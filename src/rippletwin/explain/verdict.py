@@ -235,7 +235,9 @@ def sentence(e: Explanation, result: dict, found: list[dict], base) -> str:
         )
     if "drift" in e.alarms.ringing:
         words.append(f"Early and late windows of {e.alarms.drift[1]} differ: the state drifted.")
-    told = "pull" in e.alarms.ringing or kind == "calibration_only"
+    # Without an alarm `calibration_only` rests on the sheet; disagreeing points are another cause.
+    off_the_sheet = kind == "calibration_only" and not e.alarms.ringing
+    told = "pull" in e.alarms.ringing or off_the_sheet
     if told and not e.judgement.accepted.hypothesis:
         size, name = e.alarms.pull
         words.append(f"{name} is {size:.1f} standard deviations from the data sheet.")
