@@ -25,6 +25,7 @@ import numpy as np
 from rippletwin.case import FlowRipple, Fluid, Load, Rig, Segment, Sensor
 from rippletwin.effects import candidates
 from rippletwin.explain.fit import refine
+from rippletwin.explain.intervals import effects_own, intervals
 from rippletwin.explain.judge import span
 from rippletwin.explain.run import explain_observations
 from rippletwin.explain.search import library
@@ -168,6 +169,7 @@ def run_case(number: int, kind: str) -> dict:
         "base_floor": e.search.base.floor,
         "floor": e.search.best.floor,
         "folds": e.validation.disagreement,
+        "held": held(truth, accepted),
         "z": z_scores(truth, accepted),
         "z_line": z_scores(truth, accepted, line=True),
         "held_out": [v["fit"][k]["held_out"] for k in ("before", "after")],
@@ -178,8 +180,6 @@ def run_case(number: int, kind: str) -> dict:
 
 def placed(rig, truth, e) -> bool | None:
     """Whether a named true effect is at its place; None where no true effect was named."""
-    from rippletwin.explain.judge import intervals
-
     own = {}
     for effect, place, values in truth.effect_values(truth.theta):
         own[effect.name] = (place, values)
@@ -195,6 +195,18 @@ def placed(rig, truth, e) -> bool | None:
         else:
             results.append(place.element == entry["place"].element)
     return all(results) if results else None
+
+
+def held(truth, accepted) -> list[bool]:
+    """Whether the 95 % intervals of the effects' parameters hold the truth."""
+    found = []
+    for _, _, own in effects_own(accepted.twin):
+        for k in own:
+            name = accepted.twin.parameters[k].name
+            if name in truth.index:
+                low, high = accepted.interval(k)
+                found.append(low <= truth.theta[truth.index[name]] <= high)
+    return found
 
 
 def z_scores(truth, accepted, line=False) -> dict:
@@ -242,11 +254,13 @@ def summary(rows: list[dict]) -> str:
         folds = sorted((r["folds"] for r in seen if r["right"]), reverse=True)
         lines.append("  folds' disagreement where right: " + _row(folds[:8]))
         good = [r for r in seen if len(r["right"]) == len(r["truth"]) and not r["wrong"]]
+        inside = [x for r in good for x in r["held"]]
+        lines.append(f"  intervals of effects that hold the truth: {sum(inside)} of {len(inside)}")
         for key in ("z", "z_line"):
             z = np.array([x for r in good for x in r[key].values()])
             if len(z):
                 lines.append(
-                    f"  {key}: {np.mean(np.abs(z) < 1.96):.1%} of {len(z)} within 95 % intervals, "
+                    f"  {key}: {np.mean(np.abs(z) < 1.96):.1%} of {len(z)} within 1.96 deviations, "
                     f"rms {np.sqrt(np.mean(np.clip(z, -9, 9) ** 2)):.2f}"
                 )
         ratio = [r["held_out"][1] / r["truth_misfit"] for r in good]

@@ -24,7 +24,7 @@ from virtualrig.rig import build
 
 NO_VALUES = {"piston_spread", "speed_fluctuation"}  # the bench's and the twin's differ
 LEFT = 0.004  # harmonics above those observed, which the orifice couples with them
-LEFT_OF_AIR = 0.02  # air does so all along the line, and the twin follows them to twice the highest
+LEFT_OF_AIR = 0.008  # air does so all along the line: those above thrice the highest are left out
 QUICK = ("entrained_air", "viscoelastic_wall", "leak")
 SLOW = tuple(name for name in LIBRARY if name not in NO_VALUES and name not in QUICK)
 STRENGTH = 0.7  # from invisible to plain

@@ -22,7 +22,7 @@ from rippletwin.line.storage import FullAmplitude
 from rippletwin.orifice import Orifice
 
 ROUGH = 1e-4  # of the pressure at an orifice, while the line's storage is known to less
-ABOVE = 2.0  # times the highest harmonic observed: those that reach it by way of the line
+ABOVE = 3.0  # times the highest harmonic observed: those that reach it by way of the line
 
 
 def flow_harmonics(ripple: FlowRipple, orders: np.ndarray) -> np.ndarray:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from rippletwin.explain.posterior import Posterior
@@ -10,21 +12,31 @@ CONVERGED = 1e-2  # change of minus the log posterior: evidence is judged in who
 REACH = 1.5  # longest step of a coordinate, in prior standard deviations
 
 
-def descend(posterior: Posterior, theta: np.ndarray, max_steps: int):
-    """Levenberg-Marquardt: theta (P,) and minus the log posterior; sets the posterior's errors."""
+def descend(
+    posterior: Posterior,
+    theta: np.ndarray,
+    max_steps: int,
+    held: Sequence[int] = (),
+    errors: bool = True,
+):
+    """Levenberg-Marquardt: theta (P,) and minus the log posterior. Parameters with the indices
+    `held` stay; the posterior's errors are estimated on the way unless `errors` is false."""
+    free = np.setdiff1d(np.arange(len(theta)), held)
     prediction = posterior.predict(theta)
-    posterior.estimate_errors(prediction, theta)
+    if errors:
+        posterior.estimate_errors(prediction, theta)
     value = posterior.objective(theta, prediction)
     damping = 1e-2
     for _ in range(max_steps):
         r, jacobian = posterior.linearise(theta, prediction)
+        jacobian = jacobian[:, free]
         gradient, hessian = jacobian.T @ r, jacobian.T @ jacobian
         scale = np.maximum(np.diag(hessian), 1e-6)
         accepted = False
         while damping < 1e6:
             step = -np.linalg.solve(hessian + np.diag(damping * scale), gradient)
-            step = np.clip(step, -REACH, REACH)
-            new = theta + step
+            new = theta.copy()
+            new[free] += np.clip(step, -REACH, REACH)
             new_prediction = posterior.predict(new)
             new_value = posterior.objective(new, new_prediction)
             if new_value < value:
@@ -35,7 +47,8 @@ def descend(posterior: Posterior, theta: np.ndarray, max_steps: int):
             break
         damping = max(damping / 8.0, 1e-9)
         theta, prediction = new, new_prediction
-        posterior.estimate_errors(prediction, theta)
+        if errors:
+            posterior.estimate_errors(prediction, theta)
         last, value = value, min(new_value, posterior.objective(theta, prediction))
         if last - value < CONVERGED:
             break

@@ -17,7 +17,7 @@ with H the Hessian in the same coordinates, priors included.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -35,6 +35,7 @@ TRIED = (8, 24)  # starts from which Levenberg-Marquardt sets out, with few and 
 KEPT = ((4, 2, 1), (8, 4, 1))  # carried on after the first, the second and every later limit
 STEPS = (12, 8, 6)  # most steps below the first, second and later limits; the last may take more
 LAST_STEPS = 30
+ROUNDS, SETTLED = 4, 0.2  # of descents with new derivatives, and what the last may still gain
 
 Hypothesis = tuple[tuple[Effect, Place], ...]
 """The effects that a twin has, each at its place; () is the paper's line."""
@@ -50,6 +51,9 @@ class Fit:
     covariance   (P, P) of theta
     floor, source_sd, smooth_sd   estimated relative errors (see `Posterior`)
     source_free  which of the two likelihoods
+    stores       whether the line stores something beyond proportion to the pressure
+    ends         of parameters, by index: the ends of their 95 % intervals in theta's coordinates,
+                 where more is known of them than the covariance (`rippletwin.explain.intervals`)
     """
 
     hypothesis: Hypothesis
@@ -61,11 +65,18 @@ class Fit:
     source_sd: float
     smooth_sd: float
     source_free: bool = False
+    stores: bool = False
+    ends: Mapping[int, tuple[float, float]] = field(default_factory=dict, repr=False)
 
     @property
     def sd(self) -> np.ndarray:
         """(P,) posterior standard deviations in theta's coordinates."""
         return np.sqrt(np.diag(self.covariance))
+
+    def interval(self, k: int) -> tuple[float, float]:
+        """95 % interval of parameter k, in theta's coordinates."""
+        reach = 1.96 * self.sd[k]
+        return self.ends.get(k, (self.twin.theta[k] - reach, self.twin.theta[k] + reach))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -165,8 +176,8 @@ def fit_hypothesis(
 def refine(
     base: Twin, hypothesis: Hypothesis, observations, thetas: Sequence, source_free=False
 ) -> Fit:
-    """Fit on all frequencies from starts theta (P,), where good ones are known: one alone, or many
-    that differ in their newest effect."""
+    """Fit on all frequencies from starts theta (P,), where good ones are known: one alone, whose
+    mode is then found exactly, or many that differ in their newest effect."""
     twin = base.with_(effects=hypothesis)
     posterior = Posterior(twin, observations, None, source_free)
     thetas = [np.asarray(theta, dtype=float) for theta in thetas]
@@ -177,7 +188,7 @@ def refine(
         posterior.forward.hold_storage = True
     fits = [descend(posterior, theta, LAST_STEPS) for theta in thetas]
     best = min(fits, key=lambda f: f[1])[0]
-    return conclude(posterior, hypothesis, _followed(posterior, best))
+    return conclude(posterior, hypothesis, _followed(posterior, best, ROUNDS * (len(fits) == 1)))
 
 
 def _without_storage(twin: Twin, observations, limit: float, source_free: bool) -> Posterior:
@@ -187,10 +198,20 @@ def _without_storage(twin: Twin, observations, limit: float, source_free: bool) 
     return posterior
 
 
-def _followed(posterior: Posterior, theta: np.ndarray) -> np.ndarray:
-    """The mode near theta, where that was held: now it is followed."""
+def _followed(posterior: Posterior, theta: np.ndarray, rounds: int = 0) -> np.ndarray:
+    """The mode near theta, where that was held: now it is followed, and in so many `rounds` at most
+    by derivatives too."""
     posterior.forward.hold_storage = False
-    return descend(posterior, theta, LAST_STEPS)[0] if posterior.forward.stores else theta
+    if not posterior.forward.stores:
+        return theta
+    theta, value = descend(posterior, theta, LAST_STEPS)
+    for _ in range(rounds):
+        posterior.follow(theta)
+        last = value
+        theta, value = descend(posterior, theta, LAST_STEPS)
+        if last - value < SETTLED:
+            break
+    return theta
 
 
 def conclude(posterior: Posterior, hypothesis: Hypothesis, theta: np.ndarray) -> Fit:
@@ -210,6 +231,7 @@ def conclude(posterior: Posterior, hypothesis: Hypothesis, theta: np.ndarray) ->
         posterior.source_sd,
         posterior.smooth_sd,
         posterior.source_free,
+        posterior.forward.stores,
     )
 
 

@@ -148,27 +148,6 @@ def probabilities(search: Search, accepted: Fit) -> dict[str, float]:
     }
 
 
-def intervals(fit: Fit) -> list[dict]:
-    """Each effect with its place and its parameters' values and 95 % intervals.
-
-    An effect without parameters of its own works through the fluid's viscosity, which stands in.
-    """
-    twin, sd, found = fit.twin, fit.sd, []
-    for effect, place in fit.hypothesis:
-        label = f"{effect.name}@{place}"
-        own = [k for k, p in enumerate(twin.parameters) if p.place == label]
-        own = own or [twin.index["viscosity"]]
-        parameters = {}
-        for k in own:
-            p, u = twin.parameters[k], twin.theta[k]
-            ends = sorted(float(p.value(u + side * 1.96 * sd[k])) for side in (-1, 1))
-            name = p.name.split(".")[-1]
-            name = "kinematic_viscosity" if name == "viscosity" else name
-            parameters[name] = {"value": float(p.value(u)), "ci95": ends, "unit": p.unit}
-        found.append({"effect": effect, "place": place, "parameters": parameters})
-    return found
-
-
 def span(rig, effect, place, parameters: dict) -> tuple[str, list[float]]:
     """Element and interval along the line (m) at which an effect acts."""
     ends = np.cumsum([s.length for s in rig.line])

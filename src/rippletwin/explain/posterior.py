@@ -210,6 +210,11 @@ class Posterior:
             sds, taus = sds[source : source + 1], taus[smooth : smooth + 1]
         self.floor = min(self.floor, self.most)
 
+    def follow(self, theta: np.ndarray) -> None:
+        """From here on derivatives about theta know what the line stores beyond proportion."""
+        if self._pressures and self.forward.stores:
+            self.forward.follow(theta)
+
     def linearise(self, theta: np.ndarray, prediction: np.ndarray, besides=None):
         """Residual (N,) and its Jacobian (N, P) at the present errors, their covariance held.
 

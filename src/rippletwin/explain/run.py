@@ -16,6 +16,7 @@ from rippletwin.errors import InputError
 from rippletwin.explain import contradiction, detect, locate
 from rippletwin.explain.bootstrap import Chance, chance
 from rippletwin.explain.fit import Fit, fit_hypothesis, prepare
+from rippletwin.explain.intervals import profiled
 from rippletwin.explain.judge import ADEQUATE, Judgement, judge
 from rippletwin.explain.search import ACCEPT, GOOD, Search, extended, search
 from rippletwin.explain.shaft import (
@@ -130,7 +131,7 @@ def explain_observations(
             found = Search(fit, [], fit)
         else:
             found = search(pool, progress)
-            found.best = that_transfers(pool, found.best, held)
+            found.best = profiled(pool, that_transfers(pool, found.best, held))
             found.others = _others(pool, found)
             reason = contradiction.wiring(base, data, found)
         single = _alone(pool, found.base)

@@ -85,6 +85,7 @@ def search(pool: Workers, progress: Callable[[str, int, int], None] | None = Non
                 break
         best, rivals = new, rivals if step is singles else [*rivals, *step]
         best = simplify(pool, exchange(pool, backward(pool, best), singles), found)
+        best = settled(pool, best)
         if len(best.hypothesis) >= MOST:
             break
         jobs = [
@@ -123,6 +124,14 @@ def _lowest(pool: Workers, base: Fit, singles: Sequence[Fit]) -> Fit:
         # Of one operating point the lowest harmonics say least.
         jobs = [{"hypothesis": (), "draws": DRAWS}, *jobs]
     return max([base, *pool.fit(jobs)], key=lambda fit: fit.evidence)
+
+
+def settled(pool: Workers, best: Fit) -> Fit:
+    """The fit at its exact mode, where that takes derivatives of what the line stores: what is
+    added to a fit that stopped short of it would be taken for what is missing."""
+    if not best.stores:
+        return best
+    return pool.fit([{"hypothesis": best.hypothesis, "theta": best.twin.theta}])[0]
 
 
 def exchange(pool: Workers, best: Fit, singles: Sequence[Fit], rounds: int = 2) -> Fit:

@@ -11,9 +11,9 @@ import numpy as np
 
 from rippletwin.explain import detect, locate, next_recording
 from rippletwin.explain.describe import is_passive, missing
+from rippletwin.explain.intervals import intervals
 from rippletwin.explain.judge import (
     between,
-    intervals,
     join,
     places,
     probabilities,

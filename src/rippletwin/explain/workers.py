@@ -82,17 +82,27 @@ class Workers:
 
     def fit(self, jobs: Sequence[dict], progress: Callable[[], None] | None = None) -> list[Fit]:
         """Fits in the order of `jobs`, each a hypothesis and options of `work`."""
+        return self.map(work, jobs, progress)
+
+    def map(
+        self,
+        function: Callable,
+        jobs: Sequence[dict],
+        progress: Callable[[], None] | None = None,
+    ) -> list:
+        """function(base twin, observations, job) of every job, in their order."""
+        calls = [(function, job) for job in jobs]
         if self._pool is None:
             _prepare(self.base, self.observations)
-            results = map(work, jobs)
+            results = map(_call, calls)
         else:
-            results = self._pool.map(work, jobs)
-        fits = []
-        for fit in results:
-            fits.append(fit)
+            results = self._pool.map(_call, calls)
+        found = []
+        for result in results:
+            found.append(result)
             if progress is not None:
                 progress()
-        return fits
+        return found
 
 
 @contextmanager
@@ -123,15 +133,19 @@ def _prepare(base, observations):
     _DATA = base, observations
 
 
-def work(job: dict) -> Fit:
+def _call(call: tuple[Callable, dict]):
+    function, job = call
+    return function(*_DATA, job)
+
+
+def work(base: Twin, observations: Sequence, job: dict) -> Fit:
     """Fit `hypothesis` to the observations with the indices `use` (all by default).
 
-    `base` takes the place of the pool's, as where the sheet is another. With `theta` from there;
-    with `fit` from where that ended and the newest effect's starts, as strong as its prior and
-    weak; else by continuation from the starts `starts` or the newest effect's scan; `source_free`
-    and `draws` as in `fit_hypothesis`.
+    The job's `base` takes the place of the twin, as where the sheet is another. With `theta` from
+    there; with `fit` from where that ended and the newest effect's starts, as strong as its prior
+    and weak; else by continuation from the starts `starts` or the newest effect's scan;
+    `source_free` and `draws` as in `fit_hypothesis`.
     """
-    base, observations = _DATA
     base = job.get("base", base)
     use = job.get("use")
     observations = observations if use is None else [observations[k] for k in use]

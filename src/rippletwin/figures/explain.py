@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from rippletwin.explain.describe import missing, posterior_of
 from rippletwin.explain.detect import residual_map
-from rippletwin.explain.judge import intervals
+from rippletwin.explain.intervals import intervals
 from rippletwin.explain.locate import side_by_side
 from rippletwin.explain.search import ACCEPT
 from rippletwin.figures import style

@@ -1,0 +1,131 @@
+"""What an explanation's parameters are, and how well they are known.
+
+The curvature at a posterior mode says how the posterior falls next to it and no further. A side
+branch somewhat shorter and wider, or a volume further down the line, may do as well beyond a ridge
+that the curvature knows nothing of, and a model error that is estimated along with the parameters
+makes the tails heavier than a normal distribution's. So each parameter of an effect is held ever
+further off its mode, all else refitted and the errors estimated anew: the interval ends where minus
+the log posterior has risen by half the 95 % quantile of chi-squared with one degree of freedom, and
+stays above that (Venzon and Moolgavkar 1988, Appl. Statist. 37:87).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import chi2
+
+from rippletwin.explain.descent import descend
+from rippletwin.explain.fit import Fit
+from rippletwin.explain.posterior import Posterior
+from rippletwin.explain.workers import Workers
+from rippletwin.twin import Twin
+
+RISE = 0.5 * float(chi2.ppf(0.95, 1))
+FAR = 4.0 * RISE  # nothing is sought further out
+OUTWARDS = (1.5, 2.5, 4.0, 6.0)  # standard deviations by the curvature
+STEPS = 8  # of a descent with one parameter held; it starts from the last
+BETTER = 0.5  # a mode that is lower by as much is another
+MODES = 3  # followed, one after the other
+
+
+class Walk(NamedTuple):
+    """From the mode in one direction of one parameter.
+
+    end     coordinate at which the interval ends
+    value   least minus log posterior on the way, at `theta` (P,)
+    """
+
+    end: float
+    value: float
+    theta: np.ndarray
+
+
+def profiled(pool: Workers, best: Fit, modes: int = MODES) -> Fit:
+    """`best` with the ends of its effects' intervals, or of the better mode that a walk came to."""
+    held = [k for _, _, own in effects_own(best.twin) for k in own]
+    common = {"fit": best, "missed": _missed(pool, best) if best.stores else None}
+    jobs = [{**common, "held": k, "side": side} for k in held for side in (-1, 1)]
+    walks = pool.map(walk, jobs)
+    lowest = min(walks, key=lambda w: w.value, default=None)
+    if lowest is not None and lowest.value < best.objective - BETTER and modes > 1:
+        better = pool.fit([{"hypothesis": best.hypothesis, "theta": lowest.theta}])[0]
+        return profiled(pool, better, modes - 1)
+    sides = zip(walks[::2], walks[1::2])
+    return replace(best, ends={k: (low.end, high.end) for k, (low, high) in zip(held, sides)})
+
+
+def _missed(pool: Workers, fit: Fit) -> np.ndarray:
+    """What derivatives at the mode must know of what the line stores; the same for all walks."""
+    posterior = Posterior(fit.twin, pool.observations, None, fit.source_free)
+    posterior.follow(fit.twin.theta)
+    return posterior.forward.missed
+
+
+def walk(base: Twin, observations: Sequence, job: dict) -> Walk:
+    """Hold the parameter with the index `held` of `fit` further and further to one `side`."""
+    fit, k, side = job["fit"], job["held"], job["side"]
+    posterior = Posterior(fit.twin, observations, None, fit.source_free)
+    posterior.forward.missed = job.get("missed")
+    posterior.estimate_errors(posterior.predict(fit.twin.theta), fit.twin.theta)
+    sd = fit.sd[k]
+    along = fit.covariance[:, k] / sd  # what all else does where this one moves by its deviation
+    theta, last, values, thetas = fit.twin.theta, 0.0, [fit.objective], [fit.twin.theta]
+    for distance in OUTWARDS:
+        start = theta + side * (distance - last) * along
+        # First with the errors of the last place: judged by where it starts, a descent would take
+        # what the others have yet to make good for an error of the source, and rest there.
+        theta, _ = descend(posterior, start, STEPS, held=[k], errors=False)
+        theta, value = descend(posterior, theta, STEPS, held=[k])
+        last = distance
+        values.append(value)
+        thetas.append(theta)
+        if value - min(values) > FAR:
+            break
+    least = int(np.argmin(values))
+    end = crossing((0.0, *OUTWARDS), np.array(values) - values[0])
+    return Walk(float(fit.twin.theta[k] + side * end * sd), values[least], thetas[least])
+
+
+def crossing(distances: Sequence[float], rises: np.ndarray) -> float:
+    """The last distance at which `rises` pass RISE, their root being a straight line between two;
+    the last of all where they do not."""
+    roots = np.sqrt(np.maximum(rises, 0.0))
+    goal = np.sqrt(RISE)
+    below = int(np.flatnonzero(rises < RISE)[-1])
+    if below == len(rises) - 1:
+        return distances[below]
+    share = (goal - roots[below]) / (roots[below + 1] - roots[below])
+    return distances[below] + share * (distances[below + 1] - distances[below])
+
+
+def effects_own(twin: Twin) -> list[tuple]:
+    """(effect, place, indices of its parameters) of every effect.
+
+    An effect without parameters of its own works through the fluid's viscosity, which stands in.
+    """
+    found = []
+    for effect, place in twin.effects:
+        label = f"{effect.name}@{place}"
+        own = [k for k, p in enumerate(twin.parameters) if p.place == label]
+        found.append((effect, place, own or [twin.index["viscosity"]]))
+    return found
+
+
+def intervals(fit: Fit) -> list[dict]:
+    """Each effect with its place and its parameters' values and 95 % intervals."""
+    twin, found = fit.twin, []
+    for effect, place, own in effects_own(twin):
+        parameters = {}
+        for k in own:
+            p = twin.parameters[k]
+            ends = sorted(float(p.value(u)) for u in fit.interval(k))
+            name = p.name.split(".")[-1]
+            name = "kinematic_viscosity" if name == "viscosity" else name
+            value = float(p.value(twin.theta[k]))
+            parameters[name] = {"value": value, "ci95": ends, "unit": p.unit}
+        found.append({"effect": effect, "place": place, "parameters": parameters})
+    return found
