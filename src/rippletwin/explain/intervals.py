@@ -46,7 +46,7 @@ class Walk(NamedTuple):
 
 def profiled(pool: Workers, best: Fit, modes: int = MODES) -> Fit:
     """`best` with the ends of its effects' intervals, or of the better mode that a walk came to."""
-    held = [k for _, _, own in effects_own(best.twin) for k in own]
+    held = sorted({k for _, _, own in effects_own(best.twin) for k in own})
     common = {"fit": best, "missed": _missed(pool, best) if best.stores else None}
     jobs = [{**common, "held": k, "side": side} for k in held for side in (-1, 1)]
     walks = pool.map(walk, jobs)
@@ -69,7 +69,7 @@ def walk(base: Twin, observations: Sequence, job: dict) -> Walk:
     """Hold the parameter with the index `held` of `fit` further and further to one `side`."""
     fit, k, side = job["fit"], job["held"], job["side"]
     posterior = Posterior(fit.twin, observations, None, fit.source_free)
-    posterior.forward.missed = job.get("missed")
+    posterior.forward.missed = job.get("missed")  # none where the line stores nothing
     posterior.estimate_errors(posterior.predict(fit.twin.theta), fit.twin.theta)
     sd = fit.sd[k]
     along = fit.covariance[:, k] / sd  # what all else does where this one moves by its deviation
@@ -80,6 +80,8 @@ def walk(base: Twin, observations: Sequence, job: dict) -> Walk:
         # what the others have yet to make good for an error of the source, and rest there.
         theta, _ = descend(posterior, start, STEPS, held=[k], errors=False)
         theta, value = descend(posterior, theta, STEPS, held=[k])
+        if not np.isfinite(value):
+            break
         last = distance
         values.append(value)
         thetas.append(theta)
