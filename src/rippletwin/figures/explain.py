@@ -19,7 +19,7 @@ from rippletwin.figures import style
 
 POINTS = 4  # operating points or effects shown side by side at most
 SAMPLES = 720
-TITLE = 84  # letters that titles side by side have room for
+TITLE = 78  # letters that titles side by side have room for
 
 
 def draw(explanation, folder: str | Path, suffixes: Sequence[str] = (".png", ".svg")) -> list[Path]:
