@@ -10,7 +10,7 @@ be told that way, because the sweep's steps are common to all copies, has exact 
 Positions of inserts are moved one by one. The orifice's nonlinear remainder is held meanwhile, two
 orders below the linear part, and so is what segments store beyond proportion to the pressure. That
 is no small part next to a sharp resonance: columns are wrong by some per cent, and where wave
-speeds, air and a branch can stand in for each other a fit stops tens of log likelihood too soon.
+speeds, air and a branch can stand in for each other a fit stops units of log likelihood too soon.
 `follow` makes up for it by difference quotients at one place. With `hold_storage` what is stored is
 held in predictions too, which is all that makes them slow.
 """
