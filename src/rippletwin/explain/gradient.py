@@ -54,8 +54,8 @@ class DifferentiableForward(Forward):
         """Find `missed` (P, S, F), what `derivatives` at theta lack because they hold what segments
         store; from here on they have it, there and, as long as it changes little, about there."""
         self.missed = None
-        held = self.derivatives(theta)
         readings = np.concatenate(self(theta), axis=1)
+        held = self.derivatives(theta)
         missed = np.zeros_like(held)
         for k in (*self._together, *self._positions):
             moved = theta.copy()
