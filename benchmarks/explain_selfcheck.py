@@ -255,7 +255,8 @@ def summary(rows: list[dict]) -> str:
         lines.append("  folds' disagreement where right: " + _row(folds[:8]))
         good = [r for r in seen if len(r["right"]) == len(r["truth"]) and not r["wrong"]]
         inside = [x for r in good for x in r["held"]]
-        lines.append(f"  intervals of effects that hold the truth: {sum(inside):.0f} of {len(inside)}")
+        holding = f"{sum(inside):.0f} of {len(inside)}"
+        lines.append(f"  intervals of effects that hold the truth: {holding}")
         for key in ("z", "z_line"):
             z = np.array([x for r in good for x in r[key].values()])
             if len(z):
