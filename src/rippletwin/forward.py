@@ -84,6 +84,7 @@ class Forward:
         for point, part in zip(points, self.slices):
             if point.ripple is not None:
                 self.source_admittance[part] = point.ripple.source_admittance(self.s[part])
+        self._of_pump = self._changes_of_pump(points)
         self.angle_index = [twin.index.get(f"angle[{o.label}]") for o in self.observations]
         self.back_pressure = rig.load.back_pressure
         self.load_impedance = None
@@ -143,7 +144,7 @@ class Forward:
                 for a, d in zip(v.wave_speeds, v.diameters)
             ]
         )
-        source = self.source.copy()
+        source, source_admittance = self._source_at(theta)
         for part, index in zip(self.slices, self.angle_index):
             if index is not None:
                 angle = twin.parameters[index].value(theta[index])
@@ -154,7 +155,7 @@ class Forward:
             series=series,
             shunt=shunt,
             source_flow=source,
-            source_admittance=self.source_admittance,
+            source_admittance=source_admittance,
             load=self._load(v.load),
             sensor_positions=v.positions,
         )
@@ -163,6 +164,31 @@ class Forward:
             for effect, place, values in twin.effect_values(theta):
                 effect.apply(network, line, values, place)
         return network
+
+    def _changes_of_pump(self, points: Sequence) -> list[tuple]:
+        """(index, slope and curvature (2, F) of the flow, slope (F,) of the admittance) of each of
+        the pump's parameters."""
+        found = {}
+        for o, point, part in zip(self.observations, points, self.slices):
+            if point.ripple is None:
+                continue
+            mean = flow_harmonics(point.ripple, np.zeros(1))[0].real
+            for k, change in self.twin.pump_changes(o.speed_hz, point.load_pressure):
+                flow, own = found.setdefault(
+                    k, (np.zeros((2, len(self.s)), complex), np.zeros(len(self.s), complex))
+                )
+                flow[:, part] = change.harmonics(o.orders, mean)
+                if np.any(self.source_admittance[part]):  # a ripple given is an ideal source
+                    own[part] = change.source_admittance(self.s[part])
+        return [(k, *changes) for k, changes in found.items()]
+
+    def _source_at(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Flow and admittance (F,) of the source at `theta`, shaft angles being 0."""
+        flow, admittance = self.source.copy(), self.source_admittance.copy()
+        for k, (slope, curvature), own in self._of_pump:
+            flow += theta[k] * (slope + theta[k] * curvature)
+            admittance += theta[k] * own
+        return flow, admittance
 
     def _line_state(self, v) -> LineState:
         fluid = self.twin.rig.fluid

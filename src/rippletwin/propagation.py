@@ -58,6 +58,9 @@ def line_in_time(twin, flow, healthy_flow, speed_hz, load_pressure, source_capac
         raise InputError(
             "rig.yaml", "load.kind", "a measured impedance has no time domain", "Give an orifice"
         )
+    change, more = _pump_change(twin, healthy_flow, speed_hz, load_pressure)
+    if source_capacitance:  # a ripple that was given is an ideal source
+        source_capacitance += more
     factor = twin.values().get("load", 1.0)
     mean = nominal = float(np.mean(healthy_flow))
     coefficient, resistance = 0.0, None
@@ -69,7 +72,7 @@ def line_in_time(twin, flow, healthy_flow, speed_hz, load_pressure, source_capac
     pressure = rig.load.back_pressure if rig.load.kind == "orifice" else load_pressure
     line = Line(
         pipes=[Pipe(s.length, s.diameter, s.wave_speed) for s in rig.line],
-        flow=np.asarray(flow, dtype=float) - np.mean(healthy_flow) + mean,
+        flow=np.asarray(flow, dtype=float) + change - np.mean(healthy_flow) + mean,
         period=1.0 / speed_hz,
         end=End(rig.load.kind, pressure, coefficient),
         density=rig.fluid.density,
@@ -95,3 +98,18 @@ def line_in_time(twin, flow, healthy_flow, speed_hz, load_pressure, source_capac
     for effect, place, values in twin.effect_values(twin.theta):
         effect.in_time(line, state, values, place)
     return line
+
+
+def _pump_change(twin, healthy_flow, speed_hz: float, load_pressure: float):
+    """Flow (M,), m3/s, and capacitance, m3/Pa, by which the source of a twin that knows its pump
+    better than the data sheet differs from the sheet's, healthy or not."""
+    count, mean = len(healthy_flow), float(np.mean(healthy_flow))
+    flow, capacity = np.zeros(count), 0.0
+    pumping = np.array([2j * np.pi * speed_hz * twin.rig.pump.get("pistons", 1)])
+    orders = np.arange(1, (count - 1) // 2 + 1)
+    for k, change in twin.pump_changes(speed_hz, load_pressure):
+        u = twin.theta[k]
+        spectrum = np.array([u, u**2]) @ change.harmonics(orders, mean)
+        flow += np.fft.irfft(np.append(0.0, spectrum) * count / 2, count)
+        capacity += u * float(change.source_admittance(pumping)[0].imag / pumping[0].imag)
+    return flow, capacity

@@ -8,6 +8,7 @@ and every prior is N(0, 1). Its entries, in this order (segments and recordings 
     viscosity                               kinematic
     load                                    factor on the orifice's coefficient or on the measured
                                             load impedance; not there for other loads
+    bulk_modulus, port_timing               of the pump, where `uncertain_pump` says so
     angle[LABEL]                            shaft angle at a recording's first sample, rad: no prior
     LABEL.NAME                              parameters of the effects, with priors of their own
 
@@ -38,6 +39,10 @@ a flow ripple nor an orifice coefficient is known: oil lines run at half to six 
 
 SOURCE_SD = 0.05
 """Largest relative error of a nominal flow ripple's harmonic that is put down to the ripple."""
+
+BULK_MODULUS_SD = 0.1  # relative, of what the chambers hold: air and heat lower it
+PORT_TIMING_SD = 1.0  # deg, of the port plate's angle to the swash plate
+"""Standard deviations of the pump's numbers, where they are parameters (`pump.uncertain`)."""
 
 ANGLE_SCALE = 0.01  # rad, of the fit's coordinate: a few degrees of phase at the 9th harmonic
 
@@ -78,6 +83,9 @@ class Twin:
     theta : where the twin stands, (P,); nominal by default.
     guessed_load : whether the orifice's coefficient is but a guess; by default it is where an
         observation has neither a flow ripple nor a coefficient to tell the mean flow.
+    uncertain_pump : whether the pump's bulk modulus and port timing are parameters. They are only
+        where recordings have a nominal source and the data sheet gives the pump's geometry, from
+        which the lumped model tells what they change in the ripple.
 
     Raises ValueError for an unknown friction or a theta of the wrong length.
     """
@@ -91,6 +99,7 @@ class Twin:
         source_sd: float = SOURCE_SD,
         theta: np.ndarray | None = None,
         guessed_load: bool | None = None,
+        uncertain_pump: bool = False,
     ):
         if friction not in FRICTIONS:
             raise ValueError(f"friction must be one of {FRICTIONS}, not {friction!r}")
@@ -106,9 +115,11 @@ class Twin:
                 o.source == "free" and o.flow_ripple is None for o in observations
             )
         self.guessed_load = bool(guessed_load)
+        self.uncertain_pump = bool(uncertain_pump and self.labels and len(rig.pump) > 1)
         self._effect_parameters = [effect.parameters(rig, place) for effect, place in self.effects]
         self.parameters = (
             *_line_parameters(rig, self.guessed_load),
+            *(_pump_parameters(rig) if self.uncertain_pump else ()),
             *(_angle(label) for label in self.labels),
             *_named_apart(self.effects, self._effect_parameters),
         )
@@ -239,6 +250,7 @@ class Twin:
             "effects": self.effects,
             "source_sd": self.source_sd,
             "guessed_load": self.guessed_load,
+            "uncertain_pump": self.uncertain_pump,
             "theta": None if "effects" in changes else self.theta,
         }
         labels = [_Point(label=label) for label in self.labels]
@@ -276,6 +288,7 @@ class Twin:
             "friction": self.friction,
             "source_sd": self.source_sd,
             "guessed_load": self.guessed_load,
+            "uncertain_pump": self.uncertain_pump,
             "effects": [{"name": e.name, "place": asdict(place)} for e, place in self.effects],
             "theta": self.theta.tolist(),
             "values": self.values(),
@@ -293,8 +306,26 @@ class Twin:
             effects=effects,
             source_sd=data["source_sd"],
             guessed_load=data["guessed_load"],
+            uncertain_pump=data.get("uncertain_pump", False),
             theta=np.array(data["theta"]),
         )
+
+    def pump_changes(self, speed_hz: float, load_pressure: float) -> list[tuple]:
+        """(index, `RippleChange`) of each parameter of the pump, at rev/s into Pa; none where there
+        are no such parameters."""
+        if not self.uncertain_pump or not np.isfinite(load_pressure):
+            return []
+        from rippletwin.pump import ripple_change
+
+        rig, found = self.rig, []
+        for k in (self.index["bulk_modulus"], self.index["port_timing"]):
+            p = self.parameters[k]
+            ends = p.value(1.0), p.value(-1.0)
+            change = ripple_change(
+                rig.pump, rig.fluid, 60.0 * speed_hz, load_pressure, p.name, ends
+            )
+            found.append((k, change))
+        return found
 
     def _pump_ripple(self, observation) -> FlowRipple:
         """The lumped pump model's ripple where the user gave none."""
@@ -355,6 +386,18 @@ def _line_parameters(rig: Rig, guessed_load: bool) -> list[Parameter]:
         sd = GUESSED_SD if guessed_load else sheet.load
         out.append(Parameter("load", "", lognormal(1.0, sd), "load"))
     return out
+
+
+def _pump_parameters(rig: Rig) -> list[Parameter]:
+    from rippletwin.pump import Geometry
+
+    geometry = Geometry.from_dict(rig.pump)
+    modulus = lognormal(geometry.bulk_modulus, BULK_MODULUS_SD)
+    timing = normal(geometry.port_timing_deg, PORT_TIMING_SD)
+    return [
+        Parameter("bulk_modulus", "Pa", modulus, "pump"),
+        Parameter("port_timing", "deg", timing, "pump"),
+    ]
 
 
 def _angle(label: str) -> Parameter:

@@ -7,12 +7,12 @@ be told that way, because the sweep's steps are common to all copies, has exact 
     turning the shaft      dp/dangle = j k p at shaft order k, nonlinear load or not
     longer segment         Z' and Y' of it in proportion, then everything behind moved back
 
-Positions of inserts are moved one by one. The orifice's nonlinear remainder is held meanwhile, two
-orders below the linear part, and so is what segments store beyond proportion to the pressure. That
-is no small part next to a sharp resonance: columns are wrong by some per cent, and where wave
-speeds, air and a branch can stand in for each other a fit stops units of log likelihood too soon.
-`follow` makes up for it by difference quotients at one place. With `hold_storage` what is stored is
-held in predictions too, which is all that makes them slow.
+Positions of inserts and the pump's numbers are moved one by one. The orifice's nonlinear remainder
+is held meanwhile, two orders below the linear part, and so is what segments store beyond proportion
+to the pressure. That is no small part next to a sharp resonance: columns are wrong by some per
+cent, and where wave speeds, air and a branch can stand in for each other a fit stops units of log
+likelihood too soon. `follow` makes up for it by difference quotients at one place. With
+`hold_storage` what is stored is held in predictions too, which is all that makes them slow.
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ class DifferentiableForward(Forward):
         self._sensors = range(3 * segments, 3 * segments + sensors)
         self._angles = {i: part for i, part in zip(self.angle_index, self.slices) if i is not None}
         self._positions = [k for k, name in enumerate(names) if name.endswith(".position")]
-        apart = {*self._sensors, *self._angles, *self._positions}
+        self._singly = [*self._positions, *(k for k, *_ in self._of_pump)]
+        apart = {*self._sensors, *self._angles, *self._singly}
         self._together = [k for k in range(len(names)) if k not in apart]
         self._remainder = self._drains = self._held_at = None
         self._hold = False
@@ -57,7 +58,7 @@ class DifferentiableForward(Forward):
         readings = np.concatenate(self(theta), axis=1)
         held = self.derivatives(theta)
         missed = np.zeros_like(held)
-        for k in (*self._together, *self._positions):
+        for k in (*self._together, *self._singly):
             moved = theta.copy()
             moved[k] += FOLLOWED
             slope = (np.concatenate(self(moved), axis=1) - readings) / FOLLOWED
@@ -94,7 +95,7 @@ class DifferentiableForward(Forward):
         for k, part in self._angles.items():
             turn = 1j * self.order[part] * self._rate(k, theta)
             out[k][:, part] = turn * readings[:, part]
-        for k in self._positions:
+        for k in self._singly:
             moved = theta.copy()
             step = -STEP if theta[k] > 0 else STEP  # inwards
             moved[k] += step
@@ -190,7 +191,7 @@ class DifferentiableForward(Forward):
             lengths=base.lengths,
             series=np.empty((n, *shape), complex),
             shunt=np.empty((n, *shape), complex),
-            source_admittance=self.source_admittance,
+            source_admittance=self._source_at(theta)[1],
             load=self._load(v.load),
             sensor_positions=v.positions,
         )

@@ -29,6 +29,7 @@ from rippletwin.explain.shaft import (
 from rippletwin.explain.sheet import WithoutEffect, without_each
 from rippletwin.explain.validate import Validation, that_transfers, validate
 from rippletwin.explain.workers import Workers, workers
+from rippletwin.forward import Forward
 from rippletwin.spectra import observe, revolutions_of
 from rippletwin.twin import Twin
 
@@ -123,8 +124,9 @@ def explain_observations(
         HIGHEST_HZ if observations[0].orders is not None else None,
     )
     early, late = prepare(early, rig, HIGHEST_HZ), prepare(late, rig, HIGHEST_HZ)
-    base = Twin(rig, data)
+    base = Twin(rig, data, uncertain_pump=True)
     held = late if len(data) == 1 and late else None
+    Forward(base, data)  # what the twin keeps of the pump is worked out before the processes part
     with workers(base, data, processes) as pool:
         if reason:
             fit = pool.fit([{"hypothesis": ()}])[0]
@@ -174,7 +176,11 @@ def _turning(rig, observations: Sequence) -> ShaftLines | None:
     if found is None or found[0] < RELATIVE:
         return None
     data = prepare(observations, rig, HIGHEST_HZ)
-    return shaft_lines(fit_hypothesis(Twin(rig, data), (), data).twin, observations, HIGHEST_HZ)
+    return shaft_lines(
+        fit_hypothesis(Twin(rig, data, uncertain_pump=True), (), data).twin,
+        observations,
+        HIGHEST_HZ,
+    )
 
 
 def _others(pool: Workers, found: Search) -> list[Fit]:

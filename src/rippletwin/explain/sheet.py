@@ -91,6 +91,7 @@ def freed(pool: Workers, held: Sequence[Fit], accepted: Fit) -> list[tuple[float
             friction=old.friction,
             source_sd=old.source_sd,
             guessed_load=old.guessed_load,
+            uncertain_pump=old.uncertain_pump,
         )
         parameters = base.with_(effects=fit.hypothesis).parameters
         job = {"base": base, "hypothesis": fit.hypothesis, "source_free": fit.source_free}

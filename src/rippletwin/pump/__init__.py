@@ -9,6 +9,7 @@ from rippletwin.pump.simulation import (
     Slipper,
     simulate,
 )
+from rippletwin.pump.uncertain import RippleChange, ripple_change
 
 __all__ = [
     "ConstantPressure",
@@ -16,7 +17,9 @@ __all__ = [
     "Geometry",
     "Pipe",
     "PumpRipple",
+    "RippleChange",
     "Slipper",
     "kinematic_flow",
+    "ripple_change",
     "simulate",
 ]

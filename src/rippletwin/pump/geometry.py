@@ -28,6 +28,7 @@ class Geometry:
     port_area: float = 1.2e-4  # of a fully open port, m2
     port_opening_deg: float = 30.0  # from closed to fully open
     port_overlap_deg: float = 5.0  # both ports closed for so long, half before each dead centre
+    port_timing_deg: float = 0.0  # by so much the port plate is turned, later being positive
     discharge_coefficient: float = 0.65
     case_leakage: float = 3e-13  # laminar, of a chamber, m3/s/Pa
     suction_pressure: float = 1e5  # absolute, also that of the case, Pa
@@ -40,9 +41,12 @@ class Geometry:
         if unknown:
             raise ValueError(f"unknown pump keys {unknown}; known are {known}")
         geometry = cls(**{key: value for key, value in pump.items() if value is not None})
-        may_be_zero = ("air_fraction", "case_leakage", "port_overlap_deg")
+        may_be_negative = ("port_timing_deg",)
+        may_be_zero = ("air_fraction", "case_leakage", "port_overlap_deg", *may_be_negative)
         for name in known:
             value = getattr(geometry, name)
+            if value < 0.0 and name in may_be_negative:
+                continue
             if value < 0.0 or (value == 0.0 and name not in may_be_zero):
                 raise ValueError(f"pump key {name} = {value} must be positive")
         if geometry.port_overlap_deg + 2 * geometry.port_opening_deg > 180.0:
@@ -81,7 +85,7 @@ class Geometry:
 
         (Edge & Darling 1989, J. Dyn. Sys. Meas. Control 111, 307, found such grooves best.)
         """
-        phi = np.degrees(phi) % 360.0
+        phi = (np.degrees(phi) - self.port_timing_deg) % 360.0
         shut = self.port_overlap_deg / 2
         rising = np.clip((phi - shut) / self.port_opening_deg, 0.0, 1.0)
         falling = np.clip((180.0 - shut - phi) / self.port_opening_deg, 0.0, 1.0)
