@@ -16,6 +16,7 @@ import numpy as np
 
 from rippletwin.case import FlowRipple
 from rippletwin.effects.base import ATMOSPHERE, LineState
+from rippletwin.effects.speed_fluctuation import peaks, swung
 from rippletwin.line.chain import Network
 from rippletwin.line.segment import series_impedance, shunt_admittance
 from rippletwin.line.storage import FullAmplitude
@@ -144,7 +145,7 @@ class Forward:
                 for a, d in zip(v.wave_speeds, v.diameters)
             ]
         )
-        source, source_admittance = self._source_at(theta)
+        source, source_admittance = self.source_at(theta)
         for part, index in zip(self.slices, self.angle_index):
             if index is not None:
                 angle = twin.parameters[index].value(theta[index])
@@ -177,12 +178,12 @@ class Forward:
                 flow, own = found.setdefault(
                     k, (np.zeros((2, len(self.s)), complex), np.zeros(len(self.s), complex))
                 )
-                flow[:, part] = change.harmonics(o.orders, mean)
+                flow[:, part] = _delivered(change, point.ripple, o.orders, mean)
                 if np.any(self.source_admittance[part]):  # a ripple given is an ideal source
                     own[part] = change.source_admittance(self.s[part])
         return [(k, *changes) for k, changes in found.items()]
 
-    def _source_at(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def source_at(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Flow and admittance (F,) of the source at `theta`, shaft angles being 0."""
         flow, admittance = self.source.copy(), self.source_admittance.copy()
         for k, (slope, curvature), own in self._of_pump:
@@ -287,6 +288,17 @@ class Forward:
         forward = Forward(self.twin, wide)
         own = [np.r_[b][: a.stop - a.start] for a, b in zip(self.slices, forward.slices)]
         return forward, np.concatenate(own)
+
+
+def _delivered(change, ripple: FlowRipple, orders: np.ndarray, mean_flow: float) -> np.ndarray:
+    """Slope and curvature (2, F) of a `RippleChange` by the shaft that delivers `ripple`."""
+    if not ripple.swing:
+        return change.harmonics(orders, mean_flow)
+    orders = np.asarray(orders, int)
+    even = np.zeros((2, 2 * np.max(orders)), complex)
+    even[:, 1:] = change.harmonics(np.arange(1, even.shape[1]), mean_flow)
+    even[np.abs(even) < 1e-9 * np.max(np.abs(even))] = 0.0  # orders that equal pistons do not make
+    return np.array([peaks(swung(x, ripple.swing, 4 * len(x)))[orders] for x in even])
 
 
 def characteristic_impedance(fluid, segment) -> float:

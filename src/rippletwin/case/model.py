@@ -97,11 +97,13 @@ class FlowRipple:
     """Flow into the line over one revolution: flow (M,), m3/s, at angle_deg (M,), ascending.
 
     `pressure_mean` is the mean outlet pressure (Pa) at which it was computed, where that is known.
+    `swing` b, rad: the shaft that delivers it is ahead of even turning by Re(b exp(j t)) rad.
     """
 
     angle_deg: np.ndarray
     flow: np.ndarray
     pressure_mean: float | None = None
+    swing: complex = 0.0
 
     def source_admittance(self, s: np.ndarray) -> np.ndarray:
         """Admittance (F,), m3/s/Pa, beside this flow: none, a given ripple is an ideal source."""

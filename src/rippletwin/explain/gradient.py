@@ -191,7 +191,7 @@ class DifferentiableForward(Forward):
             lengths=base.lengths,
             series=np.empty((n, *shape), complex),
             shunt=np.empty((n, *shape), complex),
-            source_admittance=self._source_at(theta)[1],
+            source_admittance=self.source_at(theta)[1],
             load=self._load(v.load),
             sensor_positions=v.positions,
         )

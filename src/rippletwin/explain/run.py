@@ -175,12 +175,13 @@ def _turning(rig, observations: Sequence) -> ShaftLines | None:
         found = standing_out(observations, rig.pump["pistons"], HIGHEST_HZ)
     if found is None or found[0] < RELATIVE:
         return None
-    data = prepare(observations, rig, HIGHEST_HZ)
-    return shaft_lines(
-        fit_hypothesis(Twin(rig, data, uncertain_pump=True), (), data).twin,
-        observations,
-        HIGHEST_HZ,
-    )
+    shaft = None
+    for uncertain_pump in (False, True):
+        # What a swing takes from the ripple must not be put down to the pump, so that comes second.
+        data = prepare(as_turned(observations, shaft), rig, HIGHEST_HZ)
+        twin = fit_hypothesis(Twin(rig, data, uncertain_pump=uncertain_pump), (), data).twin
+        shaft = shaft_lines(twin, observations, HIGHEST_HZ)
+    return shaft
 
 
 def _others(pool: Workers, found: Search) -> list[Fit]:

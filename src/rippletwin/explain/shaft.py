@@ -90,7 +90,9 @@ def shaft_lines(twin: Twin, observations: Sequence, highest_hz: float) -> ShaftL
         point = twin.operating_point(o)
         even = np.zeros(orders.max() + 1, complex)
         at = orders[~off]
-        even[at] = flow[~off] if point.ripple is None else flow_harmonics(point.ripple, at)
+        even[at] = flow[~off]
+        if point.ripple is not None:
+            even[at] = Forward(twin, [o]).source_at(twin.theta)[0][~off]
         even[0] = point.mean_flow
         b, rest, whole = _modulation(even, orders[off], flow[off], unit[:, off], pistons)
         modulation[o.label] = b
@@ -125,7 +127,8 @@ def turned(ripple: FlowRipple, modulation: complex) -> FlowRipple:
     count = max(len(ripple.flow) // 2, 8)
     spectrum = flow_harmonics(ripple, np.arange(count))
     flow = swung(spectrum, modulation, 4 * count)
-    return replace(ripple, angle_deg=360.0 * np.arange(len(flow)) / len(flow), flow=flow)
+    angle = 360.0 * np.arange(len(flow)) / len(flow)
+    return replace(ripple, angle_deg=angle, flow=flow, swing=modulation)
 
 
 def _with_lines(observations: Sequence, pistons: int, highest_hz: float) -> list[tuple]:
