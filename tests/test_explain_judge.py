@@ -14,6 +14,7 @@ from rippletwin.explain.judge import SURE, judge
 from rippletwin.explain.search import ACCEPT, Search, simplify
 from rippletwin.explain.validate import Score, Validation
 
+LOUD = Alarms(0.03, (1.0, "diameter[1]"), (1.0, "length[1]"), (1.0, ""))
 QUIET = Alarms(0.004, (1.0, "diameter[1]"), (1.0, "length[1]"), (1.0, ""))
 FRICTION = replace(EFFECTS["unsteady_friction"], certain=True)
 HOSE = (EFFECTS["viscoelastic_wall"], Place("segment 1", 0))
@@ -37,36 +38,38 @@ def validation(after, disagreement=1.0, in_sample=0.01):
 
 
 @pytest.mark.parametrize(
-    ("gain", "after", "verdict"),
+    ("gain", "after", "apart", "alarms", "verdict"),
     [
-        (SURE - 1, 0.01, "named"),
-        (SURE - 1, 0.03, "consistent"),  # the line fits without, data left out speak against it
-        (SURE + 1, 0.03, "unexplained"),  # too much evidence for chance, and no explanation
+        (SURE - 1, 0.01, 1.0, QUIET, "named"),
+        (SURE - 1, 0.03, 1.0, QUIET, "consistent"),  # fits without, data left out are against it
+        (SURE + 1, 0.03, 1.0, QUIET, "consistent"),  # the same, however much it is worth in sample
+        (SURE + 1, 0.015, 9.0, QUIET, "unexplained"),  # too much for chance, and folds disagree
+        (SURE + 1, 0.03, 1.0, LOUD, "unexplained"),  # the line alone does not fit either
     ],
 )
-def test_an_explanation_must_hold_where_it_was_not_fitted(gain, after, verdict):
+def test_an_explanation_must_hold_where_it_was_not_fitted(gain, after, apart, alarms, verdict):
     base, best = fit(0.0), fit(gain, HOSE)
-    found = judge(Search(base, [best], best), QUIET, validation(after))
+    found = judge(Search(base, [best], best), alarms, validation(after, apart))
     assert found.verdict == verdict
     assert found.accepted is (base if verdict == "consistent" else best)
 
 
 @pytest.mark.parametrize(
-    ("in_sample", "after", "floor", "verdict"),
+    ("in_sample", "after", "alarms", "verdict"),
     [
-        (0.021, 0.03, 0.004, "calibration_only"),
-        (0.019, 0.03, 0.004, "unexplained"),  # it fits something: the data speak for it
-        (0.021, 0.03, 0.03, "unexplained"),  # the line alone does not fit either
+        (0.021, 0.03, QUIET, "calibration_only"),
+        (0.019, 0.03, QUIET, "consistent"),  # it fits something, but nothing unseen
+        (0.021, 0.03, LOUD, "unexplained"),  # the line alone does not fit either
     ],
 )
 def test_an_explanation_that_fits_nothing_better_speaks_of_the_sheet(
-    in_sample, after, floor, verdict
+    in_sample, after, alarms, verdict
 ):
     """Evidence above SURE that comes from the priors alone: the nominal values are off."""
-    base, best = replace(fit(0.0), floor=floor), fit(SURE + 10, HOSE)
-    found = judge(Search(base, [best], best), QUIET, validation(after, in_sample=in_sample))
+    base, best = fit(0.0), fit(SURE + 10, HOSE)
+    found = judge(Search(base, [best], best), alarms, validation(after, in_sample=in_sample))
     assert found.verdict == verdict
-    assert found.accepted is (base if verdict == "calibration_only" else best)
+    assert found.accepted is (best if verdict == "unexplained" else base)
 
 
 @pytest.mark.parametrize(("large", "small"), [(LARGE, SMALL), (VOLUME, END)])

@@ -63,13 +63,16 @@ def judge(
     if by_chance is not None and search.gain(best) < by_chance.threshold:
         return _nothing_missing(search.base, alarms)
     fails = validation is not None and not validation.holds
-    if fails and search.base.floor <= GOOD:
-        if search.gain(best) < SURE:
-            # A line that fits without it, and data left out that speak against it: an absorber.
-            return _nothing_missing(search.base, alarms)
+    if fails and "misfit" not in alarms.ringing:
         if not validation.gains:
             # It fits nothing better: the data sheet alone speaks for it, and that may be off.
-            return _nothing_missing(search.base, alarms, "calibration_only")
+            only_sheet = search.gain(best) >= SURE
+            return _nothing_missing(
+                search.base, alarms, "calibration_only" if only_sheet else "consistent"
+            )
+        if search.gain(best) < SURE or not validation.transfers:
+            # A line that fits without it, and data left out that speak against it: an absorber.
+            return _nothing_missing(search.base, alarms)
     if best.floor > ADEQUATE or fails:
         # Without a name it is modelled all the same, by whatever describes the data best.
         stands_in = other is not None and other.evidence > best.evidence

@@ -55,6 +55,11 @@ class Validation:
         return after < LITTLE * before or (after < before and self.disagreement < AGREE)
 
     @property
+    def transfers(self) -> bool:
+        """Whether the explanation fits what it has not seen better than the base does."""
+        return self.after["held_out"].misfit < self.before["held_out"].misfit
+
+    @property
     def gains(self) -> bool:
         """Whether the explanation fits better than the base anywhere, in sample or held out.
 
