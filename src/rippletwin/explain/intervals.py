@@ -131,3 +131,15 @@ def intervals(fit: Fit) -> list[dict]:
             parameters[name] = {"value": value, "ci95": ends, "unit": p.unit}
         found.append({"effect": effect, "place": place, "parameters": parameters})
     return found
+
+
+def pump_numbers(fit: Fit) -> dict[str, dict]:
+    """The pump's numbers by name with data sheet's value and 95 % interval; empty where the twin
+    takes the sheet's."""
+    found = {}
+    for k, p in enumerate(fit.twin.parameters):
+        if p.place == "pump":
+            ends = sorted(float(p.value(u)) for u in fit.interval(k))
+            value = float(p.value(fit.twin.theta[k]))
+            found[p.name] = {"value": value, "sheet": p.nominal, "ci95": ends, "unit": p.unit}
+    return found

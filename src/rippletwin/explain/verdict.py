@@ -11,7 +11,7 @@ import numpy as np
 
 from rippletwin.explain import detect, locate, next_recording
 from rippletwin.explain.describe import is_passive, missing
-from rippletwin.explain.intervals import intervals
+from rippletwin.explain.intervals import intervals, pump_numbers
 from rippletwin.explain.judge import (
     between,
     join,
@@ -85,6 +85,7 @@ def verdict(explanation: Explanation) -> dict:
         "next_recording": next_words,
         "fit": _fit(e),
         "without": [asdict(each) for each in e.without],
+        "pump": pump_numbers(accepted),
         "sentence": "",
     }
     if kind == "unexplained" and found and not found[-1]["effect"].named:
@@ -226,6 +227,7 @@ def sentence(e: Explanation, result: dict, found: list[dict], base) -> str:
         if places(e.search):
             words.append("Its place or form cannot be told: see equivalents.")
         words.append(_without_source(e))
+    words.append(_pump(result["pump"]))
     if kind == "bad_data":
         words = [f"The data contradict themselves: {e.judgement.reason}."]
     if e.shaft is not None and e.shaft.name is not None:
@@ -245,6 +247,20 @@ def sentence(e: Explanation, result: dict, found: list[dict], base) -> str:
     if e.judgement.accepted.hypothesis and pulled[0] > detect.PULL:
         words.append(f"Check {pulled[1]}: {pulled[0]:.1f} standard deviations from the data sheet.")
     return " ".join(word for word in words if word)
+
+
+def _pump(numbers: dict) -> str:
+    """What the ripple says of the pump, where that is not what the data sheet says."""
+    off = [n for n in numbers.values() if not n["ci95"][0] <= n["sheet"] <= n["ci95"][1]]
+    if not off:
+        return ""
+    modulus, timing = numbers["bulk_modulus"], numbers["port_timing"]
+    turned = timing["value"] - timing["sheet"]
+    return (
+        f"The ripple is that of a pump with a bulk modulus of {modulus['value']:.3g} Pa (sheet "
+        f"{modulus['sheet']:.3g}) and its port plate {abs(turned):.2f} deg "
+        f"{'late' if turned > 0 else 'early'}."
+    )
 
 
 def _against_the_sheet(e: Explanation) -> list[str]:
