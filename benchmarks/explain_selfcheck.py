@@ -1,12 +1,15 @@
 """How often `rippletwin explain` is right on cases of the library's own making.
 
     python benchmarks/explain_selfcheck.py run FILE --kind none|single|pair [--first 0] [--cases 20]
+        [--geometry]
     python benchmarks/explain_selfcheck.py summary FILE...
 
 `run` appends one JSON line a case to FILE. A case is drawn from its number alone: a line of two to
 four segments, two or three sensors, one to three operating points, 0.5 to 4 kPa of sensor noise,
 nominal values off by their stated uncertainty, a nominal flow ripple whose backflow is wrong by a
 few per cent in depth, width and timing, effects at random places with parameters from their priors.
+With `--geometry` the ripple is the lumped pump's, its geometry is known, and the true pump has
+another bulk modulus (4 %), port timing (0.3 deg) and dead volume (2 %, no parameter of the twin).
 
 The recordings come from the same equations as the twin, so this measures the statistics of
 explaining (false alarms, confusion, coverage) and not whether the equations are right.
@@ -32,6 +35,7 @@ from rippletwin.explain.search import library
 from rippletwin.explain.verdict import verdict
 from rippletwin.forward import Forward
 from rippletwin.misfit import relative_misfit
+from rippletwin.pump import ConstantPressure, simulate
 from rippletwin.spectra import Observation
 from rippletwin.twin import Twin
 
@@ -67,7 +71,30 @@ def ripple(speed_hz, pressure, depth=0.5, width=0.04, timing=0.12) -> FlowRipple
     return FlowRipple(np.rad2deg(angle), flow / flow.mean() * 40e-6 * speed_hz, pressure)
 
 
-def draw(rng, kind: str):
+def draw_pump(rng) -> tuple[dict, dict]:
+    """The pump on the data sheet and the true one."""
+    sheet = {
+        "pistons": 9,
+        "bulk_modulus": float(rng.uniform(1.2e9, 1.5e9)),
+        "port_opening_deg": float(rng.uniform(12.0, 30.0)),
+        "port_overlap_deg": float(rng.uniform(1.0, 5.0)),
+        "dead_volume": float(rng.uniform(1.5e-6, 4e-6)),
+    }
+    true = {
+        "bulk_modulus": sheet["bulk_modulus"] * float(np.exp(0.04 * rng.normal())),
+        "port_timing_deg": 0.3 * float(rng.normal()),
+        "dead_volume": sheet["dead_volume"] * float(np.exp(0.02 * rng.normal())),
+    }
+    return sheet, sheet | true
+
+
+def pump_ripple(rig, pump: dict, speed_hz: float, pressure: float) -> FlowRipple:
+    """The lumped pump's, as a file has it: an ideal source."""
+    found = simulate(pump, rig.fluid, 60 * speed_hz, ConstantPressure(pressure))
+    return FlowRipple(found.angle_deg, found.flow, pressure)
+
+
+def draw(rng, kind: str, geometry: bool = False):
     """(rig, observations, twin at the truth)."""
     rig = draw_rig(rng)
     noise = rng.uniform(0.5e3, 4e3)
@@ -82,6 +109,10 @@ def draw(rng, kind: str):
         "width": shape["width"] * (1 + 0.02 * rng.normal()),
         "timing": shape["timing"] + 0.002 * rng.normal(),  # rad: a tenth of a degree
     }
+    if geometry:
+        # Numbers of its own, so that line and effects are those of the case without.
+        sheet, pump = draw_pump(np.random.default_rng(rng.bit_generator.seed_seq.entropy))
+        rig = replace(rig, pump=sheet)
     observations, true_ripples = [], []
     for k, speed in enumerate(speeds):
         pressure = float(rng.uniform(5e6, 16e6))
@@ -100,11 +131,17 @@ def draw(rng, kind: str):
                 speed,
                 pressure,
                 "nominal",
-                ripple(speed, pressure, **wrong),
+                pump_ripple(rig, sheet, speed, pressure)
+                if geometry
+                else ripple(speed, pressure, **wrong),
                 rig.sensors,
             )
         )
-        true_ripples.append(ripple(speed, pressure, **shape))
+        true_ripples.append(
+            pump_ripple(rig, pump, speed, pressure)
+            if geometry
+            else ripple(speed, pressure, **shape)
+        )
     effects = draw_effects(rng, rig, observations, EFFECTS[kind])
     twin = Twin(rig, observations, effects=effects)
     theta = np.clip(rng.normal(size=len(twin.theta)), -2.5, 2.5)
@@ -131,16 +168,19 @@ def draw_effects(rng, rig, observations, count: int) -> tuple:
     return tuple(found)
 
 
-def run_case(number: int, kind: str) -> dict:
+def run_case(number: int, kind: str, geometry: bool = False) -> dict:
     """Draw, explain and score one case."""
     rng = np.random.default_rng([number, EFFECTS[kind]])
-    rig, observations, truth = draw(rng, kind)
-    base = Twin(rig, observations)
+    rig, observations, truth = draw(rng, kind, geometry)
+    base = Twin(rig, observations, uncertain_pump=True)
     start = time.process_time()
     e = explain_observations(rig, observations, processes=1)
     seconds = time.process_time() - start
     v = verdict(e)
-    known = refine(base, truth.effects, observations, [truth.theta])
+    at = dict(zip((p.name for p in truth.parameters), truth.theta))
+    parameters = base.with_(effects=truth.effects).parameters
+    start = np.array([at.get(p.name, 0.0) for p in parameters])
+    known = refine(base, truth.effects, observations, [start])
     measured = np.concatenate([o.values for o in observations], axis=1)
     floor = relative_misfit(measured, np.concatenate(truth.predict(observations), axis=1))
     accepted, told = e.judgement.accepted, {x["name"] for x in v["effects"]}
@@ -289,6 +329,7 @@ def main() -> None:
     running.add_argument("--kind", choices=EFFECTS, required=True)
     running.add_argument("--first", type=int, default=0)
     running.add_argument("--cases", type=int, default=20)
+    running.add_argument("--geometry", action="store_true")
     commands.add_parser("summary").add_argument("files", type=Path, nargs="+")
     arguments = parser.parse_args()
     if arguments.command == "summary":
@@ -296,7 +337,7 @@ def main() -> None:
         print(summary([json.loads(x) for x in lines]))
         return
     for number in range(arguments.first, arguments.first + arguments.cases):
-        row = run_case(number, arguments.kind)
+        row = run_case(number, arguments.kind, arguments.geometry)
         with open(arguments.file, "a") as file:
             file.write(json.dumps(row, default=float) + "\n")
         print(number, row["truth"], row["verdict"], row["told"], f"{row['seconds']:.0f} s")

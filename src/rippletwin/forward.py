@@ -146,10 +146,7 @@ class Forward:
             ]
         )
         source, source_admittance = self.source_at(theta)
-        for part, index in zip(self.slices, self.angle_index):
-            if index is not None:
-                angle = twin.parameters[index].value(theta[index])
-                source[part] *= np.exp(1j * angle * self.order[part])
+        source = source * self._turn(theta)
         network = Network(
             s=self.s,
             lengths=v.lengths,
@@ -190,6 +187,15 @@ class Forward:
             flow += theta[k] * (slope + theta[k] * curvature)
             admittance += theta[k] * own
         return flow, admittance
+
+    def _turn(self, theta: np.ndarray) -> np.ndarray:
+        """What the shaft angles at the first samples make of the source's harmonics, (F,)."""
+        turn = np.ones(len(self.s), complex)
+        for part, index in zip(self.slices, self.angle_index):
+            if index is not None:
+                angle = self.twin.parameters[index].value(theta[index])
+                turn[part] = np.exp(1j * angle * self.order[part])
+        return turn
 
     def _line_state(self, v) -> LineState:
         fluid = self.twin.rig.fluid

@@ -31,7 +31,8 @@ def propagate(
     ----------
     twin : calibrated, with the effects it was corrected by.
     flow, healthy_flow : (M,) m3/s at the pump outlet over one revolution, of the pump to simulate
-        and of the healthy one, whose mean settles the orifice that a faulty pump also meets.
+        and of the healthy one, whose mean settles the orifice that a faulty pump also meets; both
+        as the data sheet has them, what the twin knows better is added (`pump_change`).
     speed_hz, load_pressure : rev/s, and Pa upstream of the load when the pump is healthy.
     source_capacitance : m3/Pa of the chambers beside an ideal source, see `pump.source`.
     steps : at least so many a revolution.
@@ -58,7 +59,7 @@ def line_in_time(twin, flow, healthy_flow, speed_hz, load_pressure, source_capac
         raise InputError(
             "rig.yaml", "load.kind", "a measured impedance has no time domain", "Give an orifice"
         )
-    change, more = _pump_change(twin, healthy_flow, speed_hz, load_pressure)
+    change, more = pump_change(twin, healthy_flow, speed_hz, load_pressure)
     if source_capacitance:  # a ripple that was given is an ideal source
         source_capacitance += more
     factor = twin.values().get("load", 1.0)
@@ -100,7 +101,7 @@ def line_in_time(twin, flow, healthy_flow, speed_hz, load_pressure, source_capac
     return line
 
 
-def _pump_change(twin, healthy_flow, speed_hz: float, load_pressure: float):
+def pump_change(twin, healthy_flow, speed_hz: float, load_pressure: float):
     """Flow (M,), m3/s, and capacitance, m3/Pa, by which the source of a twin that knows its pump
     better than the data sheet differs from the sheet's, healthy or not."""
     count, mean = len(healthy_flow), float(np.mean(healthy_flow))

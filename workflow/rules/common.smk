@@ -131,7 +131,7 @@ def states_of(wildcards):
     propagated = f"propagated{plus_of(dataset)}"
     return expand(
         f"{RESULTS}/{{folder}}/{{state}}.zarr",
-        folder=propagated if "CFD-MOC-P" in dataset else "faults",
+        folder=propagated if "CFD-MOC-P" in dataset or plus_of(dataset) else "faults",
         state=COMPOUND if dataset.startswith(ASIDE) else STATES,
     )
 

@@ -4,7 +4,7 @@ import xarray as xr
 
 from job import start
 from rippletwin import store
-from rippletwin.propagation import propagate
+from rippletwin.propagation import propagate, pump_change
 from rippletwin.report import load_twin
 
 tell = start(snakemake)
@@ -12,12 +12,14 @@ params = snakemake.params
 line = "corrected" if snakemake.wildcards.plus else "calibrated"
 recorded = store.load(snakemake.input.recordings)
 fault, healthy = store.load(snakemake.input.flow), store.load(snakemake.input.healthy)
+twin = load_twin(snakemake.input.twin)
+flow, healthy_flow = fault.source_flow.values, healthy.source_flow.values
+point = recorded.speed_hz, recorded.load_pressure
 result = propagate(
-    load_twin(snakemake.input.twin),
-    fault.source_flow.values,
-    healthy.source_flow.values,
-    recorded.speed_hz,
-    recorded.load_pressure,
+    twin,
+    flow,
+    healthy_flow,
+    *point,
     fault.source_capacitance_m3_pa,
     params.steps,
     params.tolerance,
@@ -30,7 +32,15 @@ if not result.converged:
     raise ArithmeticError(f"the line does not repeat itself to {params.tolerance}")
 store.save(
     xr.Dataset(
-        {"pressure": (("channel", "time"), result.pressure, {"units": "Pa"})},
+        {
+            "pressure": (("channel", "time"), result.pressure, {"units": "Pa"}),
+            # What drove the line: the pump as the twin knows it.
+            "source_flow": (
+                "time",
+                flow + pump_change(twin, healthy_flow, *point)[0],
+                {"units": "m3/s"},
+            ),
+        },
         coords={"channel": recorded.channel.values},
         attrs={
             "state": snakemake.wildcards.state,

@@ -7,12 +7,12 @@ be told that way, because the sweep's steps are common to all copies, has exact 
     turning the shaft      dp/dangle = j k p at shaft order k, nonlinear load or not
     longer segment         Z' and Y' of it in proportion, then everything behind moved back
 
-Positions of inserts and the pump's numbers are moved one by one. The orifice's nonlinear remainder
-is held meanwhile, two orders below the linear part, and so is what segments store beyond proportion
-to the pressure. That is no small part next to a sharp resonance: columns are wrong by some per
-cent, and where wave speeds, air and a branch can stand in for each other a fit stops units of log
-likelihood too soon. `follow` makes up for it by difference quotients at one place. With
-`hold_storage` what is stored is held in predictions too, which is all that makes them slow.
+Positions of inserts are moved one by one. The orifice's nonlinear remainder is held meanwhile, two
+orders below the linear part, and so is what segments store beyond proportion to the pressure. That
+is no small part next to a sharp resonance: columns are wrong by some per cent, and where wave
+speeds, air and a branch can stand in for each other a fit stops units of log likelihood too soon.
+`follow` makes up for it by difference quotients at one place. With `hold_storage` what is stored is
+held in predictions too, which is all that makes them slow.
 """
 
 from __future__ import annotations
@@ -39,8 +39,7 @@ class DifferentiableForward(Forward):
         self._sensors = range(3 * segments, 3 * segments + sensors)
         self._angles = {i: part for i, part in zip(self.angle_index, self.slices) if i is not None}
         self._positions = [k for k, name in enumerate(names) if name.endswith(".position")]
-        self._singly = [*self._positions, *(k for k, *_ in self._of_pump)]
-        apart = {*self._sensors, *self._angles, *self._singly}
+        apart = {*self._sensors, *self._angles, *self._positions}
         self._together = [k for k in range(len(names)) if k not in apart]
         self._remainder = self._drains = self._held_at = None
         self._hold = False
@@ -58,7 +57,7 @@ class DifferentiableForward(Forward):
         readings = np.concatenate(self(theta), axis=1)
         held = self.derivatives(theta)
         missed = np.zeros_like(held)
-        for k in (*self._together, *self._singly):
+        for k in (*self._together, *self._positions):
             moved = theta.copy()
             moved[k] += FOLLOWED
             slope = (np.concatenate(self(moved), axis=1) - readings) / FOLLOWED
@@ -95,7 +94,7 @@ class DifferentiableForward(Forward):
         for k, part in self._angles.items():
             turn = 1j * self.order[part] * self._rate(k, theta)
             out[k][:, part] = turn * readings[:, part]
-        for k in self._singly:
+        for k in self._positions:
             moved = theta.copy()
             step = -STEP if theta[k] > 0 else STEP  # inwards
             moved[k] += step
@@ -186,12 +185,13 @@ class DifferentiableForward(Forward):
             viscosity=value(twin.index["viscosity"]),
             load=1.0 if load is None else value(load),
         )
+        source, admittance = self._sources(theta, base, shape)
         network = Network(
             s=self.s,
             lengths=base.lengths,
             series=np.empty((n, *shape), complex),
             shunt=np.empty((n, *shape), complex),
-            source_admittance=self.source_at(theta)[1],
+            source_admittance=admittance,
             load=self._load(v.load),
             sensor_positions=v.positions,
         )
@@ -219,7 +219,7 @@ class DifferentiableForward(Forward):
             lengths=base.lengths,
             series=network.series.reshape(n, -1),
             shunt=network.shunt.reshape(n, -1),
-            source_flow=flat(base.source_flow),
+            source_flow=flat(source),
             source_admittance=flat(network.source_admittance),
             inserts=[(x, kind, flat(y)) for x, kind, y in network.inserts],
             sensor_positions=v.positions,
@@ -233,3 +233,14 @@ class DifferentiableForward(Forward):
             self._balance_held(side_by_side, flat(v.load), flat(self._remainder))
         readings = side_by_side.readings().reshape(-1, *shape)
         return readings * np.broadcast_to(network.sensor_factor, readings.shape)
+
+    def _sources(self, theta: np.ndarray, base: Network, shape: tuple) -> tuple:
+        """Flow and, effects left out, admittance of the source at theta and with each parameter
+        moved that goes together, both (1 + N, F)."""
+        flow = np.array(np.broadcast_to(base.source_flow, shape))
+        admittance = np.array(np.broadcast_to(self.source_at(theta)[1], shape))
+        for k, (slope, curvature), own in self._of_pump:
+            row = 1 + self._together.index(k)
+            flow[row] += STEP * self._turn(theta) * (slope + 2.0 * theta[k] * curvature)
+            admittance[row] += STEP * own
+        return flow, admittance

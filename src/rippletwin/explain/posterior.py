@@ -6,7 +6,8 @@ sensors, and the error of a nominal source, relative and along the prediction h,
     E[e e^H] = C + (delta^2 m + lambda^2 n) I + (sigma^2 I + tau^2 K) o g h (g h)^H + s^2 h h^H
 
 sigma is the part that differs from harmonic to harmonic, tau the part that is smooth in frequency,
-as a wrong bulk modulus or port timing makes it. Between frequencies f and f' of recordings o and p
+as a wrong bulk modulus or port timing makes it where these are no parameters of the twin. Between
+frequencies f and f' of recordings o and p
 
     K = [1 + (1 + f f'/f0^2) exp(-(f - f')^2/(2 l^2))] (1/2 + 1/2 [o = p]),     f0 = l = 1 kHz:
 
