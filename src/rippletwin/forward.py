@@ -146,7 +146,7 @@ class Forward:
             ]
         )
         source, source_admittance = self.source_at(theta)
-        source = source * self._turn(theta)
+        source = source * self.turn(theta)
         network = Network(
             s=self.s,
             lengths=v.lengths,
@@ -188,7 +188,7 @@ class Forward:
             admittance += theta[k] * own
         return flow, admittance
 
-    def _turn(self, theta: np.ndarray) -> np.ndarray:
+    def turn(self, theta: np.ndarray) -> np.ndarray:
         """What the shaft angles at the first samples make of the source's harmonics, (F,)."""
         turn = np.ones(len(self.s), complex)
         for part, index in zip(self.slices, self.angle_index):

@@ -241,6 +241,6 @@ class DifferentiableForward(Forward):
         admittance = np.array(np.broadcast_to(self.source_at(theta)[1], shape))
         for k, (slope, curvature), own in self._of_pump:
             row = 1 + self._together.index(k)
-            flow[row] += STEP * self._turn(theta) * (slope + 2.0 * theta[k] * curvature)
+            flow[row] += STEP * self.turn(theta) * (slope + 2.0 * theta[k] * curvature)
             admittance[row] += STEP * own
         return flow, admittance

@@ -14,11 +14,12 @@ from rippletwin.case import Case
 from rippletwin.effects import candidates
 from rippletwin.errors import InputError
 from rippletwin.explain import contradiction, detect, locate
+from rippletwin.explain.answer import answered
 from rippletwin.explain.bootstrap import Chance, chance
 from rippletwin.explain.fit import Fit, fit_hypothesis, prepare
 from rippletwin.explain.intervals import profiled
 from rippletwin.explain.judge import ADEQUATE, Judgement, judge
-from rippletwin.explain.search import ACCEPT, GOOD, Search, extended, search
+from rippletwin.explain.search import ACCEPT, GOOD, Search, again, extended, search
 from rippletwin.explain.shaft import (
     RELATIVE,
     ShaftLines,
@@ -133,6 +134,15 @@ def explain_observations(
             found = Search(fit, [], fit)
         else:
             found = search(pool, progress)
+    if not reason and found.best.floor < ADEQUATE:
+        known = answered(found.best.twin, data)
+        if known is not None:
+            data, base = known, Twin(rig, known, uncertain_pump=True)
+            Forward(base, data)
+            with workers(base, data, processes) as pool:
+                found = again(pool, found, progress)
+    with workers(base, data, processes) as pool:
+        if not reason:
             found.best = profiled(pool, that_transfers(pool, found.best, held))
             found.others = _others(pool, found)
             reason = contradiction.wiring(base, data, found)

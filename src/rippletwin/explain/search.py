@@ -24,6 +24,7 @@ CERTAIN = -3.0  # the same for an effect that no real line is without: twenty to
 MOST = 4  # effects at a time
 STAND_INS = 10  # single effects tried in the place of another
 DRAWS = 800  # about each fit below a limit
+CLOSE = 4.0 * ACCEPT  # log evidence within which a rival is worth another look
 LENT = 5  # single effects from whose lines the base is fitted again
 LIMITS = {"line_volume": "load_volume"}  # effects at any place that are another at the line's end
 GOOD = 2.0 * FLOOR  # relative model error at which a fit is as good as it can be believed
@@ -68,11 +69,31 @@ class Search:
 
 def search(pool: Workers, progress: Callable[[str, int, int], None] | None = None) -> Search:
     """Forward and backward steps over the library, from the base; see `Search`."""
-    rig = pool.base.rig
-    found = library(rig, pool.observations)
+    found = library(pool.base.rig, pool.observations)
     base, singles = alone(pool, found, progress)
-    best, rivals = base, singles
-    step = singles
+    return _stepwise(pool, Search(base, singles, base, singles), found, progress)
+
+
+def again(pool: Workers, past: Search, progress=None) -> Search:
+    """The search on data that differ little from those of `past`: its fits from where they ended,
+    and steps on from its best."""
+    close = [f for f in past.rivals if past.best.evidence - f.evidence < CLOSE]
+    fits = [past.base, *past.singles, past.best, *close]
+    jobs = [{"hypothesis": f.hypothesis, "theta": f.twin.theta} for f in fits]
+    tell = _counter(progress, "again", len(jobs))
+    base, *rest = pool.fit(jobs, tell)
+    count = len(past.singles)
+    singles, best, rivals = _ranked(rest[:count]), rest[count], _ranked(rest[count + 1 :])
+    found = library(pool.base.rig, pool.observations)
+    return _stepwise(pool, Search(base, singles, best, rivals), found, progress)
+
+
+def _stepwise(pool: Workers, begun: Search, found: Sequence, progress) -> Search:
+    """Steps forward and back from `begun.best`, with the candidates `found`."""
+    base, singles = begun.base, begun.singles
+    best, rivals, step = begun.best, begun.rivals, singles
+    if best.hypothesis:
+        step = _extensions(pool, best, found, progress)
     while True:
         new = step[0] if step else None
         if new is None or new.evidence - best.evidence < needed(new):
@@ -88,14 +109,18 @@ def search(pool: Workers, progress: Callable[[str, int, int], None] | None = Non
         best = settled(pool, best)
         if len(best.hypothesis) >= MOST:
             break
-        jobs = [
-            extended(best, candidate, rig)
-            for candidate in found
-            if candidate not in best.hypothesis
-        ]
-        tell = _counter(progress, f"{len(best.hypothesis) + 1} effects", len(jobs))
-        step = _ranked(pool.fit(jobs, tell))
+        step = _extensions(pool, best, found, progress)
     return Search(base, singles, best, rivals)
+
+
+def _extensions(pool: Workers, best: Fit, found: Sequence, progress) -> list[Fit]:
+    """`best` with each of the candidates besides that it has not, best first."""
+    rig = pool.base.rig
+    jobs = [
+        extended(best, candidate, rig) for candidate in found if candidate not in best.hypothesis
+    ]
+    tell = _counter(progress, f"{len(best.hypothesis) + 1} effects", len(jobs))
+    return _ranked(pool.fit(jobs, tell))
 
 
 def alone(pool: Workers, found: Sequence, progress=None) -> tuple[Fit, list[Fit]]:

@@ -140,20 +140,32 @@ def solve_stage(p, rate, target, step, tables, pump, case_leak, cross_leak, c_pl
 
 @njit(cache=True)
 def revolution(
-    p, tables, stage_tables, step, pump, case_leak, cross_leak, line, line_p, line_q, sensors
+    p,
+    tables,
+    stage_tables,
+    step,
+    pump,
+    case_leak,
+    cross_leak,
+    line,
+    line_p,
+    line_q,
+    sensors,
+    outlet,
 ):
     """One revolution of K steps, from the state `p` and the line's, both overwritten.
 
     p             (n + 1,) pressures of the chambers and the outlet, Pa
     tables        (K, 4, n) at the end of each step, as for `solve_stage`
     stage_tables  (K, 4, n) at its first stage
-    line          (Zc, half the friction of a cell Pa s/m3, K_v of the orifice, outlet pressure)
-    line_p/_q     (cells + 1,) state of the line, empty for a constant outlet pressure
+    line          (Zc, half the friction of a cell Pa s/m3, K_v of the orifice)
+    line_p/_q     (cells + 1,) state of the line, empty where the outlet's pressure is given
     sensors       (S, 5): first of four neighbouring nodes, and their weights
+    outlet        (K,) the outlet's pressure at the end of each step, Pa; empty with a line
     Returns flow (K,), pressures (K, n + 1) and sensor pressures (K, S), each at a step's end.
     """
     steps, _, n = tables.shape
-    zc, half, k_v, constant = line
+    zc, half, k_v = line
     flow = np.empty(steps)
     pressures = np.empty((steps, n + 1))
     readings = np.empty((steps, len(sensors)))
@@ -163,10 +175,10 @@ def revolution(
     piped = cells > 0
     new_p, new_q = np.empty_like(line_p), np.empty_like(line_q)
     impedance = zc + half if piped else 0.0
-    c_old = line_p[0] - impedance * line_q[0] if piped else constant
+    c_old = line_p[0] - impedance * line_q[0] if piped else outlet[steps - 1]
     for i in range(steps):
         # C- characteristic arriving at the pump (Wylie & Streeter 1993, ch. 3)
-        c_new = line_p[1] - (zc - half) * line_q[1] if piped else constant
+        c_new = line_p[1] - (zc - half) * line_q[1] if piped else outlet[i]
         for k in range(n):
             content[k], _ = compression(p[k], pump[0], pump[1])
         c_stage = c_old + GAMMA * (c_new - c_old)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import resample
 
 from rippletwin.case.model import FlowRipple, Fluid, Segment
 from rippletwin.pump import chambers
@@ -39,6 +40,13 @@ class ConstantPressure:
     """An outlet held at `pressure` (Pa, absolute)."""
 
     pressure: float
+
+
+@dataclass(frozen=True)
+class PressureWave:
+    """An outlet whose pressure (M,), Pa absolute, is given at M even angles of a revolution."""
+
+    pressure: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -106,7 +114,7 @@ def simulate(
     pump: dict,
     fluid: Fluid,
     speed_rpm: float,
-    outlet: ConstantPressure | Pipe,
+    outlet: ConstantPressure | PressureWave | Pipe,
     fault: Slipper | Cylinder | Sequence[Slipper | Cylinder] | None = None,
     samples_per_revolution: int = 3072,
     min_steps: int = MIN_STEPS,
@@ -132,7 +140,8 @@ def simulate(
 
     mean_flow = geometry.displacement / period
     line, line_p, line_q, sensors = _line(fluid, outlet, period / steps, cells, mean_flow)
-    load_pressure = line_p[0] if cells else outlet.pressure
+    given = np.zeros(0) if cells else _at_steps(outlet.pressure, steps)
+    load_pressure = line_p[0] if cells else given.mean()
     delivering = np.arange(geometry.pistons) * 2 > geometry.pistons
     state = np.append(np.where(delivering, load_pressure, geometry.suction_pressure), load_pressure)
 
@@ -140,7 +149,7 @@ def simulate(
     for revolutions in range(1, MAX_REVOLUTIONS + 1):  # noqa: B007 (reported)
         flow, pressures, readings = chambers.revolution(
             state, end_of_step, first_stage, period / steps, constants, case_leak, cross_leak,
-            line, line_p, line_q, sensors,
+            line, line_p, line_q, sensors, given,
         )  # fmt: skip
         if not np.isfinite(flow).all():
             raise ArithmeticError(f"the chamber equations did not converge at {speed_rpm} r/min")
@@ -150,7 +159,7 @@ def simulate(
             break
         previous = flow
         if cells and outlet.orifice is None:
-            line = (line[0], line[1], flow.mean() / np.sqrt(outlet.load_pressure), line[3])
+            line = (line[0], line[1], flow.mean() / np.sqrt(outlet.load_pressure))
 
     def sample(values):  # values at the end of each step -> at the output's angles
         return _resample(np.roll(values, 1, axis=0), samples_per_revolution).T
@@ -179,7 +188,7 @@ def _steps(pistons, period, outlet, least):
     interpolation nor an altered wave speed.
     """
     first = -(-least // pistons) * pistons
-    if isinstance(outlet, ConstantPressure):
+    if not isinstance(outlet, Pipe):
         return first, 0
     candidates = first + pistons * np.arange(max(first // pistons, 1))
     cells = outlet.segment.delay * candidates / period
@@ -227,7 +236,7 @@ def _line(fluid, outlet, step, cells, mean_flow):
     """
     if not cells:
         empty = np.zeros(0)
-        return (0.0, 0.0, 0.0, outlet.pressure), empty, empty, np.zeros((0, 5))
+        return (0.0, 0.0, 0.0), empty, empty, np.zeros((0, 5))
     segment = outlet.segment
     zc = fluid.density * segment.wave_speed / segment.area
     viscosity = fluid.density * fluid.kinematic_viscosity
@@ -246,7 +255,14 @@ def _line(fluid, outlet, step, cells, mean_flow):
         for m in range(4):
             others = np.delete(np.arange(4), m)
             row[1 + m] = np.prod((u - others) / (m - others))
-    return (zc, half, k_v, 0.0), line_p, line_q, sensors
+    return (zc, half, k_v), line_p, line_q, sensors
+
+
+def _at_steps(pressure, steps):
+    """The outlet's pressure at the end of each step, (steps,)."""
+    if np.ndim(pressure) == 0:
+        return np.full(steps, float(pressure))
+    return np.roll(resample(np.asarray(pressure, float), steps), -1)
 
 
 def _resample(values, samples):
