@@ -16,7 +16,7 @@ def test_shaft_orders_alone_need_no_effect_of_the_line():
     )
     e.judgement.accepted.twin = SimpleNamespace(parameters=(), theta=())
     misfits = {"before": {"held_out": 0.02}, "after": {"held_out": 0.02}}
-    result = {"verdict": "named", "fit": misfits, "next_recording": None}
+    result = {"verdict": "named", "fit": misfits, "next_recording": None, "pump": {}}
     words = sentence(e, result, [], None)
     assert "pistons' harmonics the twin lacks nothing" in words
     assert "2.0% of the ripple show piston spread" in words
@@ -34,7 +34,27 @@ def test_calibration_only_names_the_value_that_is_off(ringing, told):
     )
     e.judgement.accepted.twin = SimpleNamespace(parameters=(), theta=())
     misfits = {"before": {"held_out": 0.01}, "after": {"held_out": 0.01}}
-    result = {"verdict": "calibration_only", "fit": misfits, "next_recording": None}
+    result = {"verdict": "calibration_only", "fit": misfits, "next_recording": None, "pump": {}}
     words = sentence(e, result, [], None)
     assert words.startswith("The line's nominal values are off")
     assert ("diameter[4] is 2.9 standard deviations from the data sheet" in words) is told
+
+
+def test_the_pump_is_told_where_it_is_not_the_sheets():
+    """Ports late by half a degree are worth a sentence; numbers within their intervals are not."""
+    e = SimpleNamespace(
+        shaft=None,
+        alarms=SimpleNamespace(ringing=(), pull=(0.1, "load")),
+        judgement=SimpleNamespace(accepted=SimpleNamespace(hypothesis=())),
+    )
+    e.judgement.accepted.twin = SimpleNamespace(parameters=(), theta=())
+    modulus = {"value": 1.21e9, "sheet": 1.25e9, "ci95": [1.15e9, 1.27e9], "unit": "Pa"}
+    timing = {"value": 0.5, "sheet": 0.0, "ci95": [0.4, 0.6], "unit": "deg"}
+    result = {
+        "verdict": "consistent",
+        "fit": {"before": {"held_out": 0.01}, "after": {"held_out": 0.01}},
+    }
+    result |= {"next_recording": None, "pump": {"bulk_modulus": modulus, "port_timing": timing}}
+    assert "its port plate 0.50 deg late" in sentence(e, result, [], None)
+    timing["ci95"] = [-0.1, 1.1]
+    assert "port plate" not in sentence(e, result, [], None)
