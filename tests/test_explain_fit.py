@@ -252,3 +252,28 @@ def test_log_likelihood_is_that_of_the_whole_covariance_matrix():
     assert square == pytest.approx((e.conj() @ np.linalg.solve(dense, e)).real, rel=2e-3)
     # The kernel is cut at 0.1 % of its largest eigenvalue; evidence is judged in whole units.
     assert log_determinant == pytest.approx(np.linalg.slogdet(dense)[1], abs=0.7)
+
+
+@pytest.mark.parametrize("source_free", [False, True])
+def test_the_gradient_is_that_of_the_objective(source_free):
+    """The covariance is the prediction's own, so that its determinant has a say in where to go: the
+    change of the objective in any direction of the prediction, by difference quotients, is what
+    residual, Jacobian and determinant say it is."""
+    _, observations, truth = make(np.random.default_rng(8))
+    posterior = Posterior(truth, observations, None, source_free)
+    theta = truth.theta + 0.05
+    h = posterior.predict(theta)
+    posterior.estimate_errors(h, theta)
+    rng = np.random.default_rng(9)
+    ways = 0.1 * np.abs(h).mean() * (rng.normal(size=(5, *h.shape, 2)) @ np.array([1, 1j]))
+    r, jacobian, determinant = posterior.linearise(theta, h, ways)
+    told = (jacobian.T @ r + determinant)[len(theta) :]
+    step = 1e-5
+    made = [
+        (posterior.objective(theta, h + step * d) - posterior.objective(theta, h - step * d))
+        / (2 * step)
+        for d in ways
+    ]
+    np.testing.assert_allclose(told, made, rtol=1e-5, atol=1e-4 * np.max(np.abs(made)))
+    if not source_free:  # noise that is the same at all sensors gives a free source none
+        assert np.max(np.abs(determinant)) > 0.01 * np.max(np.abs(made))

@@ -217,7 +217,8 @@ class Posterior:
             self.forward.follow(theta)
 
     def linearise(self, theta: np.ndarray, prediction: np.ndarray, besides=None):
-        """Residual (N,) and its Jacobian (N, P) at the present errors, their covariance held.
+        """Residual r (N,), its Jacobian J (N, P) and the log determinant's slope (P,), all at the
+        present errors: the gradient of `objective` is J^T r and that slope together.
 
         Of the N residuals 2 S F are the whitened ones, of unit variance; theta follows where it
         has a prior. `besides` (B, S, F) are further directions in which the prediction may go,
@@ -232,12 +233,14 @@ class Posterior:
             slopes = np.concatenate([slopes, besides])
         metric = self._metric(prediction)
         whitened = metric.apply(self._rotated - self._rotate(prediction))
+        determinant = metric.log_determinant_slopes(self._rotate(slopes))
         # The sum of squares is least over the source's error, so its gradient is that with the
         # source held at its most likely value, which every slope therefore carries.
         slopes = slopes * self._source(prediction, metric, whitened)
         columns = -_real(metric.apply(self._rotate(slopes))).reshape(len(slopes), -1)
         r = np.concatenate([_real(whitened).ravel(), theta[self.prior]])
-        return r, np.concatenate([columns.T, np.eye(len(theta), len(slopes))[self.prior]])
+        jacobian = np.concatenate([columns.T, np.eye(len(theta), len(slopes))[self.prior]])
+        return r, jacobian, determinant
 
     def best_source(self, prediction: np.ndarray) -> np.ndarray:
         """The prediction with every free source at its most likely amplitude, (S, F)."""
@@ -280,6 +283,10 @@ class Metric:
         power = np.sum(np.abs(h) ** 2, axis=0)
         volume = np.where(free, self._size / np.maximum(power, 1e-300), stretch)
         self.log_determinant = float(2.0 * np.sum(np.log(sd)) + np.sum(np.log(volume)))
+        # What the log determinant gains by |h/sd|^2 and by |h|^2 of each frequency.
+        by_source = np.where(free, 0.0, source) ** 2 / stretch
+        self._by_size = np.where(free, 1.0 / self._size, by_source)
+        self._by_power = np.where(free, -1.0 / np.maximum(power, 1e-300), 0.0)
         self._part, self._columns = nominal, None
         if np.any(basis):
             # Whitened so far, the smooth error is B c with unit c: I + B B^H in the span of B.
@@ -289,7 +296,15 @@ class Metric:
             columns = (turn / np.sqrt(grown)).T @ basis  # orthonormal over (S, N) with u
             self._columns = columns[:, None, :] * (self._u / np.sqrt(stretch))[:, nominal]
             self._reduce = 1.0 - 1.0 / np.sqrt(1.0 + grown)
+            shares = np.sum((turn.T @ basis) ** 2 / (1.0 + grown)[:, None], axis=0)
+            self._by_size[nominal] += shares / stretch[nominal] ** 2
             self.log_determinant += float(np.sum(np.log1p(grown)))
+
+    def log_determinant_slopes(self, directions: np.ndarray) -> np.ndarray:
+        """What the log determinant gains as h goes in each of `directions` (P, S, F): (P,)."""
+        along = 2.0 * np.sum((np.conj(self._u) * directions).real / self._sd, axis=1)
+        power = 2.0 * np.sum((np.conj(self._u * self._sd) * directions).real, axis=1)
+        return along @ self._by_size + power @ self._by_power
 
     def apply(self, x: np.ndarray) -> np.ndarray:
         """x (..., S, F) multiplied."""

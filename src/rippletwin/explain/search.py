@@ -76,7 +76,7 @@ def search(pool: Workers, progress: Callable[[str, int, int], None] | None = Non
 
 def again(pool: Workers, past: Search, progress=None) -> Search:
     """The search on data that differ little from those of `past`: its fits from where they ended,
-    and steps on from its best."""
+    and steps from its best, of which what has become needless is dropped first."""
     close = [f for f in past.rivals if past.best.evidence - f.evidence < CLOSE]
     fits = [past.base, *past.singles, past.best, *close]
     jobs = [{"hypothesis": f.hypothesis, "theta": f.twin.theta} for f in fits]
@@ -85,6 +85,7 @@ def again(pool: Workers, past: Search, progress=None) -> Search:
     count = len(past.singles)
     singles, best, rivals = _ranked(rest[:count]), rest[count], _ranked(rest[count + 1 :])
     found = library(pool.base.rig, pool.observations)
+    best = settled(pool, simplify(pool, exchange(pool, backward(pool, best), singles), found))
     return _stepwise(pool, Search(base, singles, best, rivals), found, progress)
 
 
