@@ -33,22 +33,39 @@ def _answered(twin: Twin, observation):
     given = observation.kind != "periodic" or observation.source != "nominal"
     if given or observation.flow_ripple is not None:
         return observation
-    from rippletwin.pump import PressureWave, simulate
+    from rippletwin.pump import ConstantPressure, PressureWave, simulate
 
     ripple = twin.operating_point(observation).ripple
     forward = Forward(twin, [observation])
     orders = np.asarray(observation.orders, int)
-    turn = forward.turn(twin.theta)
+    pump, turned = _pump(twin)
+    # In the frame of the port plate, which the twin turns with the shaft (`pump.uncertain`).
+    turn = forward.turn(twin.theta) * np.exp(1j * orders * turned)
     outlet = forward.network(twin.theta).pressure_at([0.0])[0] / turn
-    count = len(ripple.flow)
+    count, mean = len(ripple.flow), observation.load_pressure
 
     def wave(harmonics):
         spectrum = np.zeros(count // 2 + 1, complex)
         spectrum[orders] = 0.5 * count * harmonics
         return np.fft.irfft(spectrum, count)
 
-    pressure = PressureWave(observation.load_pressure + wave(outlet))
-    rig, speed_rpm = twin.rig, 60.0 * observation.speed_hz
-    delivered = simulate(rig.pump, rig.fluid, speed_rpm, pressure, samples_per_revolution=count)
-    taken = wave(ripple.source_admittance(forward.s) * outlet)
-    return replace(observation, flow_ripple=replace(ripple, flow=delivered.flow + taken))
+    def harmonics(outlet):
+        speed_rpm = 60.0 * observation.speed_hz
+        run = simulate(pump, twin.rig.fluid, speed_rpm, outlet, samples_per_revolution=count)
+        return 2.0 / count * np.fft.rfft(run.flow)[orders], run
+
+    free, source = harmonics(ConstantPressure(mean))
+    delivered, _ = harmonics(PressureWave(mean + wave(outlet)))
+    answer = delivered - free + source.source_admittance(forward.s) * outlet
+    flow = ripple.flow + wave(answer * np.exp(1j * orders * turned))
+    return replace(observation, flow_ripple=replace(ripple, flow=flow))
+
+
+def _pump(twin: Twin) -> tuple[dict, float]:
+    """The pump with its numbers as fitted, and the angle, rad, by which its port plate is off."""
+    values, pump = twin.values(), dict(twin.rig.pump)
+    if not twin.uncertain_pump:
+        return pump, 0.0
+    sheet = twin.parameters[twin.index["port_timing"]].nominal
+    pump |= {"bulk_modulus": values["bulk_modulus"], "port_timing_deg": values["port_timing"]}
+    return pump, float(np.radians(values["port_timing"] - sheet))

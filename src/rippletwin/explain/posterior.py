@@ -48,9 +48,10 @@ FLOOR = 0.004
 sensors' noise: harmonic means over a wandering speed, the orifice's exponent, the mesh."""
 
 FLOORS = np.geomspace(FLOOR, 1.5, 9)
-SOURCE_SDS = np.array([0.003, 0.01, 0.03, 0.1])
-"""sigma is one of these, the last being the largest that is put down to the ripple."""
-SMOOTH_SDS = np.array([0.003, 0.01, 0.03, 0.1])  # the same for tau
+SOURCE_SDS = np.array([0.01, 0.03, 0.1])
+"""sigma is one of these: no pump model has a harmonic to better than 1 %, and the last is the largest
+that is put down to the ripple."""
+SMOOTH_SDS = np.array([0.01, 0.03, 0.1])  # the same for tau
 SIZE = 0.03  # s
 CORRELATION_HZ = 1000.0  # l and f0
 LEAST = 0.01  # of the strongest harmonic: smaller ones are uncertain by more than their own share
@@ -73,7 +74,7 @@ class Posterior:
         self.observations = [cut(o, max_frequency_hz) for o in observations]
         self.forward = DifferentiableForward(twin, self.observations)
         self.source_free = source_free
-        self.floor, self.source_sd, self.smooth_sd = 0.1, float(SOURCE_SDS[2]), 0.0
+        self.floor, self.source_sd, self.smooth_sd = 0.1, float(SOURCE_SDS[1]), 0.0
         self.most, self._products = np.inf, 0.0
         self.prior = np.array([not p.flat for p in twin.parameters])
         data = [comparable(o, twin.rig) for o in self.observations]
