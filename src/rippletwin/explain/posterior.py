@@ -49,8 +49,8 @@ sensors' noise: harmonic means over a wandering speed, the orifice's exponent, t
 
 FLOORS = np.geomspace(FLOOR, 1.5, 9)
 SOURCE_SDS = np.array([0.01, 0.03, 0.1])
-"""sigma is one of these: no pump model has a harmonic to better than 1 %, and the last is the largest
-that is put down to the ripple."""
+"""sigma is one of these: no pump model has a harmonic to better than 1 %, and the last is the
+largest that is put down to the ripple."""
 SMOOTH_SDS = np.array([0.01, 0.03, 0.1])  # the same for tau
 SIZE = 0.03  # s
 CORRELATION_HZ = 1000.0  # l and f0
