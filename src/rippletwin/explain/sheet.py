@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields, replace
 from rippletwin.case import Rig, Uncertainty
 from rippletwin.explain import detect
 from rippletwin.explain.fit import Fit
+from rippletwin.explain.search import ACCEPT
 from rippletwin.explain.validate import score
 from rippletwin.explain.workers import Workers, in_common
 from rippletwin.parameters import coordinates
@@ -32,7 +33,7 @@ class WithoutEffect:
     parameter  the line's parameter that goes furthest from the sheet
     value, nominal   its values, `unit`
     pull       how far that is, in standard deviations as stated
-    rivals     whether the fit is nearly as good as the accepted one
+    rivals     whether the fit is nearly as good as the accepted one, or hardly any evidence is lost
     """
 
     effect: str
@@ -63,17 +64,18 @@ def without_each(pool: Workers, base: Fit, accepted: Fit) -> tuple[WithoutEffect
         theta = coordinates(pool.base.parameters, fit.twin.values())
         pull, name = detect.pull(replace(fit, twin=pool.base.with_(theta=theta)))
         parameter = pool.base.parameters[pool.base.index[name]]
+        lost = accepted.evidence - stated.evidence
         found.append(
             WithoutEffect(
                 effect=effect.name,
-                evidence=accepted.evidence - stated.evidence,
+                evidence=lost,
                 misfit=misfit,
                 parameter=parameter.name,
                 value=fit.twin.values()[parameter.name],
                 nominal=parameter.nominal,
                 unit=parameter.unit,
                 pull=pull,
-                rivals=misfit < limit,
+                rivals=misfit < limit or lost < ACCEPT,
             )
         )
     return tuple(found)
