@@ -124,9 +124,9 @@ def test_derivatives():
 
 
 def test_numbers_are_found():
-    """Recordings of a pump simulated with other numbers: a fit finds both within two of its standard
-    deviations, at most a fifth of the priors', and leaves a seventh of the misfit of one that takes
-    the sheet's ripple for true."""
+    """Recordings of a pump simulated with other numbers: a fit finds both within two of its
+    standard deviations, at most a fifth of the priors', and leaves a seventh of the misfit of one
+    that takes the sheet's ripple for true."""
     data = observations()
     other = [
         replace(o, flow_ripple=ripple(speed_rpm, pressure, modulus=MODULUS, timing=TIMING))
