@@ -28,9 +28,9 @@ def descend(
     value = posterior.objective(theta, prediction)
     damping = 1e-2
     for _ in range(max_steps):
-        r, jacobian, determinant = posterior.linearise(theta, prediction)
+        r, jacobian = posterior.linearise(theta, prediction)
         jacobian = jacobian[:, free]
-        gradient, hessian = jacobian.T @ r + determinant[free], jacobian.T @ jacobian
+        gradient, hessian = jacobian.T @ r, jacobian.T @ jacobian
         scale = np.maximum(np.diag(hessian), 1e-6)
         accepted = False
         while damping < 1e6:

@@ -142,7 +142,7 @@ class _Scan:
         self.posterior = posterior_of(fit, observations, FLOOR)
         theta = fit.twin.theta
         self.prediction = self.posterior.predict(theta)
-        r, jacobian, _ = self.posterior.linearise(theta, self.prediction)
+        r, jacobian = self.posterior.linearise(theta, self.prediction)
         self.residual = r[: 2 * self.prediction.size]
         self.jacobian = jacobian[: 2 * self.prediction.size]
         self.network = self.posterior.forward.network(theta)

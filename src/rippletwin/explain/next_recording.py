@@ -116,7 +116,7 @@ def loss(accepted: Fit, rival: Fit, rig: Rig, observation: Observation) -> float
     posterior.floor = max(accepted.floor, FLOOR)
     posterior.source_sd = rival.source_sd
     posterior.smooth_sd = rival.smooth_sd
-    r, jacobian, _ = posterior.linearise(twin.theta, posterior.predict(twin.theta))
+    r, jacobian = posterior.linearise(twin.theta, posterior.predict(twin.theta))
     count = 2 * values.size
     r = r[:count]
     variances, basis = np.linalg.eigh(_covariance(rival, twin))

@@ -21,7 +21,8 @@ tau is what the residual says, but of one thing it says nothing: an error of the
 all operating points share is taken up by the line's impedance, all segments alike. Displacement
 fixes the mean flow and not the backflow, which makes most of a ripple and goes with the bulk
 modulus. So a size common to all is uncertain by s = 3 % whatever tau is; without it the impedances
-of concealed cases were off by 1 to 4 % and stated to 0.8 % (docs/explain.md).
+of concealed cases were off by 1 to 4 % and stated to 0.8 % (docs/explain.md). Where the bulk
+modulus is a parameter of its own, 1 % is left to dead volumes, ports and leakage.
 
 g >= 1 is the size of the nominal ripple about a harmonic over that of the harmonic itself: where
 two parts of the ripple cancel, or 40 dB below the strongest harmonic, a few per cent of the parts
@@ -29,7 +30,8 @@ are a large part of the sum. n is the mean square over sensors of what an orific
 harmonics make of the prediction; they are wrong by lambda, several times the harmonics' own error,
 and come from the load and not along h.
 
-All is built from the prediction and not from the data (a shrinking model would fit anything else).
+Residuals are judged by the prediction and not by the data (a shrinking model would fit anything
+else), the determinant is the data's (a shrinking model would gain by it).
 Explaining adds a least delta, and the choice to be blind to the source: sigma infinite, which
 projects its amplitude and phase out at every frequency. All observations stand side by side.
 """
@@ -52,7 +54,7 @@ SOURCE_SDS = np.array([0.01, 0.03, 0.1])
 """sigma is one of these: no pump model has a harmonic to better than 1 %, and the last is the
 largest that is put down to the ripple."""
 SMOOTH_SDS = np.array([0.01, 0.03, 0.1])  # the same for tau
-SIZE = 0.03  # s
+SIZE, SIZE_OF_PUMP = 0.03, 0.01  # s, and s where the pump's numbers are parameters
 CORRELATION_HZ = 1000.0  # l and f0
 LEAST = 0.01  # of the strongest harmonic: smaller ones are uncertain by more than their own share
 PRODUCTS = 0.2  # lambda
@@ -76,6 +78,8 @@ class Posterior:
         self.source_free = source_free
         self.floor, self.source_sd, self.smooth_sd = 0.1, float(SOURCE_SDS[1]), 0.0
         self.most, self._products = np.inf, 0.0
+        self._size = SIZE_OF_PUMP if twin.uncertain_pump else SIZE
+        self._known_for, self._known_determinant = None, 0.0
         self.prior = np.array([not p.flat for p in twin.parameters])
         data = [comparable(o, twin.rig) for o in self.observations]
         covariance = np.concatenate([o.covariance for o in data])
@@ -122,7 +126,20 @@ class Posterior:
         the first one's.
         """
         metric = self._metric(prediction[(0,) * (prediction.ndim - 2)])
-        return metric.apply(self._rotated - self._rotate(prediction)), metric.log_determinant
+        r = metric.apply(self._rotated - self._rotate(prediction))
+        return r, self._log_determinant()
+
+    def _log_determinant(self) -> float:
+        """Of the covariance that readings as large as the data have: a harmonic's error goes with
+        the source's size as it was. Were it the prediction's, the determinant would reward one that
+        is too small at all frequencies, of which the error of the size takes up the whole."""
+        errors = self.floor, self.source_sd, self.smooth_sd, np.sum(self._products)
+        if errors != self._known_for:
+            self._known_for, self._known_determinant = (
+                errors,
+                self._metric(self.values).log_determinant,
+            )
+        return self._known_determinant
 
     def _variance(self, floor) -> np.ndarray:
         """Of the readings, (..., S, F), but for the source's share."""
@@ -141,7 +158,7 @@ class Posterior:
     def _sds(self, smooth_sd) -> np.ndarray:
         """Standard deviations (..., J) of the basis's amplitudes for tau (...)."""
         smooth = np.repeat(np.asarray(smooth_sd)[..., None], len(self._basis) - 1, axis=-1)
-        return np.concatenate([smooth, np.full((*smooth.shape[:-1], 1), SIZE)], axis=-1)
+        return np.concatenate([smooth, np.full((*smooth.shape[:-1], 1), self._size)], axis=-1)
 
     def draw(self, prediction: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Values (S, F) that a twin of this prediction might have given, its errors drawn anew.
@@ -218,8 +235,8 @@ class Posterior:
             self.forward.follow(theta)
 
     def linearise(self, theta: np.ndarray, prediction: np.ndarray, besides=None):
-        """Residual r (N,), its Jacobian J (N, P) and the log determinant's slope (P,), all at the
-        present errors: the gradient of `objective` is J^T r and that slope together.
+        """Residual r (N,) and its Jacobian J (N, P) at the present errors; the gradient of the
+        `objective` is J^T r.
 
         Of the N residuals 2 S F are the whitened ones, of unit variance; theta follows where it
         has a prior. `besides` (B, S, F) are further directions in which the prediction may go,
@@ -234,14 +251,12 @@ class Posterior:
             slopes = np.concatenate([slopes, besides])
         metric = self._metric(prediction)
         whitened = metric.apply(self._rotated - self._rotate(prediction))
-        determinant = metric.log_determinant_slopes(self._rotate(slopes))
         # The sum of squares is least over the source's error, so its gradient is that with the
         # source held at its most likely value, which every slope therefore carries.
         slopes = slopes * self._source(prediction, metric, whitened)
         columns = -_real(metric.apply(self._rotate(slopes))).reshape(len(slopes), -1)
         r = np.concatenate([_real(whitened).ravel(), theta[self.prior]])
-        jacobian = np.concatenate([columns.T, np.eye(len(theta), len(slopes))[self.prior]])
-        return r, jacobian, determinant
+        return r, np.concatenate([columns.T, np.eye(len(theta), len(slopes))[self.prior]])
 
     def best_source(self, prediction: np.ndarray) -> np.ndarray:
         """The prediction with every free source at its most likely amplitude, (S, F)."""
@@ -284,10 +299,6 @@ class Metric:
         power = np.sum(np.abs(h) ** 2, axis=0)
         volume = np.where(free, self._size / np.maximum(power, 1e-300), stretch)
         self.log_determinant = float(2.0 * np.sum(np.log(sd)) + np.sum(np.log(volume)))
-        # What the log determinant gains by |h/sd|^2 and by |h|^2 of each frequency.
-        by_source = np.where(free, 0.0, source) ** 2 / stretch
-        self._by_size = np.where(free, 1.0 / self._size, by_source)
-        self._by_power = np.where(free, -1.0 / np.maximum(power, 1e-300), 0.0)
         self._part, self._columns = nominal, None
         if np.any(basis):
             # Whitened so far, the smooth error is B c with unit c: I + B B^H in the span of B.
@@ -297,15 +308,7 @@ class Metric:
             columns = (turn / np.sqrt(grown)).T @ basis  # orthonormal over (S, N) with u
             self._columns = columns[:, None, :] * (self._u / np.sqrt(stretch))[:, nominal]
             self._reduce = 1.0 - 1.0 / np.sqrt(1.0 + grown)
-            shares = np.sum((turn.T @ basis) ** 2 / (1.0 + grown)[:, None], axis=0)
-            self._by_size[nominal] += shares / stretch[nominal] ** 2
             self.log_determinant += float(np.sum(np.log1p(grown)))
-
-    def log_determinant_slopes(self, directions: np.ndarray) -> np.ndarray:
-        """What the log determinant gains as h goes in each of `directions` (P, S, F): (P,)."""
-        along = 2.0 * np.sum((np.conj(self._u) * directions).real / self._sd, axis=1)
-        power = 2.0 * np.sum((np.conj(self._u * self._sd) * directions).real, axis=1)
-        return along @ self._by_size + power @ self._by_power
 
     def apply(self, x: np.ndarray) -> np.ndarray:
         """x (..., S, F) multiplied."""

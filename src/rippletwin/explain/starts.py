@@ -119,7 +119,7 @@ def promising(base: Twin, posterior: Posterior, thetas: list) -> list:
     prediction = own.predict(theta)
     own.estimate_errors(prediction, theta)
     ways = np.array([posterior.predict(start) for start in thetas]) - prediction
-    r, jacobian, _ = own.linearise(theta, prediction, ways)
+    r, jacobian = own.linearise(theta, prediction, ways)
     jacobian, ways = jacobian[:, : len(theta)], jacobian[:, len(theta) :]
     both = np.linalg.lstsq(jacobian, np.column_stack([r, ways]), rcond=None)[0]
     r, ways = r - jacobian @ both[:, 0], ways - jacobian @ both[:, 1:]

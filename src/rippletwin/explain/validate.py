@@ -191,7 +191,7 @@ def _turned(posterior: Posterior, theta: np.ndarray) -> np.ndarray:
         return theta
     theta = align(posterior, theta)[1]
     for _ in range(6):
-        r, jacobian, _ = posterior.linearise(theta, posterior.predict(theta))
+        r, jacobian = posterior.linearise(theta, posterior.predict(theta))
         step = np.linalg.lstsq(jacobian[:, used], -r, rcond=None)[0]
         theta = theta.copy()
         theta[used] += np.clip(step, -5.0, 5.0)
