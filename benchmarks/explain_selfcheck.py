@@ -179,8 +179,8 @@ def run_case(number: int, kind: str, geometry: bool = False) -> dict:
     v = verdict(e)
     at = dict(zip((p.name for p in truth.parameters), truth.theta))
     parameters = base.with_(effects=truth.effects).parameters
-    start = np.array([at.get(p.name, 0.0) for p in parameters])
-    known = refine(base, truth.effects, observations, [start])
+    theta = np.array([at.get(p.name, 0.0) for p in parameters])
+    known = refine(base, truth.effects, observations, [theta])
     measured = np.concatenate([o.values for o in observations], axis=1)
     floor = relative_misfit(measured, np.concatenate(truth.predict(observations), axis=1))
     accepted, told = e.judgement.accepted, {x["name"] for x in v["effects"]}

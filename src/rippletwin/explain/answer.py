@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rippletwin.forward import Forward
+from rippletwin.forward import Forward, flow_harmonics
 from rippletwin.twin import Twin
 
 
@@ -52,7 +52,7 @@ def _answered(twin: Twin, observation):
     def harmonics(outlet):
         speed_rpm = 60.0 * observation.speed_hz
         run = simulate(pump, twin.rig.fluid, speed_rpm, outlet, samples_per_revolution=count)
-        return 2.0 / count * np.fft.rfft(run.flow)[orders], run
+        return flow_harmonics(run, orders), run
 
     free, source = harmonics(ConstantPressure(mean))
     delivered, _ = harmonics(PressureWave(mean + wave(outlet)))

@@ -64,13 +64,11 @@ def judge(
         return _nothing_missing(search.base, alarms)
     fails = validation is not None and not validation.holds
     if fails and "misfit" not in alarms.ringing:
-        if not validation.gains:
+        weak = search.gain(best) < SURE
+        if not weak and not validation.gains:
             # It fits nothing better: the data sheet alone speaks for it, and that may be off.
-            only_sheet = search.gain(best) >= SURE
-            return _nothing_missing(
-                search.base, alarms, "calibration_only" if only_sheet else "consistent"
-            )
-        if search.gain(best) < SURE or not validation.transfers:
+            return _nothing_missing(search.base, alarms, "calibration_only")
+        if weak or not validation.transfers:
             # A line that fits without it, and data left out that speak against it: an absorber.
             return _nothing_missing(search.base, alarms)
     if best.floor > ADEQUATE or fails:

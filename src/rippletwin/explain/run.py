@@ -138,7 +138,6 @@ def explain_observations(
         known = answered(found.best.twin, data)
         if known is not None:
             data, base = known, Twin(rig, known, uncertain_pump=True)
-            Forward(base, data)
             with workers(base, data, processes) as pool:
                 found = again(pool, found, progress)
     with workers(base, data, processes) as pool:

@@ -108,14 +108,14 @@ def _stepwise(pool: Workers, begun: Search, found: Sequence, progress) -> Search
         best, rivals = new, rivals if step is singles else [*rivals, *step]
         best = simplify(pool, exchange(pool, backward(pool, best), singles), found)
         best = settled(pool, best)
-        if len(best.hypothesis) >= MOST:
-            break
         step = _extensions(pool, best, found, progress)
     return Search(base, singles, best, rivals)
 
 
 def _extensions(pool: Workers, best: Fit, found: Sequence, progress) -> list[Fit]:
-    """`best` with each of the candidates besides that it has not, best first."""
+    """`best` with each of the candidates besides that it has not, best first; none beyond MOST."""
+    if len(best.hypothesis) >= MOST:
+        return []
     rig = pool.base.rig
     jobs = [
         extended(best, candidate, rig) for candidate in found if candidate not in best.hypothesis

@@ -42,10 +42,10 @@ class Geometry:
             raise ValueError(f"unknown pump keys {unknown}; known are {known}")
         geometry = cls(**{key: value for key, value in pump.items() if value is not None})
         may_be_negative = ("port_timing_deg",)
-        may_be_zero = ("air_fraction", "case_leakage", "port_overlap_deg", *may_be_negative)
+        may_be_zero = ("air_fraction", "case_leakage", "port_overlap_deg")
         for name in known:
             value = getattr(geometry, name)
-            if value < 0.0 and name in may_be_negative:
+            if name in may_be_negative:
                 continue
             if value < 0.0 or (value == 0.0 and name not in may_be_zero):
                 raise ValueError(f"pump key {name} = {value} must be positive")
