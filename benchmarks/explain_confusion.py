@@ -27,7 +27,7 @@ from tqdm import tqdm
 
 from rippletwin.case import load_case
 from rippletwin.explain.fit import prepare
-from rippletwin.explain.posterior import smooth_basis
+from rippletwin.explain.metric import smooth_basis
 from rippletwin.explain.run import HIGHEST_HZ
 from rippletwin.explain.search import alone, library
 from rippletwin.explain.workers import workers

@@ -25,6 +25,7 @@ import numpy as np
 import torch
 import yaml
 
+from rippletwin import twin_file
 from rippletwin.calibrate import Settings, calibrate
 from rippletwin.case import Case, load_case
 from rippletwin.dataset import augment
@@ -80,7 +81,7 @@ def lines(case: Case, folder: Path) -> dict[str, Twin]:
         path = folder / f"{name}.json"
         if not path.exists():
             print(f"{path}: making", file=sys.stderr, flush=True)
-            path.write_text(json.dumps(make().to_dict()))
+            path.write_text(json.dumps(twin_file.to_dict(make())))
         return load_twin(path)
 
     def calibrated():

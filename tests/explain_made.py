@@ -72,7 +72,7 @@ def make(rng, effects=(), values=None, sensors=3, points=POINTS, source=0.03, no
     for part, o in zip(forward.slices, observations):
         c = rng.normal(size=(4, 2)) @ np.array([1, 1j])
         waves = np.cos(np.pi * np.outer(np.arange(4), o.frequency_hz) / 4000)
-        forward.source[part] *= 1 + 0.5 * source * (c @ waves)
+        forward.source.flow[part] *= 1 + 0.5 * source * (c @ waves)
     recorded = []
     for o, h in zip(observations, forward(theta)):
         error = rng.normal(size=(*h.shape, 2)) @ np.array([1, 1j]) / np.sqrt(2)

@@ -11,10 +11,10 @@ import pytest
 from rippletwin import cli, report
 from rippletwin.calibrate import calibrate
 from rippletwin.case import Load
-from rippletwin.forward import flow_harmonics
 from rippletwin.line import moc
 from rippletwin.line.parts import End, Line, Pipe
 from rippletwin.pareto import calibrate_pareto
+from rippletwin.source import flow_harmonics
 from rippletwin.twin import Twin
 from twin_made import (
     line_errors,

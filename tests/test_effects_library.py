@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import jv
 
+from rippletwin import twin_file
 from rippletwin.case import Fluid, Load, Rig, Segment, Sensor
 from rippletwin.effects import EFFECTS, LineState, Place, candidates
 from rippletwin.effects.base import Prior
@@ -250,7 +251,7 @@ def test_effect_in_a_twin_survives_plain_data():
     effects = ((EFFECTS["line_volume"], Place("position")),)
     twin = Twin(rig(), effects=effects)
     twin = twin.with_(theta=np.linspace(-0.3, 0.3, len(twin.parameters)))
-    again = Twin.from_dict(twin.to_dict())
+    again = twin_file.from_dict(twin_file.to_dict(twin))
     assert again.effects[0][0].name == "line_volume"
     np.testing.assert_array_equal(again.theta, twin.theta)
 

@@ -10,7 +10,8 @@ from rippletwin.effects import EFFECTS, Place
 from rippletwin.explain.detect import drift, interior_test, pull
 from rippletwin.explain.fit import fit_hypothesis, refine
 from rippletwin.explain.locate import locate
-from rippletwin.explain.posterior import FLOOR, SIZE, Posterior, source_scale
+from rippletwin.explain.metric import source_scale
+from rippletwin.explain.posterior import FLOOR, SIZE, Posterior
 from rippletwin.explain.search import ACCEPT, again, search
 from rippletwin.explain.starts import PROMISING, promising
 from rippletwin.explain.validate import validate
@@ -239,7 +240,7 @@ def test_log_likelihood_is_that_of_the_whole_covariance_matrix():
     kernel += 1.0
     kernel *= 0.5 + 0.5 * (recording[:, None] == recording)
     source = 0.03**2 * np.eye(len(f)) + 0.1**2 * kernel
-    scale = [source_scale(posterior.forward.source[part]) for part in posterior.forward.slices]
+    scale = [source_scale(posterior.forward.source.flow[part]) for part in posterior.forward.slices]
     h = (prediction * np.concatenate(scale)).ravel()
     sensors = len(prediction)
     dense = np.outer(h, h.conj()) * np.kron(np.ones((sensors, sensors)), source)

@@ -10,7 +10,7 @@ from explain_made import POINTS, make
 from rippletwin.case import Load
 from rippletwin.case.model import FlowRipple
 from rippletwin.explain.shaft import as_turned, shaft_lines, turned
-from rippletwin.forward import flow_harmonics
+from rippletwin.source import flow_harmonics
 from rippletwin.twin import Twin
 
 ANGLE = 360.0 * np.arange(1536) / 1536

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from explain_made import rig
+from rippletwin import twin_file
 from rippletwin.case import FlowRipple
 from rippletwin.explain.fit import refine
 from rippletwin.explain.gradient import DifferentiableForward
-from rippletwin.forward import flow_harmonics
 from rippletwin.propagation import propagate
 from rippletwin.pump import ConstantPressure, simulate
+from rippletwin.source import flow_harmonics
 from rippletwin.spectra import Observation
 from rippletwin.twin import Twin
 
@@ -181,5 +182,5 @@ def test_only_where_geometry_and_source_are_known():
         "port_timing" not in Twin(bench(), [replace(o, source="free")], uncertain_pump=True).index
     )
     twin = standing(Twin(bench(), [o], uncertain_pump=True), port_timing=0.4)
-    again = Twin.from_dict(twin.to_dict())
+    again = twin_file.from_dict(twin_file.to_dict(twin))
     assert again.values()["port_timing"] == pytest.approx(0.4)

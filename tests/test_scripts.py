@@ -10,7 +10,7 @@ import torch
 import xarray as xr
 import yaml
 
-from rippletwin import store
+from rippletwin import store, twin_file
 from rippletwin.case.model import Fluid
 from rippletwin.effects import EFFECTS
 from rippletwin.flow_sensor import band_limit, network_of
@@ -109,7 +109,7 @@ def test_page_on_the_cost_names_the_physics_taken_in(tmp_path):
     rig = paper_rig(2, 1)
     place = EFFECTS["unsteady_friction"].places(rig)[0]
     twin = Twin(rig, effects=[(EFFECTS["unsteady_friction"], place)])
-    (tmp_path / "twin.json").write_text(json.dumps(twin.to_dict()))
+    (tmp_path / "twin.json").write_text(json.dumps(twin_file.to_dict(twin)))
     fit = {"before": {"held_out": 0.45}, "after": {"held_out": 0.03}}
     (tmp_path / "verdict.json").write_text(json.dumps({"verdict": "named", "fit": fit}))
     cells = [("CFD-Q", 0, 40.0), ("CFD-Q+", 0, 90.0)]
@@ -156,7 +156,7 @@ def test_flow_sensor_by_either_method_finds_the_flow(tmp_path):
         ),
         tmp_path / "recorded.zarr",
     )
-    files = {"": {"twin": twin.to_dict()}, "+": twin.to_dict()}
+    files = {"": {"twin": twin_file.to_dict(twin)}, "+": twin_file.to_dict(twin)}
     bandwidth = 400.0
     truth = band_limit(flow, SPEED, bandwidth)
     for (plus, file), method in zip(files.items(), ("spectral", "pinn"), strict=True):

@@ -8,14 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rippletwin import twin_file
 from rippletwin.case import FlowRipple, Load
 from rippletwin.effects import EFFECTS, Place
-from rippletwin.forward import Forward, flow_harmonics, reflection
+from rippletwin.forward import Forward, reflection
 from rippletwin.likelihood import Likelihood
 from rippletwin.line.balance import balance_orifice
 from rippletwin.line.chain import Network
 from rippletwin.line.segment import series_impedance, shunt_admittance
 from rippletwin.misfit import misfit, theil
+from rippletwin.source import flow_harmonics
 from rippletwin.twin import Twin
 from twin_made import flow_ripple, line_errors, paper_rig, point, recordings, three_points
 
@@ -104,7 +106,7 @@ def test_a_twin_survives_json_to_the_last_bit():
     effect = EFFECTS["viscoelastic_wall"]
     twin = Twin(rig, points, effects=[(effect, effect.places(rig)[1])])
     twin = twin.with_(theta=np.random.default_rng(0).standard_normal(len(twin.parameters)))
-    again = Twin.from_dict(json.loads(json.dumps(twin.to_dict())))
+    again = twin_file.from_dict(json.loads(json.dumps(twin_file.to_dict(twin))))
     for one, two in zip(twin.predict(points), again.predict(points)):
         assert np.array_equal(one, two)
 

@@ -14,33 +14,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from rippletwin.case import FlowRipple
 from rippletwin.effects.base import ATMOSPHERE, LineState
-from rippletwin.effects.speed_fluctuation import peaks, swung
 from rippletwin.line.chain import Network
 from rippletwin.line.segment import series_impedance, shunt_admittance
 from rippletwin.line.storage import FullAmplitude
 from rippletwin.orifice import Orifice
+from rippletwin.source import Source
 
 ROUGH = 1e-4  # of the pressure at an orifice, while the line's storage is known to less
 ABOVE = 3.0  # times the highest harmonic observed: those that reach it by way of the line
-
-
-def flow_harmonics(ripple: FlowRipple, orders: np.ndarray) -> np.ndarray:
-    """Peak complex amplitudes (F,), m3/s, at shaft `orders` (F,); that of order 0 is the mean.
-
-    Angles need not be evenly spaced: the ripple is taken as piecewise linear over the revolution.
-    """
-    angle = np.deg2rad(np.asarray(ripple.angle_deg, dtype=float))
-    count = max(4 * len(angle), 4 * int(np.max(orders, initial=0)))
-    even = angle[0] + 2 * np.pi * np.arange(count) / count
-    step = np.diff(angle)
-    if np.allclose(step, 2 * np.pi / len(angle), rtol=1e-6, atol=0):
-        even, flow = angle, np.asarray(ripple.flow, dtype=float)
-    else:
-        flow = np.interp(even, angle, ripple.flow, period=2 * np.pi)
-    spectrum = np.exp(-1j * np.outer(orders, even)) @ flow / len(even)
-    return np.where(np.asarray(orders) == 0, spectrum, 2 * spectrum)
 
 
 class Forward:
@@ -75,18 +57,7 @@ class Forward:
         self.load_pressure = column([p.load_pressure for p in points])
         self.mean_flow = column([p.mean_flow for p in points])
         self.coefficient = column([p.coefficient for p in points])
-        self.source = np.concatenate(
-            [
-                np.ones(n, complex) if p.ripple is None else flow_harmonics(p.ripple, o.orders)
-                for p, o, n in zip(points, self.observations, sizes)
-            ]
-        )
-        self.source_admittance = np.zeros(len(self.s), complex)
-        for point, part in zip(points, self.slices):
-            if point.ripple is not None:
-                self.source_admittance[part] = point.ripple.source_admittance(self.s[part])
-        self._of_pump = self._changes_of_pump(points)
-        self.angle_index = [twin.index.get(f"angle[{o.label}]") for o in self.observations]
+        self.source = Source(twin, self.observations, points, self.slices)
         self.back_pressure = rig.load.back_pressure
         self.load_impedance = None
         if rig.load.kind == "impedance":
@@ -145,14 +116,13 @@ class Forward:
                 for a, d in zip(v.wave_speeds, v.diameters)
             ]
         )
-        source, source_admittance = self.source_at(theta)
-        source = source * self.turn(theta)
+        source, source_admittance = self.source.at(theta)
         network = Network(
             s=self.s,
             lengths=v.lengths,
             series=series,
             shunt=shunt,
-            source_flow=source,
+            source_flow=source * self.source.turn(theta),
             source_admittance=source_admittance,
             load=self._load(v.load),
             sensor_positions=v.positions,
@@ -162,40 +132,6 @@ class Forward:
             for effect, place, values in twin.effect_values(theta):
                 effect.apply(network, line, values, place)
         return network
-
-    def _changes_of_pump(self, points: Sequence) -> list[tuple]:
-        """(index, slope and curvature (2, F) of the flow, slope (F,) of the admittance) of each of
-        the pump's parameters."""
-        found = {}
-        for o, point, part in zip(self.observations, points, self.slices):
-            if point.ripple is None:
-                continue
-            mean = flow_harmonics(point.ripple, np.zeros(1))[0].real
-            for k, change in self.twin.pump_changes(o.speed_hz, point.load_pressure):
-                flow, own = found.setdefault(
-                    k, (np.zeros((2, len(self.s)), complex), np.zeros(len(self.s), complex))
-                )
-                flow[:, part] = _delivered(change, point.ripple, o.orders, mean)
-                if np.any(self.source_admittance[part]):  # a ripple given is an ideal source
-                    own[part] = change.source_admittance(self.s[part])
-        return [(k, *changes) for k, changes in found.items()]
-
-    def source_at(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Flow and admittance (F,) of the source at `theta`, shaft angles being 0."""
-        flow, admittance = self.source.copy(), self.source_admittance.copy()
-        for k, (slope, curvature), own in self._of_pump:
-            flow += theta[k] * (slope + theta[k] * curvature)
-            admittance += theta[k] * own
-        return flow, admittance
-
-    def turn(self, theta: np.ndarray) -> np.ndarray:
-        """What the shaft angles at the first samples make of the source's harmonics, (F,)."""
-        turn = np.ones(len(self.s), complex)
-        for part, index in zip(self.slices, self.angle_index):
-            if index is not None:
-                angle = self.twin.parameters[index].value(theta[index])
-                turn[part] = np.exp(1j * angle * self.order[part])
-        return turn
 
     def _line_state(self, v) -> LineState:
         fluid = self.twin.rig.fluid
@@ -294,17 +230,6 @@ class Forward:
         forward = Forward(self.twin, wide)
         own = [np.r_[b][: a.stop - a.start] for a, b in zip(self.slices, forward.slices)]
         return forward, np.concatenate(own)
-
-
-def _delivered(change, ripple: FlowRipple, orders: np.ndarray, mean_flow: float) -> np.ndarray:
-    """Slope and curvature (2, F) of a `RippleChange` by the shaft that delivers `ripple`."""
-    if not ripple.swing:
-        return change.harmonics(orders, mean_flow)
-    orders = np.asarray(orders, int)
-    even = np.zeros((2, 2 * np.max(orders)), complex)
-    even[:, 1:] = change.harmonics(np.arange(1, even.shape[1]), mean_flow)
-    even[np.abs(even) < 1e-9 * np.max(np.abs(even))] = 0.0  # orders that equal pistons do not make
-    return np.array([peaks(swung(x, ripple.swing, 4 * len(x)))[orders] for x in even])
 
 
 def characteristic_impedance(fluid, segment) -> float:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rippletwin import twin_file
 from rippletwin.calibrate import Calibration
 from rippletwin.misfit import Misfit
 from rippletwin.twin import Twin
@@ -63,7 +64,7 @@ def parameter_table(calibration: Calibration) -> list[dict]:
 def to_dict(calibration: Calibration) -> dict:
     """Everything of a calibration as plain data; `twin_of` makes a twin of it again."""
     return {
-        "twin": calibration.twin.to_dict(),
+        "twin": twin_file.to_dict(calibration.twin),
         "covariance": calibration.covariance.tolist(),
         "parameters": parameter_table(calibration),
         "segments": segment_table(calibration),
@@ -76,8 +77,8 @@ def to_dict(calibration: Calibration) -> dict:
 
 
 def twin_of(data: dict) -> Twin:
-    """The twin in what `to_dict` made, or in what `Twin.to_dict` did."""
-    return Twin.from_dict(data.get("twin", data))
+    """The twin in what `to_dict` made, or in what `twin_file.to_dict` did."""
+    return twin_file.from_dict(data.get("twin", data))
 
 
 def markdown(calibration: Calibration) -> str:

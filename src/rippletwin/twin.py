@@ -19,32 +19,30 @@ An effect at its place is a pair (effect, place) of `rippletwin.effects`; its LA
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from rippletwin import parameters as coordinates
-from rippletwin.case import FlowRipple, Fluid, Load, Rig, Segment, Sensor, Uncertainty
-from rippletwin.effects import EFFECTS, Place
-from rippletwin.effects.base import lognormal, normal
+from rippletwin.case import FlowRipple, Rig, Segment, Sensor
 from rippletwin.errors import InputError
-from rippletwin.forward import Forward, characteristic_impedance, flow_harmonics
+from rippletwin.forward import Forward, characteristic_impedance
 from rippletwin.line.segment import FRICTIONS
-from rippletwin.parameters import Parameter
+from rippletwin.source import flow_harmonics
+from rippletwin.uncertain import (
+    angle_parameter,
+    effect_parameters,
+    line_parameters,
+    pump_parameters,
+)
 
-GUESSED_VELOCITY, GUESSED_SD = 2.0, 1.0
-"""Mean flow velocity (m/s) in the last segment, and the load's relative uncertainty, where neither
-a flow ripple nor an orifice coefficient is known: oil lines run at half to six metres a second."""
+GUESSED_VELOCITY = 2.0
+"""Mean flow velocity (m/s) in the last segment where neither a flow ripple nor an orifice
+coefficient is known: oil lines run at half to six metres a second."""
 
 SOURCE_SD = 0.05
 """Largest relative error of a nominal flow ripple's harmonic that is put down to the ripple."""
-
-BULK_MODULUS_SD = 0.1  # relative, of what the chambers hold: air and heat lower it
-PORT_TIMING_SD = 1.0  # deg, of the port plate's angle to the swash plate
-"""Standard deviations of the pump's numbers, where they are parameters (`pump.uncertain`)."""
-
-ANGLE_SCALE = 0.01  # rad, of the fit's coordinate: a few degrees of phase at the 9th harmonic
 
 
 class OperatingPoint(NamedTuple):
@@ -118,10 +116,10 @@ class Twin:
         self.uncertain_pump = bool(uncertain_pump and self.labels and len(rig.pump) > 1)
         self._effect_parameters = [effect.parameters(rig, place) for effect, place in self.effects]
         self.parameters = (
-            *_line_parameters(rig, self.guessed_load),
-            *(_pump_parameters(rig) if self.uncertain_pump else ()),
-            *(_angle(label) for label in self.labels),
-            *_named_apart(self.effects, self._effect_parameters),
+            *line_parameters(rig, self.guessed_load),
+            *(pump_parameters(rig) if self.uncertain_pump else ()),
+            *(angle_parameter(label) for label in self.labels),
+            *effect_parameters(self.effects, self._effect_parameters),
         )
         self.index = {p.name: k for k, p in enumerate(self.parameters)}
         self.theta = np.zeros(len(self.parameters)) if theta is None else np.asarray(theta, float)
@@ -219,7 +217,7 @@ class Twin:
         where the data sheet has none.
         """
         twin = self if friction is None else self.with_(friction=friction)
-        point = _Point(
+        point = Point(
             label="",
             frequency_hz=np.asarray(orders) * speed_hz,
             orders=np.asarray(orders),
@@ -253,7 +251,7 @@ class Twin:
             "uncertain_pump": self.uncertain_pump,
             "theta": None if "effects" in changes else self.theta,
         }
-        labels = [_Point(label=label) for label in self.labels]
+        labels = [Point(label=label) for label in self.labels]
         twin = Twin(self.rig, labels, **{**state, **changes})
         twin._ripples = self._ripples
         return twin
@@ -274,41 +272,6 @@ class Twin:
             load = replace(load, coefficient=load.coefficient * v.load)
         fluid = replace(self.rig.fluid, kinematic_viscosity=v.viscosity)
         return replace(self.rig, line=line, sensors=sensors, load=load, fluid=fluid)
-
-    # to and from plain data
-
-    def to_dict(self) -> dict:
-        """Plain lists, numbers and text, for a JSON file."""
-        rig = asdict(self.rig)
-        for key in ("frequency_hz", "impedance"):
-            rig["load"][key] = _plain(rig["load"][key])
-        return {
-            "rig": rig,
-            "recordings": list(self.labels),
-            "friction": self.friction,
-            "source_sd": self.source_sd,
-            "guessed_load": self.guessed_load,
-            "uncertain_pump": self.uncertain_pump,
-            "effects": [{"name": e.name, "place": asdict(place)} for e, place in self.effects],
-            "theta": self.theta.tolist(),
-            "values": self.values(),
-        }
-
-    @classmethod
-    def from_dict(cls, data: dict) -> Twin:
-        """The twin that `to_dict` wrote."""
-        effects = [(EFFECTS[e["name"]], Place(**e["place"])) for e in data["effects"]]
-        points = [_Point(label=label) for label in data["recordings"]]
-        return cls(
-            _rig(data["rig"]),
-            points,
-            friction=data["friction"],
-            effects=effects,
-            source_sd=data["source_sd"],
-            guessed_load=data["guessed_load"],
-            uncertain_pump=data.get("uncertain_pump", False),
-            theta=np.array(data["theta"]),
-        )
 
     def pump_changes(self, speed_hz: float, load_pressure: float) -> list[tuple]:
         """(index, `RippleChange`) of each parameter of the pump, at rev/s into Pa; none where there
@@ -343,7 +306,7 @@ class Twin:
 
 
 @dataclass(frozen=True)
-class _Point:
+class Point:
     """An operating point to predict, with the fields of an observation but no data."""
 
     label: str
@@ -357,88 +320,6 @@ class _Point:
     mean: np.ndarray | None = None
     sensors: tuple | None = None
     normalised: bool = False
-
-
-def _line_parameters(rig: Rig, guessed_load: bool) -> list[Parameter]:
-    sheet = rig.uncertainty
-    relative = (
-        ("wave_speed", sheet.wave_speed, "m/s"),
-        ("diameter", sheet.diameter, "m"),
-        ("length", sheet.length, "m"),
-    )
-    out = [
-        Parameter(f"{name}[{k}]", unit, lognormal(getattr(segment, name), sd), f"segment {k}")
-        for name, sd, unit in relative
-        for k, segment in enumerate(rig.line, 1)
-    ]
-    out += [
-        Parameter(
-            f"position[{s.name}]",
-            "m",
-            normal(s.position, sheet.sensor_position),
-            f"sensor {s.name}",
-        )
-        for s in rig.sensors
-    ]
-    viscosity = lognormal(rig.fluid.kinematic_viscosity, sheet.viscosity)
-    out.append(Parameter("viscosity", "m2/s", viscosity, "fluid"))
-    if rig.load.kind in ("orifice", "impedance"):
-        sd = GUESSED_SD if guessed_load else sheet.load
-        out.append(Parameter("load", "", lognormal(1.0, sd), "load"))
-    return out
-
-
-def _pump_parameters(rig: Rig) -> list[Parameter]:
-    from rippletwin.pump import Geometry
-
-    geometry = Geometry.from_dict(rig.pump)
-    modulus = lognormal(geometry.bulk_modulus, BULK_MODULUS_SD)
-    timing = normal(geometry.port_timing_deg, PORT_TIMING_SD)
-    return [
-        Parameter("bulk_modulus", "Pa", modulus, "pump"),
-        Parameter("port_timing", "deg", timing, "pump"),
-    ]
-
-
-def _angle(label: str) -> Parameter:
-    return Parameter(f"angle[{label}]", "rad", normal(0.0, ANGLE_SCALE), f"recording {label}", True)
-
-
-def _named_apart(effects, parameters) -> list[Parameter]:
-    labels = [f"{effect.name}@{place}" for effect, place in effects]
-    if len(set(labels)) < len(labels):
-        raise ValueError(f"an effect can be at a place once, not {labels}")
-    return [
-        Parameter(f"{label}.{p.name}", p.unit, p.prior, label)
-        for label, own in zip(labels, parameters)
-        for p in own
-    ]
-
-
-def _rig(data: dict) -> Rig:
-    load = dict(data["load"])
-    for key in ("frequency_hz", "impedance"):
-        load[key] = _array(load[key])
-    return Rig(
-        fluid=Fluid(**data["fluid"]),
-        pump=data["pump"],
-        line=tuple(Segment(**s) for s in data["line"]),
-        sensors=tuple(Sensor(**s) for s in data["sensors"]),
-        load=Load(**load),
-        uncertainty=Uncertainty(**data["uncertainty"]),
-    )
-
-
-def _plain(values: np.ndarray | None):
-    if values is None or not np.iscomplexobj(values):
-        return None if values is None else values.tolist()
-    return {"re": values.real.tolist(), "im": values.imag.tolist()}
-
-
-def _array(values):
-    if isinstance(values, dict):
-        return np.array(values["re"]) + 1j * np.array(values["im"])
-    return None if values is None else np.array(values)
 
 
 def _mean_flow(ripple: FlowRipple | None) -> float:

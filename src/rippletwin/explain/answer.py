@@ -17,7 +17,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rippletwin.forward import Forward, flow_harmonics
+from rippletwin.forward import Forward
+from rippletwin.source import flow_harmonics
 from rippletwin.twin import Twin
 
 
@@ -40,7 +41,7 @@ def _answered(twin: Twin, observation):
     orders = np.asarray(observation.orders, int)
     pump, turned = _pump(twin)
     # In the frame of the port plate, which the twin turns with the shaft (`pump.uncertain`).
-    turn = forward.turn(twin.theta) * np.exp(1j * orders * turned)
+    turn = forward.source.turn(twin.theta) * np.exp(1j * orders * turned)
     outlet = forward.network(twin.theta).pressure_at([0.0])[0] / turn
     count, mean = len(ripple.flow), observation.load_pressure
 

@@ -37,7 +37,9 @@ class DifferentiableForward(Forward):
         segments, sensors = len(twin.rig.line), len(twin.rig.sensors)
         self._lengths = range(2 * segments, 3 * segments)
         self._sensors = range(3 * segments, 3 * segments + sensors)
-        self._angles = {i: part for i, part in zip(self.angle_index, self.slices) if i is not None}
+        self._angles = {
+            i: part for i, part in zip(self.source.angles, self.slices) if i is not None
+        }
         self._positions = [k for k, name in enumerate(names) if name.endswith(".position")]
         apart = {*self._sensors, *self._angles, *self._positions}
         self._together = [k for k in range(len(names)) if k not in apart]
@@ -238,9 +240,9 @@ class DifferentiableForward(Forward):
         """Flow and, effects left out, admittance of the source at theta and with each parameter
         moved that goes together, both (1 + N, F)."""
         flow = np.array(np.broadcast_to(base.source_flow, shape))
-        admittance = np.array(np.broadcast_to(self.source_at(theta)[1], shape))
-        for k, (slope, curvature), own in self._of_pump:
+        admittance = np.array(np.broadcast_to(self.source.at(theta)[1], shape))
+        for k, (slope, curvature), own in self.source.changes:
             row = 1 + self._together.index(k)
-            flow[row] += STEP * self.turn(theta) * (slope + 2.0 * theta[k] * curvature)
+            flow[row] += STEP * self.source.turn(theta) * (slope + 2.0 * theta[k] * curvature)
             admittance[row] += STEP * own
         return flow, admittance

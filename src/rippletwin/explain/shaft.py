@@ -18,8 +18,9 @@ from scipy.stats import chi2
 
 from rippletwin.case.model import FlowRipple
 from rippletwin.effects.speed_fluctuation import peaks, swung
-from rippletwin.forward import Forward, flow_harmonics
+from rippletwin.forward import Forward
 from rippletwin.likelihood import cut
+from rippletwin.source import flow_harmonics
 from rippletwin.twin import Twin
 
 FLOOR = 0.02  # of the lines, where no orifice couples them: the line's own error and more
@@ -92,7 +93,7 @@ def shaft_lines(twin: Twin, observations: Sequence, highest_hz: float) -> ShaftL
         at = orders[~off]
         even[at] = flow[~off]
         if point.ripple is not None:
-            even[at] = Forward(twin, [o]).source_at(twin.theta)[0][~off]
+            even[at] = Forward(twin, [o]).source.at(twin.theta)[0][~off]
         even[0] = point.mean_flow
         b, rest, whole = _modulation(even, orders[off], flow[off], unit[:, off], pistons)
         modulation[o.label] = b
@@ -145,7 +146,7 @@ def _variance(o) -> np.ndarray:
 def _response(twin: Twin, observation) -> np.ndarray:
     """Readings (S, F) for unit flow at every order, the orifice linear."""
     forward = Forward(twin, [observation])
-    forward.source = np.ones_like(forward.source)
+    forward.source.flow = np.ones_like(forward.source.flow)
     forward._orifice = None
     return forward(twin.theta)[0]
 

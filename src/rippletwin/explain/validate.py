@@ -186,7 +186,7 @@ def _difference(whole: Fit, fold: Fit) -> float:
 def _turned(posterior: Posterior, theta: np.ndarray) -> np.ndarray:
     """theta with the shaft angles fitted and all else held."""
     angles = np.flatnonzero(~posterior.prior)
-    used = [k for k in angles if k in posterior.forward.angle_index]
+    used = [k for k in angles if k in posterior.forward.source.angles]
     if not used:
         return theta
     theta = align(posterior, theta)[1]

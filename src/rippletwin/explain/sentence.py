@@ -1,0 +1,131 @@
+"""The verdict in a paragraph for an engineer."""
+
+from __future__ import annotations
+
+from rippletwin.explain import detect, locate
+from rippletwin.explain.judge import join, places, span
+from rippletwin.explain.run import Explanation
+
+CHANCE = {
+    "consistent": "The recordings are what the twin predicts within the data sheet's tolerances.",
+    "calibration_only": "The line's nominal values are off by more than their stated tolerances, "
+    "but no physics is missing: use the calibrated values and look at the data sheet.",
+}
+
+
+def sentence(e: Explanation, result: dict, found: list[dict], base) -> str:
+    """One paragraph an engineer can act on."""
+    kind, fit = result["verdict"], result["fit"]
+    before, after = fit["before"]["held_out"], fit["after"]["held_out"]
+    words = [CHANCE.get(kind, "")]
+    if kind == "named" and not found:  # what was named acts at shaft orders alone
+        words = ["At the pistons' harmonics the twin lacks nothing."]
+    elif kind in ("named", "ambiguous"):
+        names = [f"{f['effect'].name.replace('_', ' ')} at the {_place(e, f)}" for f in found]
+        words = [
+            f"The twin lacks {join(names)}: with it the misfit on data it has not seen goes from "
+            f"{before:.1%} to {after:.1%} of the measured ripple."
+        ]
+        numbers = {}
+        for f in found:
+            for name, p in f["parameters"].items():
+                low, high = p["ci95"]
+                unit = "" if p["unit"] == "1" else f" {p['unit']}"
+                numbers[
+                    f"{name.replace('_', ' ').capitalize()} {p['value']:.3g}{unit} "
+                    f"({low:.3g} to {high:.3g})."
+                ] = None
+            if f["effect"].certain:
+                numbers[
+                    f"{f['effect'].name.replace('_', ' ').capitalize()} is taken in because no "
+                    "such line is without it, unless data speak against it."
+                ] = None
+        words += numbers
+        words += _against_the_sheet(e)
+        if kind == "ambiguous":
+            classes = "; ".join(join(names) for names in result["equivalents"])
+            words.append(f"These recordings cannot tell apart {classes}.")
+    elif kind == "unexplained":
+        words = [
+            "Something is missing that no effect of the library explains"
+            + (f"; it is seen at the {_place(e, found[0])}" if found else "")
+            + "."
+        ]
+        if "stand_in" in result:
+            words.append(
+                f"A {result['stand_in']['form']}, {_passive(result)}, stands in for it: misfit on "
+                f"unseen data {before:.1%} to {after:.1%}. What is missing goes "
+                f"{result['stand_in']['follows']}."
+            )
+    if kind in ("named", "ambiguous", "unexplained") and result["next_recording"]:
+        words.append(f"Next: {result['next_recording']}.")
+    if kind in ("named", "ambiguous") and found:
+        if places(e.search):
+            words.append("Its place or form cannot be told: see equivalents.")
+        words.append(_without_source(e))
+    words.append(_pump(result["pump"]))
+    if kind == "bad_data":
+        words = [f"The data contradict themselves: {e.judgement.reason}."]
+    if e.shaft is not None and e.shaft.name is not None:
+        words.append(
+            f"Shaft-order lines of {e.shaft.relative:.1%} of the ripple show "
+            f"{e.shaft.name.replace('_', ' ')}: they resemble a single-piston fault."
+        )
+    if "drift" in e.alarms.ringing:
+        words.append(f"Early and late windows of {e.alarms.drift[1]} differ: the state drifted.")
+    # Without an alarm `calibration_only` rests on the sheet; disagreeing points are another cause.
+    off_the_sheet = kind == "calibration_only" and not e.alarms.ringing
+    told = "pull" in e.alarms.ringing or off_the_sheet
+    if told and not e.judgement.accepted.hypothesis:
+        size, name = e.alarms.pull
+        words.append(f"{name} is {size:.1f} standard deviations from the data sheet.")
+    pulled = detect.pull(e.judgement.accepted)
+    if e.judgement.accepted.hypothesis and pulled[0] > detect.PULL:
+        words.append(f"Check {pulled[1]}: {pulled[0]:.1f} standard deviations from the data sheet.")
+    return " ".join(word for word in words if word)
+
+
+def _pump(numbers: dict) -> str:
+    """What the ripple says of the pump, where that is not what the data sheet says."""
+    off = [n for n in numbers.values() if not n["ci95"][0] <= n["sheet"] <= n["ci95"][1]]
+    if not off:
+        return ""
+    modulus, timing = numbers["bulk_modulus"], numbers["port_timing"]
+    turned = timing["value"] - timing["sheet"]
+    return (
+        f"The ripple is that of a pump with a bulk modulus of {modulus['value']:.3g} Pa (sheet "
+        f"{modulus['sheet']:.3g}) and its port plate {abs(turned):.2f} deg "
+        f"{'late' if turned > 0 else 'early'}."
+    )
+
+
+def _against_the_sheet(e: Explanation) -> list[str]:
+    """Where the data alone would do without an effect, and only the data sheet says no."""
+    return [
+        f"Without {w.effect.replace('_', ' ')} a fit at {w.misfit:.1%} would be had with "
+        f"{w.parameter} at {w.value:.3g} {w.unit}, {w.pull:.0f} standard deviations from the "
+        "data sheet, which is what rejects it."
+        for w in e.without
+        if w.rivals and w.pull > detect.PULL
+    ]
+
+
+def _passive(result: dict) -> str:
+    return "passive" if result["stand_in"]["passive"] else "not passive"
+
+
+def _without_source(e: Explanation) -> str:
+    """What a fit that knows nothing of the source says of the accepted effects."""
+    for row in locate.side_by_side(e.search, e.blind):
+        if row["effects"] == e.judgement.accepted.label:
+            if row["source_free"] > 0.2 * row["informed"]:
+                return "It stands in a fit that is blind to the source too."
+            return "Blind to the source it is not seen: it acts at the pump or only there is known."
+    return ""
+
+
+def _place(e: Explanation, entry: dict) -> str:
+    element, (low, high) = span(e.rig, entry["effect"], entry["place"], entry["parameters"])
+    if "position" in entry["parameters"]:
+        return f"line, {low:.2f} to {high:.2f} m from the pump ({element})"
+    return element
