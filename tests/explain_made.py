@@ -53,7 +53,7 @@ def make(rng, effects=(), values=None, sensors=3, points=POINTS, source=0.03, no
                 orders,
                 np.ones((sensors, len(orders)), complex),
                 covariance.astype(complex),
-                np.full(sensors, pressure),
+                np.zeros(sensors),
                 shaft,
                 pressure,
                 "nominal",

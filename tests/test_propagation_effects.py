@@ -128,6 +128,27 @@ def test_air_stiffens_in_the_crests():
     assert misfit(linear, chain) > 0.01
 
 
+def test_a_valve_opens_on_the_pressure_that_there_is():
+    """What a valve opens passes the flow of the pressure then over it: at a ripple of an eighth of
+    the mean, substitution agrees with the method of characteristics to 0.3 %, where a valve whose
+    flow is linear in the pressure misses by more than 1 %."""
+    spool = next((e, p) for e, p in candidates(rig()) if p.form == "spool")
+
+    def without_opening(network, *state):
+        spool[0].apply(network, *state)
+        network.opening = None
+
+    linear = replace(spool[0], apply=without_opening)
+    wave, pressure = ripple(), 3e6
+    full, bent = corrected(spool, strength=0.5), corrected((linear, spool[1]), strength=0.5)
+    moc = propagate(full, wave.flow, wave.flow, SPEED_HZ, pressure, steps=STEPS, tolerance=1e-4)
+    moc = moc.harmonics(ORDERS)
+    chain, without = (t.respond(wave, SPEED_HZ, pressure, ORDERS) for t in (full, bent))
+    print(f"{misfit(moc, chain):.1e}, flow linear in the pressure {misfit(moc, without):.1e}")
+    assert misfit(moc, chain) < 0.003
+    assert misfit(moc, without) > 0.01
+
+
 def test_faulty_pump_draws_on_the_same_leak():
     """A pump that delivers 5 % less: the mean falls in orifice and leak as their slopes say."""
     leak = EFFECTS["leak"], Place("position")

@@ -50,7 +50,7 @@ def point(rig, label="a", speed_rpm=1000.0, load_pressure=9.5e6, seed=0, highest
         orders=orders,
         values=np.zeros((len(rig.sensors), len(orders)), complex),
         covariance=np.tile(np.eye(len(rig.sensors), dtype=complex), (len(orders), 1, 1)),
-        mean=np.full(len(rig.sensors), load_pressure),
+        mean=np.zeros(len(rig.sensors)),
         speed_hz=speed,
         load_pressure=load_pressure,
         source="nominal",

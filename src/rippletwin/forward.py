@@ -23,6 +23,7 @@ from rippletwin.source import Source
 
 ROUGH = 1e-4  # of the pressure at an orifice, while the line's storage is known to less
 ABOVE = 3.0  # times the highest harmonic observed: those that reach it by way of the line
+NEXT = 3  # harmonics above the highest observed: those that reach it by way of the orifice
 
 
 class Forward:
@@ -75,6 +76,7 @@ class Forward:
                 self.order,
                 np.array([points[r].load_pressure for r in self._periodic]) - self.back_pressure,
                 np.array([points[r].coefficient for r in self._periodic]),
+                rig.load.passes_flow,
             )
 
     def __call__(self, theta: np.ndarray) -> list[np.ndarray]:
@@ -183,17 +185,17 @@ class Forward:
     def _balance(self, network: Network, theta: np.ndarray) -> None:
         """Give `network` the full-amplitude state at its load, and what its line stores beyond."""
         if network.storage:
-            wide, seen = self._wide
-            whole = wide._linear(theta)
-            whole.source_flow[seen] = network.source_flow
+            wide, seen, whole = self._widened(network, theta, self._far)
             law = wide._law(whole, theta, tolerance=ROUGH)
             state = [x[seen] for x in wide._full.drain(whole, law)]
             positions, leaving = whole.drains
             network.drains = positions, leaving[:, seen]
             if self._orifice is not None:
                 network.load = "state", tuple(state)
-        else:
-            self._balance_load(network, theta)
+        elif self._orifice is not None:
+            wide, seen, whole = self._widened(network, theta, self._near)
+            state = wide._law(whole, theta)(*whole.load_relation())
+            network.load = "state", tuple(x[seen] for x in state)
 
     def _balance_load(self, network: Network, theta: np.ndarray) -> None:
         """Give `network` the full-amplitude state at its load, its drains as they are."""
@@ -211,20 +213,37 @@ class Forward:
 
         def law(a, b, c):
             if self._orifice is not None:
-                return self._orifice.solve(a, b, c, q / p, factor, **accuracy)
+                return self._orifice.solve(a, b, c, q / p, factor, network.opening, **accuracy)
             scale = c / (a * p + b * q)
             return scale * p, scale * q
 
         return law
 
+    @staticmethod
+    def _widened(network: Network, theta: np.ndarray, with_above: tuple) -> tuple:
+        """The forward model with harmonics above, where those of `network` are among its columns,
+        and its network at `theta`."""
+        wide, seen = with_above
+        whole = wide._linear(theta)
+        whole.source_flow[seen] = network.source_flow
+        return wide, seen, whole
+
     @cached_property
-    def _wide(self) -> tuple[Forward, np.ndarray]:
-        """The same with the harmonics above, and where those observed are among its columns."""
+    def _far(self) -> tuple[Forward, np.ndarray]:
+        return self._with_above(lambda top, step: ABOVE * top)
+
+    @cached_property
+    def _near(self) -> tuple[Forward, np.ndarray]:
+        return self._with_above(lambda top, step: top + (NEXT + 0.5) * step)
+
+    def _with_above(self, highest) -> tuple[Forward, np.ndarray]:
+        """The same with the harmonics up to `highest` (top order, step) of every recording besides,
+        and where those observed are among its columns."""
         wide = list(self.observations)
         for r in self._periodic:
             o = wide[r]
             step, top = np.gcd.reduce(np.asarray(o.orders, int)), np.max(o.orders)
-            most = min(ABOVE * top, 0.5 * len(self._ripples[r].angle_deg))
+            most = min(highest(top, step), 0.5 * len(self._ripples[r].angle_deg))
             orders = np.append(o.orders, np.arange(top + step, most, step))
             wide[r] = replace(o, orders=orders, frequency_hz=orders * o.speed_hz)
         forward = Forward(self.twin, wide)

@@ -26,10 +26,9 @@ import numpy as np
 
 from rippletwin import parameters as coordinates
 from rippletwin.case import FlowRipple, Rig, Segment, Sensor
-from rippletwin.errors import InputError
 from rippletwin.forward import Forward, characteristic_impedance
 from rippletwin.line.segment import FRICTIONS
-from rippletwin.source import flow_harmonics
+from rippletwin.operating_point import OperatingPoint, operating_point
 from rippletwin.uncertain import (
     angle_parameter,
     effect_parameters,
@@ -37,24 +36,8 @@ from rippletwin.uncertain import (
     pump_parameters,
 )
 
-GUESSED_VELOCITY = 2.0
-"""Mean flow velocity (m/s) in the last segment where neither a flow ripple nor an orifice
-coefficient is known: oil lines run at half to six metres a second."""
-
 SOURCE_SD = 0.05
 """Largest relative error of a nominal flow ripple's harmonic that is put down to the ripple."""
-
-
-class OperatingPoint(NamedTuple):
-    """Pressures in Pa, flow in m3/s, orifice coefficient in m3/s/sqrt(Pa); NaN where unknown.
-
-    `ripple` is None where the source is free or known by definition (input impedance).
-    """
-
-    load_pressure: float
-    mean_flow: float
-    coefficient: float
-    ripple: FlowRipple | None
 
 
 class Arrays(NamedTuple):
@@ -172,35 +155,12 @@ class Twin:
         return Forward(self, observations)(self.theta if theta is None else np.asarray(theta))
 
     def operating_point(self, observation) -> OperatingPoint:
-        """Mean pressure and flow, orifice coefficient and source of an observation.
-
-        The coefficient is that of the data sheet, or what mean flow and load pressure give.
-        Raises InputError for an orifice load without a mean pressure.
-        """
-        load, kind = self.rig.load, observation.kind
+        """Mean pressure and flow, orifice coefficient and source of an observation, see
+        `rippletwin.operating_point`."""
         ripple = None
-        if kind == "periodic" and observation.source != "free":
+        if observation.kind == "periodic" and observation.source != "free":
             ripple = observation.flow_ripple or self._pump_ripple(observation)
-        mean = observation.load_pressure
-        if mean is None and observation.mean is not None and np.size(observation.mean):
-            mean = float(observation.mean[-1])
-        if load.kind != "orifice":
-            return OperatingPoint(_or_nan(mean), _mean_flow(ripple), np.nan, ripple)
-        if mean is None or not mean > load.back_pressure:
-            raise InputError(
-                observation.label,
-                "load_pressure",
-                f"an orifice load needs a mean pressure above the back pressure, not {mean}",
-                "give load_pressure in Pa for this recording, or another kind of load",
-            )
-        root = np.sqrt(mean - load.back_pressure)
-        if load.coefficient is not None:
-            coefficient = load.coefficient
-        elif ripple is not None or observation.flow_ripple is not None:
-            coefficient = _mean_flow(ripple or observation.flow_ripple) / root
-        else:
-            coefficient = GUESSED_VELOCITY * self.rig.line[-1].area / root
-        return OperatingPoint(mean, coefficient * root, coefficient, ripple)
+        return operating_point(self.rig, observation, ripple)
 
     def respond(
         self,
@@ -320,11 +280,3 @@ class Point:
     mean: np.ndarray | None = None
     sensors: tuple | None = None
     normalised: bool = False
-
-
-def _mean_flow(ripple: FlowRipple | None) -> float:
-    return np.nan if ripple is None else float(flow_harmonics(ripple, np.zeros(1))[0].real)
-
-
-def _or_nan(value: float | None) -> float:
-    return np.nan if value is None else value

@@ -9,7 +9,7 @@ from rippletwin.effects.base import lognormal, normal
 from rippletwin.parameters import Parameter
 
 GUESSED_SD = 1.0
-"""Relative uncertainty of the load where its mean flow is but a guess (`twin.GUESSED_VELOCITY`)."""
+"""Relative uncertainty of the load where its mean flow is but a guess (`operating_point`)."""
 
 BULK_MODULUS_SD = 0.1  # relative, of what the chambers hold: air and heat lower it
 PORT_TIMING_SD = 1.0  # deg, of the port plate's angle to the swash plate

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from rippletwin.effects.base import Effect, Parameter, Place, lognormal, normal
+from rippletwin.effects.base import ATMOSPHERE, Effect, Parameter, Place, lognormal, normal
 from rippletwin.line.chain import Insert
 from rippletwin.line.parts import Element, inertance
 
@@ -24,7 +26,9 @@ def _apply(network, line, values, place):
         return
     w = 2.0 * np.pi * values["natural_frequency"]
     motion = w**2 / (s**2 + 2.0 * values["damping_ratio"] * w * s + w**2)
-    network.inserts.append(Insert(end, "shunt", values["gain"] * motion / line.load_resistance))
+    opening = values["gain"] * motion
+    network.inserts.append(Insert(end, "shunt", opening / line.load_resistance))
+    network.opening = opening
 
 
 def _parameters(rig, place):
@@ -45,16 +49,18 @@ def _in_time(line, state, values, place):
         line.inserts.append(inertance(line.length, values["inertance"]))
         return
     w = 2.0 * np.pi * values["natural_frequency"]
-    gain = values["gain"] / state.load_resistance
+    drop = state.mean_pressure - ATMOSPHERE - line.end.pressure
+    gain = values["gain"] / (2.0 * drop)  # of the share that opens: see `rippletwin.orifice`
     spool = (gain * w**2,), (1.0, 2.0 * values["damping_ratio"] * w, w**2)
-    line.inserts.append(Element(line.length, "shunt", *spool))
+    line.end = replace(line.end, valve=Element(line.length, "shunt", *spool))
 
 
 EFFECT = Effect(
     name="load_dynamics",
     element="load",
     medium="any",
-    equation="spool: Y_load = (1/R)(1 + g w0^2/(s^2 + 2 zeta w0 s + w0^2)); "
+    equation="spool: q = K (1 + y) sqrt(P + p), y = H p/(2 P), "
+    "H = g w0^2/(s^2 + 2 zeta w0 s + w0^2); to a small ripple Y_load = (1 + H)/R; "
     "inertance: Z_load = R + s I",
     source="Merritt 1967, Hydraulic Control Systems, sec. 8-2 (spool on its spring, linearised); "
     "Johnston & Edge 1991, Proc. IMechE 205(I):89 (inertance)",

@@ -47,6 +47,8 @@ class Network:
                        order from pump to load
     sensor_positions   (S,) m from the pump outlet
     sensor_factor      (S, F) or broadcastable: what a sensor reads over the pressure at it
+    opening            (F,) of a valve at the load that follows the pressure, see `orifice`; what it
+                       does to a small ripple is an insert's
     storage            what segments store beyond proportion to the pressure, at full amplitude
     drains             (positions (N,), flows (N, F)) that leave the line whatever the pressure; for
                        lines that let the ripple through, as with them no scale can be taken out
@@ -62,6 +64,7 @@ class Network:
     inserts: list = field(default_factory=list)
     sensor_positions: np.ndarray = ()
     sensor_factor: np.ndarray | complex = 1.0
+    opening: np.ndarray | None = None
     storage: list = field(default_factory=list)
     drains: tuple | None = None
 

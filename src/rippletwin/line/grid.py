@@ -39,7 +39,9 @@ class Grid:
         self.rungs = np.cumsum([0] + [len(joint) for joint in joints])
         self.ladder = [rung for joint in joints for rung in joint]
         self.kinds = np.zeros((len(self.ladder), 2), dtype=np.int64)
-        self.filters = np.zeros((len(self.ladder), 5))
+        self.filters = np.zeros((len(self.ladder) + 1, 5))  # the last is the load's valve
+        if self.line.end.valve is not None:
+            self.filters[-1] = bilinear(self.line.end.valve, self.dt)
         for r, rung in enumerate(self.ladder):
             if isinstance(rung, Branch):
                 self.kinds[r] = kernel.BRANCH, len(self.pipes)
@@ -148,7 +150,7 @@ class Grid:
         self.pressure[: self.load_node + 1] = self._steady(self.mean)
         self.flow[: self.load_node + 1] = self.mean
         self.steady[: self.load_node + 1] = steady = self._steady(reference)
-        self.references, self.state = np.zeros(len(self.ladder)), np.zeros((len(self.ladder), 2))
+        self.references, self.state = np.zeros(len(self.filters)), np.zeros((len(self.filters), 2))
         for r, rung in enumerate(self.ladder):
             joint = int(np.searchsorted(self.rungs, r, side="right")) - 1
             node = self.load_node if joint == self.main else self.offsets[joint]
@@ -160,10 +162,9 @@ class Grid:
             now = self.mean, reference
             if rung.kind == "shunt":
                 now = self.pressure[node], steady[node]
-            self.references[r] = now[1]
-            u, (b0, _, b2, _, a2) = now[0] - now[1], self.filters[r]
-            y = u * rung.immittance(0.0)
-            self.state[r] = y - b0 * u, b2 * u - a2 * y
+            self._rest(r, rung, *now)
+        if self.line.end.valve is not None:
+            self._rest(-1, self.line.end.valve, self.pressure[self.load_node], steady[-1])
         # A wall at rest holds b = phi p = follow/(1 - keep) p.
         held = self.follow / np.where(self.share > 0.0, 1.0 - self.keep, 1.0)
         sizes = np.diff(self.offsets)
@@ -183,6 +184,13 @@ class Grid:
         more = (self.thetas - 1.0)[:, None]
         self.history[:, 0] = (self.forward[near] - more[:, 0] * loss[near])[:, None]
         self.history[:, 1] = (self.backward[last] + more[:, 0] * loss[last])[:, None]
+
+    def _rest(self, r, element, now, reference):
+        """The state of a filter that has long seen `now`."""
+        self.references[r] = reference
+        u, (b0, _, b2, _, a2) = now - reference, self.filters[r]
+        y = u * element.immittance(0.0)
+        self.state[r] = y - b0 * u, b2 * u - a2 * y
 
     def advance(self, nodes):
         """One period: pressure and flow (len(nodes), M) at `nodes`, the state moved on."""

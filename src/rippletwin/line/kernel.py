@@ -10,6 +10,8 @@ import numpy as np
 from numba import njit
 
 SHUNT, SERIES, BRANCH = range(3)  # kinds of a rung
+VALVE = -1  # row of the load's valve among the filters
+PASSES = 3  # on its opening
 LATE = 0.501  # share of a step's end in the mean rate over it
 
 # Views of one pipe, indexed from 0: so the compiler knows that no index wraps, and vectorises.
@@ -126,6 +128,14 @@ def _filter(coefficients, u, state):
 
 
 @njit(cache=True, error_model="numpy")
+def _through_orifice(excess, b, coefficient):
+    """x |x| with b x |x| + K x = excess: the pressure over an orifice of coefficient K."""
+    size = abs(excess)
+    x = 2.0 * size / (coefficient + np.sqrt(coefficient**2 + 4.0 * b * size))
+    return np.sign(excess) * x * x
+
+
+@njit(cache=True, error_model="numpy")
 def _join(supply, slope, first, stop, kinds, filters, references, state, ends, kept, joint, load):
     """Pressures at a junction whose rungs are `first` to `stop`, in order from the pump.
 
@@ -158,12 +168,12 @@ def _join(supply, slope, first, stop, kinds, filters, references, state, ends, k
     if law == 1:
         p = outside
     elif law == 2:
-        # b x^2 + K x = excess with x = sqrt(p - p0)
         excess = s - b * outside
-        size = abs(excess)
-        root = np.sqrt(coefficient**2 + 4.0 * b * size)
-        x = 2.0 * size / (coefficient + root)
-        p = outside + np.sign(excess) * x * x
+        opening = 1.0 + state[VALVE, 0]
+        for _ in range(PASSES):  # the valve hardly moves within a step
+            p = outside + _through_orifice(excess, b, coefficient * opening)
+            opening = 1.0 + state[VALVE, 0] + filters[VALVE, 0] * (p - references[VALVE])
+        _filter(filters[VALVE], p - references[VALVE], state[VALVE])
     far = p
     for r in range(stop - 1, first - 1, -1):
         kind, b0 = kinds[r, 0], filters[r, 0]

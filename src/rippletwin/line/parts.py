@@ -86,7 +86,8 @@ class Branch:
 class End:
     """The load. kind and its numbers:
 
-    "orifice"     q = K sqrt(p - p0): `coefficient` K, `pressure` p0 behind it
+    "orifice"     q = K (1 + y) sqrt(p - p0): `coefficient` K, `pressure` p0 behind it, and y what
+                  the `valve` N/D opens for what p differs from the steady state
     "open"        p = p0
     "closed"      q = 0
     "anechoic"    q = q0 + (p - p0)/Zc, Zc that of the lossless last pipe, q0 the mean flow
@@ -96,6 +97,7 @@ class End:
     kind: str
     pressure: float = 0.0
     coefficient: float = 0.0
+    valve: Element | None = None
 
 
 @dataclass
