@@ -125,23 +125,16 @@ def explain_observations(
         HIGHEST_HZ if observations[0].orders is not None else None,
     )
     early, late = prepare(early, rig, HIGHEST_HZ), prepare(late, rig, HIGHEST_HZ)
-    base = Twin(rig, data, uncertain_pump=True)
     held = late if len(data) == 1 and late else None
+    base, found = Twin(rig, data, uncertain_pump=True), None
     Forward(base, data)  # what the twin keeps of the pump is worked out before the processes part
+    if not reason:
+        base, data, found = _searched(base, data, processes, progress)
     with workers(base, data, processes) as pool:
-        if reason:
+        if found is None:
             fit = pool.fit([{"hypothesis": ()}])[0]
             found = Search(fit, [], fit)
         else:
-            found = search(pool, progress)
-    if not reason and found.best.floor < ADEQUATE:
-        known = answered(found.best.twin, data)
-        if known is not None:
-            data, base = known, Twin(rig, known, uncertain_pump=True)
-            with workers(base, data, processes) as pool:
-                found = again(pool, found, progress)
-    with workers(base, data, processes) as pool:
-        if not reason:
             found.best = profiled(pool, that_transfers(pool, found.best, held))
             found.others = _others(pool, found)
             reason = contradiction.wiring(base, data, found)
@@ -175,6 +168,19 @@ def explain_observations(
         without=without,
         chance=by_chance,
     )
+
+
+def _searched(base: Twin, data: Sequence, processes: int, progress) -> tuple:
+    """Base, observations and what the search found: where the source is the lumped pump, that has
+    been made to answer the line, and the search has gone on."""
+    with workers(base, data, processes) as pool:
+        found = search(pool, progress)
+    known = answered(found.best.twin, data) if found.best.floor < ADEQUATE else None
+    if known is None:
+        return base, data, found
+    base = Twin(base.rig, known, uncertain_pump=True)
+    with workers(base, known, processes) as pool:
+        return base, known, again(pool, found, progress)
 
 
 def _turning(rig, observations: Sequence) -> ShaftLines | None:
