@@ -89,7 +89,8 @@ def test_flow_harmonics_are_those_of_the_ripple():
 
 def test_the_shaft_angle_shifts_the_recording_in_time():
     """A recording that begins at shaft angle 0.1 rad is the same waveform, 0.1 rad further on:
-    order k gains a phase of 0.1 k, through the nonlinear orifice too.
+    order k gains a phase of 0.1 k, through the nonlinear orifice too, to 1e-8 of the largest: its
+    solution is known to as much.
     """
     rig = paper_rig()
     o = point(rig)
@@ -97,7 +98,8 @@ def test_the_shaft_angle_shifts_the_recording_in_time():
     theta = np.zeros(len(twin.parameters))
     start = twin.predict([o], theta)[0]
     theta[twin.index["angle[a]"]] = 10.0  # of 0.01 rad each
-    assert np.allclose(twin.predict([o], theta)[0], start * np.exp(0.1j * o.orders), rtol=1e-6)
+    error = np.abs(twin.predict([o], theta)[0] - start * np.exp(0.1j * o.orders))
+    assert np.max(error) < 1e-8 * np.max(np.abs(start))
 
 
 def test_a_twin_survives_json_to_the_last_bit():

@@ -23,7 +23,7 @@ its mean, or have a gain of its own."""
 
 COUPLED = 0.3  # relative: a mean further off than this is no pressure
 DEGREES = 3.0  # of freedom of Student's distribution, which has such tails
-ROUNDS = 30
+ROUNDS, SETTLED = 30, 1e-12
 
 
 class OperatingPoint(NamedTuple):
@@ -92,13 +92,14 @@ def _load_pressure(rig: Rig, observation, flow: float) -> float | None:
     rows = np.vstack([np.eye(2), np.column_stack([np.ones_like(fall), fall])])
     values = np.concatenate([[1.0, 1.0], means / stated])
     sds = np.concatenate([[SET_SD, max(known, 0.01)], np.full(len(fall), MEAN_SD)])
-    weight = np.ones(len(values))
-    answer = np.ones(2)
+    weight, answer = 1.0 / sds**2, np.ones(2)
     for _ in range(ROUNDS):
         off = (rows[2:] @ answer - values[2:]) / sds[2:]
-        weight[2:] = (DEGREES + 1.0) / (DEGREES + off**2)
-        root = np.sqrt(weight) / sds
-        answer = np.linalg.lstsq(rows * root[:, None], values * root, rcond=None)[0]
+        weight[2:] = (DEGREES + 1.0) / (DEGREES + off**2) / sds[2:] ** 2
+        weighted, before = rows.T * weight, answer
+        answer = np.linalg.solve(weighted @ rows, weighted @ values)
+        if np.max(np.abs(answer - before)) < SETTLED:
+            break
     return float(stated * answer[0])
 
 
