@@ -29,7 +29,8 @@ from rippletwin.case import load_case
 from rippletwin.explain.fit import prepare
 from rippletwin.explain.metric import smooth_basis
 from rippletwin.explain.run import HIGHEST_HZ
-from rippletwin.explain.search import alone, library
+from rippletwin.explain.search import library
+from rippletwin.explain.singles import alone
 from rippletwin.explain.workers import workers
 from rippletwin.misfit import relative_misfit
 from rippletwin.spectra import observe

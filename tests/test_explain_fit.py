@@ -12,8 +12,9 @@ from rippletwin.explain.fit import fit_hypothesis, refine
 from rippletwin.explain.locate import locate
 from rippletwin.explain.metric import source_scale
 from rippletwin.explain.posterior import FLOOR, SIZE, Posterior
-from rippletwin.explain.search import ACCEPT, again, search
+from rippletwin.explain.search import again, search
 from rippletwin.explain.starts import PROMISING, promising
+from rippletwin.explain.thresholds import ACCEPT
 from rippletwin.explain.validate import validate
 from rippletwin.explain.workers import Workers, carry, scan, weak
 from rippletwin.forward import Forward

@@ -7,11 +7,14 @@ import pytest
 
 from explain_made import rig
 from rippletwin.effects import EFFECTS, Place
+from rippletwin.effects.base import lognormal
 from rippletwin.explain import validate, workers
-from rippletwin.explain.detect import Alarms
+from rippletwin.explain.detect import PULL, Alarms
 from rippletwin.explain.fit import Fit
-from rippletwin.explain.judge import SURE, judge
-from rippletwin.explain.search import ACCEPT, Search, simplify
+from rippletwin.explain.judge import ADEQUATE, SURE, equivalents, judge, places
+from rippletwin.explain.search import Search
+from rippletwin.explain.steps import relatives, simplify
+from rippletwin.explain.thresholds import ACCEPT
 from rippletwin.explain.validate import Score, Validation
 
 LOUD = Alarms(0.03, (1.0, "diameter[1]"), (1.0, "length[1]"), (1.0, ""))
@@ -24,8 +27,11 @@ SMALL = (EFFECTS["source_impedance"], Place("source", form="volume"))
 LARGE = (EFFECTS["source_impedance"], Place("source", form="volume and passage"))
 
 
-def fit(evidence, *hypothesis):
-    return Fit(hypothesis, None, 0.0, evidence, None, 0.004, 0.01, 0.01)
+def fit(evidence, *hypothesis, floor=0.004, at=0.0):
+    """`at` is the coordinate of the one parameter of its own."""
+    own = SimpleNamespace(name="viscoelastic_wall@segment 1.time", prior=lognormal(1e-3, 1.0))
+    twin = SimpleNamespace(parameters=(own,), theta=(at,))
+    return Fit(hypothesis, twin, 0.0, evidence, None, floor, 0.01, 0.01)
 
 
 def validation(after, disagreement=1.0, in_sample=0.01):
@@ -70,6 +76,45 @@ def test_an_explanation_that_fits_nothing_better_speaks_of_the_sheet(
     found = judge(Search(base, [best], best), alarms, validation(after, in_sample=in_sample))
     assert found.verdict == verdict
     assert found.accepted is (best if verdict == "unexplained" else base)
+
+
+@pytest.mark.parametrize(
+    ("floor", "at", "verdict"),
+    [
+        (0.9 * ADEQUATE, 0.9 * PULL, "named"),
+        (1.1 * ADEQUATE, 0.0, "unexplained"),  # what is left is neither the pump nor a sensor
+        (0.004, 1.1 * PULL, "unexplained"),  # no hose is like that
+    ],
+)
+def test_what_only_comes_nearest_has_no_name(floor, at, verdict):
+    """However much evidence: what looks alike leaves more than the true effect would, or asks for
+    parameters that it never has. It is modelled all the same."""
+    base, best = fit(0.0), fit(1000.0, HOSE, floor=floor, at=at)
+    found = judge(Search(base, [best], best), LOUD, validation(0.001, in_sample=0.001))
+    assert found.verdict == verdict and found.accepted is best
+
+
+def test_every_effect_is_compared_with_its_relatives():
+    """Of hose and delay the delay was taken in first: the other effects of its sensor are fitted
+    beside the hose, one does as well, and both are a class. Of one effect alone nothing is asked:
+    every other has been tried."""
+    delay, dynamics = (
+        (EFFECTS[n], Place("sensor p1", 0)) for n in ("sensor_delay", "sensor_dynamics")
+    )
+    other = (EFFECTS["sensor_gain"], Place("sensor p2", 1))
+    best, asked = fit(100.0, delay, HOSE), []
+
+    def answer(jobs):
+        asked.extend(job["hypothesis"] for job in jobs)
+        return [fit(98.0, *job["hypothesis"]) for job in jobs]
+
+    pool = SimpleNamespace(fit=answer)
+    found = relatives(pool, best, [HOSE, delay, dynamics, other, VOLUME])
+    assert asked == [(HOSE, dynamics)]
+    assert relatives(pool, fit(100.0, delay), [delay, dynamics]) == []
+    search = Search(fit(0.0), [], best, found)
+    assert equivalents(search) == (("sensor_delay", "sensor_dynamics"),)
+    assert places(search) == ()
 
 
 @pytest.mark.parametrize(("large", "small"), [(LARGE, SMALL), (VOLUME, END)])

@@ -100,7 +100,9 @@ def test_gains_of_two_sensors_are_one_class():
 
     def fit(name, sensor, evidence):
         pair = (EFFECTS[name], Place(f"sensor {sensor}"))
-        return SimpleNamespace(hypothesis=(pair,), names=(name,), evidence=evidence)
+        return SimpleNamespace(
+            hypothesis=(pair,), names=(name,), evidence=evidence, without=lambda k: ()
+        )
 
     best = fit("sensor_gain", "p1", 100.0)
     others = [fit("sensor_gain", "p2", 99.0), fit("sensor_delay", "p2", 10.0)]

@@ -19,7 +19,8 @@ from scipy.stats import gumbel_r
 
 from rippletwin.explain.fit import Fit
 from rippletwin.explain.posterior import Posterior
-from rippletwin.explain.search import alone, library
+from rippletwin.explain.search import library
+from rippletwin.explain.singles import alone
 from rippletwin.explain.workers import Workers
 from rippletwin.forward import characteristic_impedance
 

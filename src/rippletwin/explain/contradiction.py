@@ -17,7 +17,9 @@ import numpy as np
 
 from rippletwin.explain.detect import SIGNIFICANCE, common, difference, drift
 from rippletwin.explain.fit import fit_hypothesis
-from rippletwin.explain.search import ACCEPT, GOOD, Search
+from rippletwin.explain.posterior import FLOOR
+from rippletwin.explain.search import Search
+from rippletwin.explain.thresholds import ACCEPT
 
 DEAD = 3e-3  # of the other sensors' ripple: no node of a line is as deep at every harmonic
 SAME = 2e-3  # relative difference of two sensors' ripple that no two places have
@@ -26,7 +28,7 @@ NOISELESS = 1e-20  # variance over power; single precision leaves 1e-14
 GROWTH = 0.25  # of the mean pressure: well above any sensor's gain error
 CHANGED = 0.15  # of the ripple, between parts or repeats of one state: more than drift by degrees
 TEMPERATURE = 0.005  # relative wave speed between repeats: two kelvin of oil
-POOR = 5.0 * GOOD  # model error that no explanation of sound data leaves
+POOR = 10.0 * FLOOR  # model error that no explanation of sound data leaves
 PASSAGES = 3.0  # of the line that a wave makes before it has died away
 PLATEAU = 8.0  # times as many samples in the outermost 2 % of the range as in the next
 PLATEAU_SHARE = 0.03  # of all samples

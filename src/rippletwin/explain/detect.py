@@ -3,7 +3,7 @@
 Refitting hides what is missing, so a good fit proves nothing. The alarms are the misfit left after
 refitting, the pull of the parameters on their priors (where an absorbed effect shows), and the
 disagreement of parameters fitted to each operating point alone. What decides is the evidence that
-the best effect of the whole library adds (`rippletwin.explain.search.ACCEPT`).
+the best effect of the whole library adds (`rippletwin.explain.thresholds.ACCEPT`).
 """
 
 from __future__ import annotations
@@ -61,6 +61,17 @@ def pull(fit: Fit) -> tuple[float, str]:
         if not p.flat and "@" not in p.name
     ]
     return max(pulls, default=(0.0, ""))
+
+
+def strain(fit: Fit) -> float:
+    """Largest pull of an effect's own parameter on its prior. Where along the line it sits is no
+    strain: one place is as likely as another."""
+    pulls = [
+        abs(float(u))
+        for p, u in zip(fit.twin.parameters, fit.twin.theta)
+        if "@" in p.name and p.prior.kind != "uniform"
+    ]
+    return max(pulls, default=0.0)
 
 
 def disagreement(fits: Sequence[Fit]) -> tuple[float, str]:

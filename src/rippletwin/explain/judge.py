@@ -8,10 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rippletwin.explain.bootstrap import Chance
-from rippletwin.explain.detect import Alarms
+from rippletwin.explain.detect import PULL, Alarms, strain
 from rippletwin.explain.fit import Fit
 from rippletwin.explain.locate import extent
-from rippletwin.explain.search import ACCEPT, GOOD, SURE, Search
+from rippletwin.explain.posterior import FLOOR
+from rippletwin.explain.search import Search
+from rippletwin.explain.thresholds import ACCEPT, GOOD, SURE
 from rippletwin.explain.validate import Validation
 
 VERDICTS = ("consistent", "named", "ambiguous", "unexplained", "calibration_only", "bad_data")
@@ -19,9 +21,10 @@ VERDICTS = ("consistent", "named", "ambiguous", "unexplained", "calibration_only
 EQUIVALENT = 3.0
 """Log evidence within which two explanations cannot be told apart: twenty to one."""
 
-ADEQUATE = 5.0 * GOOD
-"""Relative model error above which no name is given: an effect that leaves more than this is at
-most a part of what is missing."""
+ADEQUATE = 2.0 * FLOOR
+"""Relative model error above which no name is given. What the source and the sensors are uncertain
+by is no part of it: with the true effect it comes down to its least, and what looks alike stops
+above (docs/explain.md)."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,7 @@ def judge(
         if weak or not validation.transfers:
             # A line that fits without it, and data left out that speak against it: an absorber.
             return _nothing_missing(search.base, alarms)
-    if best.floor > ADEQUATE or fails:
+    if best.floor > ADEQUATE or strain(best) > PULL or fails:
         # Without a name it is modelled all the same, by whatever describes the data best.
         stands_in = other is not None and other.evidence > best.evidence
         return Judgement("unexplained", other if stands_in else best)
@@ -98,40 +101,43 @@ def needed_over(best: Fit, search: Search) -> float:
 
 
 def equivalents(search: Search) -> tuple[tuple[str, ...], ...]:
-    """Classes of effect names whose evidence is too close to the best explanation's."""
-    close = {name for _, name in _newest(search)}
-    return (tuple(sorted(close)),) if len(close) > 1 else ()
+    """Classes of effect names: each of an accepted effect and of what does as well in its place."""
+    found = [tuple(sorted({own, *(name for _, name in r)})) for (own, _), r in _stand_ins(search)]
+    return tuple(names for names in found if len(names) > 1)
 
 
 def places(search: Search) -> tuple[tuple[str, ...], ...]:
-    """Classes of places at which the newest effect does alike, as of two sensors' gains of which
+    """Classes of places at which one effect does alike, as of two sensors' gains of which
     only the ratio is seen: "name at place" each. The effect has a name all the same."""
-    own = search.best.names[-1] if search.best.hypothesis else ""
-    close = {f"{own} at {fit.hypothesis[-1][1]}" for fit, name in _newest(search) if name == own}
-    return (tuple(sorted(close)),) if len(close) > 1 else ()
+    found = []
+    for (own, place), stand_ins in _stand_ins(search):
+        at = {f"{own} at {where}" for (fit, where), name in stand_ins if name == own}
+        found.append(tuple(sorted({f"{own} at {place}", *at})))
+    return tuple(names for names in found if len(names) > 1)
 
 
 def rivals(search: Search) -> list[Fit]:
-    """Fits as good as the best explanation that differ from it in their newest effect."""
-    return [fit for fit, _ in _newest(search) if fit.hypothesis != search.best.hypothesis]
+    """Fits as good as the best explanation that differ from it in one effect."""
+    return [fit for _, stand_ins in _stand_ins(search) for (fit, _), _ in stand_ins]
 
 
-def _newest(search: Search) -> list[tuple[Fit, str]]:
-    """The best explanation and what is within EQUIVALENT of it, each with the effect that differs.
+def _stand_ins(search: Search) -> list[tuple[tuple, list[tuple]]]:
+    """Of each accepted effect (name, place) the fits within EQUIVALENT of the best explanation that
+    have another effect or place for it, as ((fit, place), name).
 
     What no line is without is known to be there; what could do its work besides is no rival.
     """
-    best = search.best
-    if not best.hypothesis or best.hypothesis[-1][0].certain:
-        return []
-    kept, found = set(best.hypothesis[:-1]), [(best, best.names[-1])]
-    for fit in search.rivals:
-        close = best.evidence - fit.evidence < EQUIVALENT
-        if not close or len(fit.names) != len(best.names) or fit.hypothesis == best.hypothesis:
-            continue
-        different = [effect.name for effect, place in fit.hypothesis if (effect, place) not in kept]
-        if len(different) == 1:
-            found.append((fit, different[0]))
+    best, found = search.best, []
+    for k, own in enumerate(best.hypothesis):
+        rest, others = set(best.without(k)), []
+        for fit in search.rivals:
+            close = best.evidence - fit.evidence < EQUIVALENT
+            other = set(fit.hypothesis) - rest
+            if close and rest < set(fit.hypothesis) and len(other) == 1 and own not in other:
+                ((effect, place),) = other
+                others.append(((fit, place), effect.name))
+        if not own[0].certain:
+            found.append(((own[0].name, own[1]), others))
     return found
 
 

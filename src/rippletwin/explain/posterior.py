@@ -104,6 +104,8 @@ class Posterior:
         smooth = smooth_basis(self.forward.frequency_hz[nominal], self.forward.recording[nominal])
         size = np.ones((1, smooth.shape[1]))
         self._basis = np.concatenate([self._scale[nominal] * smooth, size])
+        pairs = self._basis[:, None] * self._basis
+        self._pairs = pairs.reshape(len(self._basis) ** 2, len(self._nominal)).T
         self.count = 2 * (self.values.size - int(np.sum(self._free)))
         self._pressures = all(o.kind != "input_impedance" for o in data)
 
@@ -206,10 +208,9 @@ class Posterior:
             cost = cost - np.sum(np.log(weight), axis=(1, 2)) + np.zeros((len(taus), 1, 1))
             if any_nominal:  # (T, G, D): what the smooth error of unit prior changes
                 gain = 1.0 / stretch[..., self._nominal]
-                gram = np.einsum(
-                    "gdf,if,jf->gdij", size[:, self._nominal] * gain, self._basis, self._basis,
-                    optimize=["einsum_path", (0, 1), (0, 1)],
-                )  # fmt: skip
+                gram = ((size[:, self._nominal] * gain) @ self._pairs).reshape(
+                    *gain.shape[:2], len(self._basis), -1
+                )
                 share = (cross[:, self._nominal] * gain) @ self._basis.T  # (G, D, J)
                 sizes_of = self._sds(taus)[:, None, None]  # (T, 1, 1, J)
                 root = np.linalg.cholesky(

@@ -18,8 +18,9 @@ from rippletwin.explain.answer import answered
 from rippletwin.explain.bootstrap import Chance, chance
 from rippletwin.explain.fit import Fit, fit_hypothesis, prepare
 from rippletwin.explain.intervals import profiled
-from rippletwin.explain.judge import ADEQUATE, Judgement, judge
-from rippletwin.explain.search import ACCEPT, GOOD, Search, again, extended, search
+from rippletwin.explain.judge import Judgement, judge
+from rippletwin.explain.posterior import FLOOR
+from rippletwin.explain.search import Search, again, search
 from rippletwin.explain.shaft import (
     RELATIVE,
     ShaftLines,
@@ -28,6 +29,8 @@ from rippletwin.explain.shaft import (
     standing_out,
 )
 from rippletwin.explain.sheet import WithoutEffect, without_each
+from rippletwin.explain.steps import extended
+from rippletwin.explain.thresholds import ACCEPT, GOOD
 from rippletwin.explain.validate import Validation, that_transfers, validate
 from rippletwin.explain.workers import Workers, workers
 from rippletwin.forward import Forward
@@ -35,6 +38,7 @@ from rippletwin.spectra import observe, revolutions_of
 from rippletwin.twin import Twin
 
 HIGHEST_HZ = 4000.0
+ROUGH = 10.0 * FLOOR  # relative model error above which the pressure at the pump is not known
 
 
 @dataclass(frozen=True)
@@ -175,7 +179,7 @@ def _searched(base: Twin, data: Sequence, processes: int, progress) -> tuple:
     been made to answer the line, and the search has gone on."""
     with workers(base, data, processes) as pool:
         found = search(pool, progress)
-    known = answered(found.best.twin, data) if found.best.floor < ADEQUATE else None
+    known = answered(found.best.twin, data) if found.best.floor < ROUGH else None
     if known is None:
         return base, data, found
     base = Twin(base.rig, known, uncertain_pump=True)
@@ -216,7 +220,7 @@ def _prefers_other(found: Search) -> bool:
     best = found.best
     if not found.others:
         return False
-    return found.others[0].evidence > best.evidence and best.floor > min(GOOD, ADEQUATE)
+    return found.others[0].evidence > best.evidence and best.floor > GOOD
 
 
 def _alone(pool: Workers, base: Fit) -> list[Fit]:

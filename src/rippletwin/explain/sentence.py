@@ -41,7 +41,7 @@ def sentence(e: Explanation, result: dict, found: list[dict], base) -> str:
                     "such line is without it, unless data speak against it."
                 ] = None
         words += numbers
-        words += _against_the_sheet(e)
+        words += _against_the_sheet(e, ", which is what rejects it.")
         if kind == "ambiguous":
             classes = "; ".join(join(names) for names in result["equivalents"])
             words.append(f"These recordings cannot tell apart {classes}.")
@@ -57,6 +57,13 @@ def sentence(e: Explanation, result: dict, found: list[dict], base) -> str:
                 f"unseen data {before:.1%} to {after:.1%}. What is missing goes "
                 f"{result['stand_in']['follows']}."
             )
+        elif found:
+            names = [f"{f['effect'].name.replace('_', ' ')} at the {_place(e, f)}" for f in found]
+            words.append(
+                f"Of what has a name {join(names)} comes nearest: misfit on unseen data "
+                f"{before:.1%} to {after:.1%}, which the pump and the sensors do not account for."
+            )
+            words += _against_the_sheet(e, ".")
     if kind in ("named", "ambiguous", "unexplained") and result["next_recording"]:
         words.append(f"Next: {result['next_recording']}.")
     if kind in ("named", "ambiguous") and found:
@@ -99,12 +106,12 @@ def _pump(numbers: dict) -> str:
     )
 
 
-def _against_the_sheet(e: Explanation) -> list[str]:
+def _against_the_sheet(e: Explanation, end: str) -> list[str]:
     """Where the data alone would do without an effect, and only the data sheet says no."""
     return [
         f"Without {w.effect.replace('_', ' ')} a fit at {w.misfit:.1%} would be had with "
         f"{w.parameter} at {w.value:.3g} {w.unit}, {w.pull:.0f} standard deviations from the "
-        "data sheet, which is what rejects it."
+        f"data sheet{end}"
         for w in e.without
         if w.rivals and w.pull > detect.PULL
     ]

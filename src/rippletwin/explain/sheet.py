@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields, replace
 from rippletwin.case import Rig, Uncertainty
 from rippletwin.explain import detect
 from rippletwin.explain.fit import Fit
-from rippletwin.explain.search import ACCEPT
+from rippletwin.explain.thresholds import ACCEPT
 from rippletwin.explain.validate import score
 from rippletwin.explain.workers import Workers, in_common
 from rippletwin.parameters import coordinates

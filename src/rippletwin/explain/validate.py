@@ -12,8 +12,8 @@ import numpy as np
 
 from rippletwin.explain.fit import Fit, select
 from rippletwin.explain.posterior import Posterior
-from rippletwin.explain.search import SURE
 from rippletwin.explain.starts import align
+from rippletwin.explain.thresholds import SURE
 from rippletwin.explain.workers import Workers, dropping
 from rippletwin.misfit import relative_misfit, theil
 

@@ -167,6 +167,10 @@ def _fit(e: Explanation) -> dict:
     return {
         "before": scores(e.validation.before),
         "after": scores(e.validation.after),
+        "model_error": {
+            "before": float(e.search.base.floor),
+            "after": float(e.judgement.accepted.floor),
+        },
         "left_out": list(e.validation.left_out),
         "parameters_agree_within_sd": float(e.validation.disagreement),
     }

@@ -81,8 +81,20 @@ class Workers:
         self._pool = pool
 
     def fit(self, jobs: Sequence[dict], progress: Callable[[], None] | None = None) -> list[Fit]:
-        """Fits in the order of `jobs`, each a hypothesis and options of `work`."""
-        return self.map(work, jobs, progress)
+        """Fits in the order of `jobs`, each a hypothesis and options of `work`.
+
+        Those of most starts are begun first, so that no process ends long after the others.
+        """
+        first = sorted(range(len(jobs)), key=lambda k: -self._starts(jobs[k]))
+        fits = self.map(work, [jobs[k] for k in first], progress)
+        return [fit for _, fit in sorted(zip(first, fits), key=lambda pair: pair[0])]
+
+    def _starts(self, job: dict) -> int:
+        """How many a fit sets out from, at most."""
+        if "theta" in job:
+            return 1
+        starts = job.get("starts") or scan(self.base.rig, job["hypothesis"])
+        return len(starts) + job.get("draws", 0)
 
     def map(
         self,
@@ -167,3 +179,22 @@ def work(base: Twin, observations: Sequence, job: dict) -> Fit:
         return refine(base, hypothesis, observations, thetas, free)
     starts = job.get("starts") or scan(base.rig, hypothesis)
     return fit_hypothesis(base, hypothesis, observations, starts, free, job.get("draws", 0))
+
+
+def ranked(fits: Sequence[Fit]) -> list[Fit]:
+    """Fits with an evidence, best first."""
+    return sorted((f for f in fits if np.isfinite(f.evidence)), key=lambda f: -f.evidence)
+
+
+def counter(progress, what: str, total: int) -> Callable[[], None] | None:
+    """What tells `progress` (what, done, total) at every call; None where nobody asks."""
+    if progress is None:
+        return None
+    done = 0
+
+    def tell():
+        nonlocal done
+        done += 1
+        progress(what, done, total)
+
+    return tell

@@ -14,7 +14,7 @@ from rippletwin.explain.describe import missing, posterior_of
 from rippletwin.explain.detect import residual_map
 from rippletwin.explain.intervals import intervals
 from rippletwin.explain.locate import side_by_side
-from rippletwin.explain.search import ACCEPT
+from rippletwin.explain.thresholds import ACCEPT
 from rippletwin.figures import style
 
 POINTS = 4  # operating points or effects shown side by side at most

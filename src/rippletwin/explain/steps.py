@@ -1,0 +1,138 @@
+"""Steps from one explanation to the next: an effect more, another in its place, one less."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rippletwin.explain.fit import Fit, Hypothesis
+from rippletwin.explain.thresholds import ACCEPT, GOOD, needed_of
+from rippletwin.explain.workers import Workers, counter, dropping, in_common, ranked, scan
+
+MOST = 4  # effects at a time
+STAND_INS = 10  # single effects tried in the place of another
+BETTER = 1.0  # log evidence by which what is put in the place of another must be better
+LIMITS = {"line_volume": "load_volume"}  # effects at any place that are another at the line's end
+
+
+def extensions(pool: Workers, best: Fit, found: Sequence, progress) -> list[Fit]:
+    """`best` with each of the candidates besides that it has not, best first; none beyond MOST."""
+    if len(best.hypothesis) >= MOST:
+        return []
+    rig = pool.base.rig
+    jobs = [
+        extended(best, candidate, rig) for candidate in found if candidate not in best.hypothesis
+    ]
+    tell = counter(progress, f"{len(best.hypothesis) + 1} effects", len(jobs))
+    return ranked(pool.fit(jobs, tell))
+
+
+def extended(best: Fit, candidate, rig) -> dict:
+    """The job that adds a candidate to a fit.
+
+    Where the fit is still poor its parameters are bent, and the fit starts from nominal again with
+    its effects where they were; where it is good the candidate starts from it.
+    """
+    hypothesis = (*best.hypothesis, candidate)
+    if best.floor > GOOD:
+        return restarted(best, hypothesis, rig)
+    return {"hypothesis": hypothesis, "fit": best}
+
+
+def restarted(best: Fit, hypothesis: Hypothesis, rig) -> dict:
+    """The job that fits from nominal again, effects in common starting where they were."""
+    kept = in_common(best, hypothesis)
+    return {
+        "hypothesis": hypothesis,
+        "starts": [{**kept, **start} for start in scan(rig, hypothesis)],
+    }
+
+
+def exchange(pool: Workers, best: Fit, singles: Sequence[Fit], rounds: int = 2) -> Fit:
+    """Put another effect in the place of each while that is better and the fit still poor.
+
+    The first effect taken in does the work of all that are missing; once others are there it may
+    be the wrong one. What stands in is the best few single effects.
+    """
+    for _ in range(rounds):
+        if len(best.hypothesis) < 2 or best.floor <= GOOD:
+            break
+        stand_ins = [f.hypothesis[0] for f in singles[:STAND_INS]]
+        jobs = []
+        for k in range(len(best.hypothesis)):
+            jobs += [
+                restarted(best, (*best.without(k), c), pool.base.rig)
+                for c in stand_ins
+                if c not in best.hypothesis
+            ]
+        better = ranked(pool.fit(jobs))
+        if not better or better[0].evidence < best.evidence + BETTER:
+            break
+        best = better[0]
+    return best
+
+
+def relatives(pool: Workers, best: Fit, found: Sequence) -> list[Fit]:
+    """`best` with each of several effects exchanged for every other on the same element, best
+    first: those that might be taken for it were never tried beside what was taken in after it.
+    What no line is without is known to be there."""
+    members = best.hypothesis if len(best.hypothesis) > 1 else ()
+    jobs = [
+        {"hypothesis": (*best.without(k), candidate), "fit": best}
+        for k, (effect, place) in enumerate(members)
+        for candidate in found
+        if candidate[1].element == place.element and candidate not in best.hypothesis
+        if not effect.certain
+    ]
+    return ranked(pool.fit(jobs))
+
+
+def simplify(pool: Workers, best: Fit, found: Sequence) -> Fit:
+    """Put in the place of each effect one that it contains, unless that costs ACCEPT.
+
+    What the larger has besides is physics of its own, which has to be worth as much as any other.
+    """
+    for k, member in enumerate(best.hypothesis):
+        rest = best.without(k)
+        jobs = [
+            {"hypothesis": (*rest, c), "fit": best}
+            for c in found
+            if c not in rest and _contains(member, c, pool.base.rig)
+        ]
+        for fit in ranked(pool.fit(jobs))[:1]:
+            if fit.evidence > best.evidence - ACCEPT:
+                return simplify(pool, fit, found)
+    return best
+
+
+def _contains(member, other, rig) -> bool:
+    """Whether an effect is a special case of another: of its equations, or where it may be."""
+    (effect, place), (less, where) = member, other
+    if effect is not less:
+        return LIMITS.get(effect.name) == less.name
+    names = [{p.name for p in e.parameters(rig, at)} for e, at in (member, other)]
+    return place.element == where.element and names[1] < names[0]
+
+
+def backward(pool: Workers, best: Fit) -> Fit:
+    """Drop every effect that the others have made needless."""
+    while len(best.hypothesis) > 1:
+        fits = pool.fit([dropping(best, k, pool.base) for k in range(len(best.hypothesis))])
+        losses = [
+            best.evidence - fit.evidence - needed_of(effect)
+            for fit, (effect, _) in zip(fits, best.hypothesis)
+        ]
+        weakest = int(np.argmin(losses))
+        if losses[weakest] >= 0:
+            break
+        best = fits[weakest]
+    return best
+
+
+def settled(pool: Workers, best: Fit) -> Fit:
+    """The fit at its exact mode, where that takes derivatives of what the line stores: what is
+    added to a fit that stopped short of it would be taken for what is missing."""
+    if not best.stores:
+        return best
+    return pool.fit([{"hypothesis": best.hypothesis, "theta": best.twin.theta}])[0]
