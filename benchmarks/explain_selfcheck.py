@@ -270,6 +270,7 @@ def summary(rows: list[dict]) -> str:
         if kind == "none":
             alarms = [r for r in cases if r["verdict"] not in ("consistent", "calibration_only")]
             lines.append(f"  false alarms {len(alarms)}: {[r['number'] for r in alarms]}")
+            lines.append(f"  largest model error: {max(r['floor'] for r in cases):.4f}")
             top = sorted((r["top_single"] for r in cases), reverse=True)
             lines.append("  largest evidence of any single effect: " + _row(top[:8]))
             pulls = sorted((r["pull"] for r in cases), reverse=True)
@@ -304,6 +305,8 @@ def summary(rows: list[dict]) -> str:
                     f"  {key}: {np.mean(np.abs(z) < 1.96):.1%} of {len(z)} within 1.96 deviations, "
                     f"rms {np.sqrt(np.mean(np.clip(z, -9, 9) ** 2)):.2f}"
                 )
+        if good:
+            lines.append(f"  largest model error of these: {max(r['floor'] for r in good):.4f}")
         ratio = [r["held_out"][1] / r["truth_misfit"] for r in good]
         if ratio:
             lines.append(f"  held-out misfit over the truth's: median {np.median(ratio):.2f}")

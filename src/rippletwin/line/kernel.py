@@ -1,7 +1,8 @@
 """The inner loop of the method of characteristics; see `rippletwin.line.moc` for the equations.
 
 Per node: `forward` = p + Zc q and `backward` = p - Zc q as they leave towards a cell of length
-one, half of the losses over that cell already taken off.
+one, half of the losses over that cell already taken off. All in one file, for Numba's cache of a
+function does not see changes of another file.
 """
 
 from __future__ import annotations
