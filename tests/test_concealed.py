@@ -16,6 +16,7 @@ from concealed import jail
 from concealed.commitments import digests
 from concealed.score import score
 from concealed.summary import Rate, failed, rate
+from concealed.tool import NOTHING, crash
 from virtualrig.conceal import NUMERICS, compared
 from virtualrig.draw import MIX, UNCERTAINTY, draw, generator, kinds
 from virtualrig.draw_effects import Bare, load_dynamics
@@ -295,6 +296,13 @@ def test_right_name_place_and_interval():
     far = marked(truth(), verdict("named", claim("leak", position=(4.0, 4.5), conductance=(3, 4))))
     assert far["right"] and far["in_place"] == [False] and far["intervals"] == [False]
     assert failed(far) == "wrong place"
+
+
+def test_a_tool_that_ended_with_an_error_is_scored():
+    """It has named nothing, rang, and is a failure; what it writes is all that scoring asks for."""
+    row = score(truth(), crash(ValueError("no")), NOTHING | {"seconds": 1.0})
+    assert row["verdict"] == "crashed" and not row["right"] and row["alarm"]
+    assert failed(row) is not None
 
 
 def test_wrong_names_and_names_beside_right_ones_are_told_apart():

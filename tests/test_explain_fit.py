@@ -114,6 +114,25 @@ def test_starts_at_the_effect_promise_most(place):
     assert min(abs(x - place) for x in found) < 1000 / 4000 / 8
 
 
+def test_no_descent_enters_where_the_prediction_is_infinite(monkeypatch):
+    """A line without loss has no finite answer at its resonance: a step there is refused, a start
+    there is given up, and a hypothesis with no other start has no evidence."""
+    _, observations, truth = make(np.random.default_rng(1), (), TRUTH)
+    whole = Posterior.predict
+    ends = truth.theta[0] + 0.05  # short of the mode
+
+    def predict(self, theta):
+        return whole(self, theta) * (np.nan if theta[0] < ends else 1.0)
+
+    monkeypatch.setattr(Posterior, "predict", predict)
+    base = truth.with_(theta=np.zeros_like(truth.theta))
+    outside = truth.theta
+    assert refine(base, (), observations, [outside]).evidence == -np.inf
+    inside = truth.theta + 0.5 * np.eye(len(truth.theta))[0]
+    found = refine(base, (), observations, [inside])
+    assert found.twin.theta[0] >= ends and np.isfinite(found.evidence)
+
+
 def test_whitened_residual_of_the_truth_has_unit_variance():
     """At the true parameters, with noise alone, the residuals have mean square 1 (chi-square)."""
     _, observations, truth = make(np.random.default_rng(2), source=0.0, noise=4e5)

@@ -6,7 +6,7 @@ import pytest
 from line_rig import DENSITY, network
 from rippletwin.line.drains import Basis
 from rippletwin.line.parts import Pipe
-from rippletwin.line.storage import FullAmplitude, Storage
+from rippletwin.line.storage import TOLERANCE, FullAmplitude, Storage, _fixed_point
 
 LENGTH, DIAMETER, SPEED, PRESSURE = 6.6, 0.02, 1000.0, 1e7
 AREA = 0.25 * np.pi * DIAMETER**2
@@ -101,3 +101,19 @@ def test_variation_of_constants_is_the_sweep():
     pressure = basis.respond((scale * p, scale * q), leaving)
     line.drains = x, leaving
     np.testing.assert_allclose(line.pressure_at(x), pressure, rtol=1e-10)
+
+
+@pytest.mark.parametrize("diverging", [2, 8])
+def test_substitution_is_mixed_past_several_sharp_resonances(diverging):
+    """Against the exact solution: x = A x + b, where A takes `diverging` directions three to six
+    times further at every pass, as resonances do, and the rest a tenth."""
+    rng = np.random.default_rng(2)
+    turn = np.linalg.qr(rng.normal(size=(40, 40)) + 1j * rng.normal(size=(40, 40)))[0]
+    far = np.linspace(3.0, 6.0, diverging) * np.exp(1j * rng.uniform(0, 2 * np.pi, diverging))
+    map_ = (turn * np.r_[far, np.full(40 - diverging, 0.1)]) @ np.conj(turn).T
+    b = rng.normal(size=40) + 1j * rng.normal(size=40)
+    found = _fixed_point(
+        lambda x: (map_ @ x.ravel() + b).reshape(4, 10), np.zeros((4, 10), complex)
+    )
+    exact = np.linalg.solve(np.eye(40) - map_, b).reshape(4, 10)
+    assert np.abs(found - exact).max() < 10 * TOLERANCE * np.abs(exact).max()

@@ -58,6 +58,7 @@ def crash(error: Exception) -> dict:
         "effects": [],
         "equivalents": [],
         "fit": {"before": nothing, "after": nothing},
+        "without": [],
         "sentence": f"It ended with an error: {error!r}",
     }
 

@@ -23,6 +23,8 @@ def descend(
     `held` stay; the posterior's errors are estimated on the way unless `errors` is false."""
     free = np.setdiff1d(np.arange(len(theta)), held)
     prediction = posterior.predict(theta)
+    if not np.all(np.isfinite(prediction)):
+        return theta, np.inf  # no way leads down from there
     if errors:
         posterior.estimate_errors(prediction, theta)
     value = posterior.objective(theta, prediction)

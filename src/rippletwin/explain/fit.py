@@ -159,6 +159,8 @@ def fit_hypothesis(
     for stage, limit in enumerate(stages):
         last = stage == len(stages) - 1
         posterior = _without_storage(twin, observations, limit, source_free)
+        if stage > 0:
+            _hold_storage(posterior, states[0][1])
         posterior.most = np.inf if last else MOST
         fits = []
         for _, theta in states:
@@ -198,6 +200,19 @@ def _without_storage(twin: Twin, observations, limit: float, source_free: bool) 
     return posterior
 
 
+def _hold_storage(posterior: Posterior, theta: np.ndarray) -> None:
+    """Hold what the line stores at theta, if that fits better than leaving it out: higher harmonics
+    that get much of their size by way of it would else be put down to the pump."""
+    if not posterior.forward.stores:
+        return
+    without = posterior.objective(theta, posterior.predict(theta))
+    posterior.forward.hold_storage = False
+    stored = posterior.objective(theta, posterior.predict(theta))
+    posterior.forward.hold_storage = True
+    if not stored < without:
+        posterior.forward.leave_out_storage()
+
+
 def _followed(posterior: Posterior, theta: np.ndarray, rounds: int = 0) -> np.ndarray:
     """The mode near theta, where that was held: now it is followed, and in so many `rounds` at most
     by derivatives too."""
@@ -216,14 +231,18 @@ def _followed(posterior: Posterior, theta: np.ndarray, rounds: int = 0) -> np.nd
 
 def conclude(posterior: Posterior, hypothesis: Hypothesis, theta: np.ndarray) -> Fit:
     """The fit at a mode: evidence and covariance."""
-    prediction = posterior.predict(theta)
+    prediction, twin = posterior.predict(theta), posterior.twin.with_(theta=theta)
+    if not np.all(np.isfinite(prediction)):
+        # No start leads anywhere: the hypothesis says nothing of these data.
+        unknown = np.eye(len(theta))
+        return Fit(hypothesis, twin, np.inf, -np.inf, unknown, np.inf, 0.0, 0.0)
     posterior.estimate_errors(prediction, theta)
     objective = posterior.objective(theta, prediction)
     second = hessian(posterior, theta, prediction)
     log_det = np.linalg.slogdet(second)[1]
     return Fit(
         hypothesis,
-        posterior.twin.with_(theta=theta),
+        twin,
         objective,
         -objective - 0.5 * log_det,
         np.linalg.inv(second),

@@ -52,6 +52,10 @@ class DifferentiableForward(Forward):
         """Hold in predictions what `other`, of the same recordings, has found to be stored."""
         self.hold_storage, self._drains = True, other._drains
 
+    def leave_out_storage(self) -> None:
+        """Hold nothing in predictions: as if the line stored in proportion to the pressure."""
+        self.hold_storage, self._drains = True, None
+
     def follow(self, theta: np.ndarray) -> None:
         """Find `missed` (P, S, F), what `derivatives` at theta lack because they hold what segments
         store; from here on they have it, there and, as long as it changes little, about there."""

@@ -114,7 +114,10 @@ class Posterior:
         return np.concatenate(self.forward(theta), axis=1)
 
     def objective(self, theta: np.ndarray, prediction: np.ndarray) -> float:
-        """Minus the log posterior at the present errors, but for a constant."""
+        """Minus the log posterior at the present errors, but for a constant; infinite where the
+        prediction is, as of a line without loss at its resonance."""
+        if not np.all(np.isfinite(prediction)):
+            return np.inf
         r, log_determinant = self.whitened(prediction)
         prior = 0.5 * float(np.sum(theta[self.prior] ** 2))
         return prior + float(np.sum(np.abs(r) ** 2)) + log_determinant

@@ -79,6 +79,8 @@ def align(posterior: Posterior, theta: np.ndarray) -> tuple[float, np.ndarray]:
     """
     theta, twin = np.array(theta), posterior.twin
     prediction = posterior.predict(theta)
+    if not np.all(np.isfinite(prediction)):
+        return np.inf, theta
     square = np.sum(np.abs(prediction) ** 2 + np.abs(posterior.values) ** 2, axis=0)
     match = np.sum(np.conj(prediction) * posterior.values, axis=0)
     misfit = 0.0
@@ -118,7 +120,8 @@ def promising(base: Twin, posterior: Posterior, thetas: list) -> list:
     own.forward.hold_storage = True
     prediction = own.predict(theta)
     own.estimate_errors(prediction, theta)
-    ways = np.array([posterior.predict(start) for start in thetas]) - prediction
+    # A way to where the prediction is infinite is none.
+    ways = np.nan_to_num(np.array([posterior.predict(start) for start in thetas]) - prediction)
     r, jacobian = own.linearise(theta, prediction, ways)
     jacobian, ways = jacobian[:, : len(theta)], jacobian[:, len(theta) :]
     both = np.linalg.lstsq(jacobian, np.column_stack([r, ways]), rcond=None)[0]

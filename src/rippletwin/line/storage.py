@@ -4,7 +4,8 @@ Where the compressibility depends on the pressure itself, a length dx stores g(p
 linear part, the harmonics of one recording couple all along the line, and s g(p) dx leaves it as
 a flow of its own (`rippletwin.line.drains`). Substitution, together with the load's law, mixed as
 Anderson (1965, J. ACM 12:547) does: g is a tenth or less of what the line stores in proportion, but
-at a sharp resonance the flows of one pass move the pressure as much as the source does.
+at a sharp resonance the flows of one pass move the pressure as much as the source does, and at
+several of them by more: what is mixed must know as many directions as there are of these.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ from scipy.fft import irfft, next_fast_len, rfft
 from rippletwin.line.drains import Basis
 
 A_WAVE = 2  # places on the shortest wave: what it takes up itself hardly matters
-PASSES, TOLERANCE = 30, 0.005  # of the largest flow: what a pass still changes
-MIXED = 4  # passes before, at most
+PASSES, TOLERANCE = 80, 0.005  # of the largest flow: what a pass still changes
+MIXED = 30  # passes before, at most: each takes one direction out in which substitution diverges
 FINE = 3  # samples a wave of the highest harmonic: what is folded of its square stays above half
 FURTHEST = 0.9  # of the law's pressure: there it is held
 
