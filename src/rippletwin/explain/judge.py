@@ -129,6 +129,8 @@ def _stand_ins(search: Search) -> list[tuple[tuple, list[tuple]]]:
     """
     best, found = search.best, []
     for k, own in enumerate(best.hypothesis):
+        if own[0].certain:
+            continue
         rest, others = set(best.without(k)), []
         for fit in search.rivals:
             close = best.evidence - fit.evidence < EQUIVALENT
@@ -136,8 +138,7 @@ def _stand_ins(search: Search) -> list[tuple[tuple, list[tuple]]]:
             if close and rest < set(fit.hypothesis) and len(other) == 1 and own not in other:
                 ((effect, place),) = other
                 others.append(((fit, place), effect.name))
-        if not own[0].certain:
-            found.append(((own[0].name, own[1]), others))
+        found.append(((own[0].name, own[1]), others))
     return found
 
 
