@@ -18,10 +18,10 @@ def sentence(e: Explanation, result: dict, found: list[dict], base) -> str:
     kind, fit = result["verdict"], result["fit"]
     before, after = fit["before"]["held_out"], fit["after"]["held_out"]
     words = [CHANCE.get(kind, "")]
+    names = [f"{f['effect'].name.replace('_', ' ')} at the {_place(e, f)}" for f in found]
     if kind == "named" and not found:  # what was named acts at shaft orders alone
         words = ["At the pistons' harmonics the twin lacks nothing."]
     elif kind in ("named", "ambiguous"):
-        names = [f"{f['effect'].name.replace('_', ' ')} at the {_place(e, f)}" for f in found]
         words = [
             f"The twin lacks {join(names)}: with it the misfit on data it has not seen goes from "
             f"{before:.1%} to {after:.1%} of the measured ripple."
@@ -58,7 +58,6 @@ def sentence(e: Explanation, result: dict, found: list[dict], base) -> str:
                 f"{result['stand_in']['follows']}."
             )
         elif found:
-            names = [f"{f['effect'].name.replace('_', ' ')} at the {_place(e, f)}" for f in found]
             words.append(
                 f"Of what has a name {join(names)} comes nearest: misfit on unseen data "
                 f"{before:.1%} to {after:.1%}, which the pump and the sensors do not account for."

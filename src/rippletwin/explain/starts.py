@@ -120,8 +120,8 @@ def promising(base: Twin, posterior: Posterior, thetas: list) -> list:
     own.forward.hold_storage = True
     prediction = own.predict(theta)
     own.estimate_errors(prediction, theta)
-    # A way to where the prediction is infinite is none.
-    ways = np.nan_to_num(np.array([posterior.predict(start) for start in thetas]) - prediction)
+    ways = np.array([posterior.predict(start) for start in thetas]) - prediction
+    ways = np.where(np.isfinite(ways), ways, 0.0)  # to where it is infinite there is none
     r, jacobian = own.linearise(theta, prediction, ways)
     jacobian, ways = jacobian[:, : len(theta)], jacobian[:, len(theta) :]
     both = np.linalg.lstsq(jacobian, np.column_stack([r, ways]), rcond=None)[0]
