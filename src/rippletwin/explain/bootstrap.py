@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from multiprocessing import get_context
 
 import numpy as np
-from scipy.stats import gumbel_r
 
 from rippletwin.explain.fit import Fit
 from rippletwin.explain.posterior import Posterior
@@ -38,6 +37,8 @@ class Chance:
     def threshold(self) -> float:
         """Log evidence that chance passes in ALARMS of cases: the quantile of a Gumbel distribution
         fitted to the draws' largest, or the largest of all where that is more."""
+        from scipy.stats import gumbel_r  # half a second that few need
+
         shape = gumbel_r.fit(self.gains)
         return float(max(np.max(self.gains), gumbel_r.ppf(1.0 - ALARMS, *shape)))
 

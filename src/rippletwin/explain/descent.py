@@ -18,9 +18,11 @@ def descend(
     max_steps: int,
     held: Sequence[int] = (),
     errors: bool = True,
+    converged: float = CONVERGED,
 ):
     """Levenberg-Marquardt: theta (P,) and minus the log posterior. Parameters with the indices
-    `held` stay; the posterior's errors are estimated on the way unless `errors` is false."""
+    `held` stay; the posterior's errors are estimated on the way unless `errors` is false. A step
+    that gains less than `converged` is the last."""
     free = np.setdiff1d(np.arange(len(theta)), held)
     prediction = posterior.predict(theta)
     if not np.all(np.isfinite(prediction)):
@@ -52,7 +54,7 @@ def descend(
         if errors:
             posterior.estimate_errors(prediction, theta)
         last, value = value, min(new_value, posterior.objective(theta, prediction))
-        if last - value < CONVERGED:
+        if last - value < converged:
             break
     return theta, value
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from rippletwin.explain import residuals
 from rippletwin.explain.describe import posterior_of
@@ -108,7 +108,7 @@ def drift(early: Sequence, late: Sequence, delay: float) -> tuple[float, str]:
         a, b = common(a, b)
         gap, variance = difference(a, b, delay)
         statistic = 2.0 * np.sum(np.abs(gap) ** 2 / variance)
-        p = chi2.sf(statistic, 2 * a.values.size - 1)
+        p = chdtrc(2 * a.values.size - 1, statistic)
         worst = min(worst, (min(1.0, float(p) * len(early)), a.label))
     return worst
 

@@ -5,7 +5,7 @@ Two rules keep the optimiser out of wrong valleys (5 % of wave speed is two turn
 800 Hz, then higher; and every candidate is fitted that way from the nominal values with the
 effect in the model from the first step, because a fit without it has been bent by its absence.
 What a line stores beyond proportion to the pressure, slow to work out, is left out or held on the
-way and followed from the mode that this leads to.
+way, held anew where that has led, and followed from the mode that this leads to.
 
 The evidence is Laplace's (MacKay 2003, Information Theory, Inference, and Learning Algorithms,
 ch. 27): all parameters of effects have proper priors N(0, 1) in their coordinates, so
@@ -23,7 +23,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rippletwin.effects import Effect, Place
-from rippletwin.explain.descent import descend, hessian
+from rippletwin.explain.descent import CONVERGED, descend, hessian
 from rippletwin.explain.posterior import Posterior
 from rippletwin.explain.starts import FEW, MOST, about, first_states, promising
 from rippletwin.likelihood import cut
@@ -35,6 +35,8 @@ TRIED = (8, 24)  # starts from which Levenberg-Marquardt sets out, with few and 
 KEPT = ((4, 2, 1), (8, 4, 1))  # carried on after the first, the second and every later limit
 STEPS = (12, 8, 6)  # most steps below the first, second and later limits; the last may take more
 LAST_STEPS = 30
+ROUGHLY = 0.5  # gain of the last step where the next limit goes on from there
+HELD, SHARES = 6, (1.0, 0.5, 0.25)  # how often what is stored is held anew, at most
 ROUNDS, SETTLED = 4, 0.2  # of descents with new derivatives, and what the last may still gain
 
 Hypothesis = tuple[tuple[Effect, Place], ...]
@@ -159,13 +161,17 @@ def fit_hypothesis(
     for stage, limit in enumerate(stages):
         last = stage == len(stages) - 1
         posterior = _without_storage(twin, observations, limit, source_free)
-        if stage > 0:
-            _hold_storage(posterior, states[0][1])
         posterior.most = np.inf if last else MOST
+        steps, near = STEPS[min(stage, len(STEPS) - 1)], ROUGHLY
+        if last:
+            steps, near = LAST_STEPS, CONVERGED
         fits = []
         for _, theta in states:
-            steps = LAST_STEPS if last else STEPS[min(stage, len(STEPS) - 1)]
-            theta, value = descend(posterior, theta, steps)
+            if stage > 0:
+                _hold_storage(posterior, theta)
+            theta, value = descend(posterior, theta, steps, converged=near)
+            if stage > 0:
+                theta, value = _hold_anew(posterior, theta, value)
             fits.append((value, theta))
         kept = KEPT[many]
         states = _distinct(fits)[: 1 if last else kept[min(stage, len(kept) - 1)]]
@@ -176,10 +182,16 @@ def fit_hypothesis(
 
 
 def refine(
-    base: Twin, hypothesis: Hypothesis, observations, thetas: Sequence, source_free=False
+    base: Twin,
+    hypothesis: Hypothesis,
+    observations,
+    thetas: Sequence,
+    source_free: bool = False,
+    exact: bool = True,
 ) -> Fit:
-    """Fit on all frequencies from starts theta (P,), where good ones are known: one alone, whose
-    mode is then found exactly, or many that differ in their newest effect."""
+    """Fit on all frequencies from starts theta (P,), where good ones are known: one alone, or many
+    that differ in their newest effect. One alone ends `exact`ly at the mode, if that is asked for,
+    even where it takes derivatives of what the line stores, slow to work out."""
     twin = base.with_(effects=hypothesis)
     posterior = Posterior(twin, observations, None, source_free)
     thetas = [np.asarray(theta, dtype=float) for theta in thetas]
@@ -190,7 +202,8 @@ def refine(
         posterior.forward.hold_storage = True
     fits = [descend(posterior, theta, LAST_STEPS) for theta in thetas]
     best = min(fits, key=lambda f: f[1])[0]
-    return conclude(posterior, hypothesis, _followed(posterior, best, ROUNDS * (len(fits) == 1)))
+    rounds = ROUNDS if exact and len(fits) == 1 else 0
+    return conclude(posterior, hypothesis, _followed(posterior, best, rounds))
 
 
 def _without_storage(twin: Twin, observations, limit: float, source_free: bool) -> Posterior:
@@ -205,12 +218,40 @@ def _hold_storage(posterior: Posterior, theta: np.ndarray) -> None:
     that get much of their size by way of it would else be put down to the pump."""
     if not posterior.forward.stores:
         return
+    posterior.forward.leave_out_storage()
     without = posterior.objective(theta, posterior.predict(theta))
-    posterior.forward.hold_storage = False
-    stored = posterior.objective(theta, posterior.predict(theta))
-    posterior.forward.hold_storage = True
-    if not stored < without:
+    if not _stored(posterior, theta) < without:
         posterior.forward.leave_out_storage()
+
+
+def _hold_anew(posterior: Posterior, theta: np.ndarray, value: float) -> tuple[np.ndarray, float]:
+    """theta and minus the log posterior with what the line stores worked out, as long as holding it
+    where theta is leads to a better place. Of a way there the longest of SHARES that fits better is
+    gone: what is stored changes on it."""
+    if not posterior.forward.stores:
+        return theta, value
+    held, value = value, _stored(posterior, theta)
+    if abs(value - held) < ROUGHLY:
+        return theta, value  # what is stored stayed as it was held
+    for _ in range(HELD):
+        way = descend(posterior, theta, STEPS[0], converged=ROUGHLY)[0] - theta
+        for share in SHARES:
+            tried = theta + share * way
+            stored = _stored(posterior, tried)
+            if stored < value - ROUGHLY:
+                break
+        else:
+            break
+        theta, value = tried, stored
+    return theta, value
+
+
+def _stored(posterior: Posterior, theta: np.ndarray) -> float:
+    """Minus the log posterior with what the line stores worked out, which is held from here on."""
+    posterior.forward.hold_storage = False
+    value = posterior.objective(theta, posterior.predict(theta))
+    posterior.forward.hold_storage = True
+    return value
 
 
 def _followed(posterior: Posterior, theta: np.ndarray, rounds: int = 0) -> np.ndarray:

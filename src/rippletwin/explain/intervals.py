@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from rippletwin.explain.descent import descend
 from rippletwin.explain.fit import Fit
@@ -24,7 +24,7 @@ from rippletwin.explain.posterior import Posterior
 from rippletwin.explain.workers import Workers
 from rippletwin.twin import Twin
 
-RISE = 0.5 * float(chi2.ppf(0.95, 1))
+RISE = 0.5 * float(chdtri(1, 0.05))
 FAR = 4.0 * RISE  # nothing is sought further out
 OUTWARDS = (1.5, 2.5, 4.0, 6.0)  # standard deviations by the curvature
 STEPS = 8  # of a descent with one parameter held; it starts from the last

@@ -72,7 +72,10 @@ def again(pool: Workers, past: Search, progress=None) -> Search:
     and steps from its best, of which what has become needless is dropped first."""
     close = [f for f in past.rivals if past.best.evidence - f.evidence < CLOSE]
     fits = [past.base, *past.singles, past.best, *close]
-    jobs = [{"hypothesis": f.hypothesis, "theta": f.twin.theta} for f in fits]
+    exact = {id(f) for f in close if not set(past.best.hypothesis) < set(f.hypothesis)}
+    jobs = [
+        {"hypothesis": f.hypothesis, "theta": f.twin.theta, "exact": id(f) in exact} for f in fits
+    ]
     tell = counter(progress, "again", len(jobs))
     base, *rest = pool.fit(jobs, tell)
     count = len(past.singles)

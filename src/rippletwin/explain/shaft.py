@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from rippletwin.case.model import FlowRipple
 from rippletwin.effects.speed_fluctuation import peaks, swung
@@ -67,7 +67,7 @@ def standing_out(
         lines += max(np.sum(power) - np.sum(variance), 0.0)
         chi += 2 * np.sum(power / variance)
         count += 2 * power.size
-    return float(np.sqrt(lines / energy)), float(chi2.sf(chi, count))
+    return float(np.sqrt(lines / energy)), float(chdtrc(count, chi))
 
 
 def shaft_lines(twin: Twin, observations: Sequence, highest_hz: float) -> ShaftLines | None:

@@ -154,16 +154,16 @@ def work(base: Twin, observations: Sequence, job: dict) -> Fit:
     """Fit `hypothesis` to the observations with the indices `use` (all by default).
 
     The job's `base` takes the place of the twin, as where the sheet is another. With `theta` from
-    there; with `fit` from where that ended and the newest effect's starts, as strong as its prior
-    and weak; else by continuation from the starts `starts` or the newest effect's scan;
-    `source_free` and `draws` as in `fit_hypothesis`.
+    there, `exact` as in `refine`; with `fit` from where that ended and the newest effect's starts,
+    as strong as its prior and weak; else by continuation from the starts `starts` or the newest
+    effect's scan; `source_free` and `draws` as in `fit_hypothesis`.
     """
     base = job.get("base", base)
     use = job.get("use")
     observations = observations if use is None else [observations[k] for k in use]
     hypothesis, free = job["hypothesis"], job.get("source_free", False)
     if "theta" in job:
-        return refine(base, hypothesis, observations, [job["theta"]], free)
+        return refine(base, hypothesis, observations, [job["theta"]], free, job.get("exact", True))
     if "fit" in job:
         twin, thetas = base.with_(effects=hypothesis), []
         places = int(
@@ -176,7 +176,7 @@ def work(base: Twin, observations: Sequence, job: dict) -> Fit:
             for name, u in start.items():
                 theta[twin.index[name]] = u
             thetas.append(theta)
-        return refine(base, hypothesis, observations, thetas, free)
+        return refine(base, hypothesis, observations, thetas, free, exact=False)
     starts = job.get("starts") or scan(base.rig, hypothesis)
     return fit_hypothesis(base, hypothesis, observations, starts, free, job.get("draws", 0))
 
