@@ -23,7 +23,9 @@ from rippletwin.explain.posterior import FLOOR
 from rippletwin.explain.search import Search, again, search
 from rippletwin.explain.shaft import (
     RELATIVE,
+    ROUGH_SHARE,
     ShaftLines,
+    apart,
     as_turned,
     shaft_lines,
     standing_out,
@@ -122,18 +124,17 @@ def explain_observations(
     With `draws` the threshold is that of so many recordings drawn without an effect.
     """
     turning = _turning(rig, observations)
-    early, late = as_turned(early, turning), as_turned(late, turning)
-    data = prepare(
-        as_turned(observations, turning),
-        rig,
-        HIGHEST_HZ if observations[0].orders is not None else None,
-    )
-    early, late = prepare(early, rig, HIGHEST_HZ), prepare(late, rig, HIGHEST_HZ)
-    held = late if len(data) == 1 and late else None
-    base, found = Twin(rig, data, uncertain_pump=True), None
-    Forward(base, data)  # what the twin keeps of the pump is worked out before the processes part
+    base, data, found = *_begun(rig, observations, turning), None
     if not reason:
-        base, data, found = _searched(base, data, processes, progress)
+        found = _search(base, data, processes, progress)
+        shaft = shaft_lines(found.best.twin, observations, HIGHEST_HZ)
+        if apart(shaft, turning, data):
+            turning = shaft
+            base, data = _begun(rig, observations, turning)
+            found = _search(base, data, processes, progress)
+        base, data, found = _answered(base, data, found, processes, progress)
+    early, late = (prepare(as_turned(part, turning), rig, HIGHEST_HZ) for part in (early, late))
+    held = late if len(data) == 1 and late else None
     with workers(base, data, processes) as pool:
         if found is None:
             fit = pool.fit([{"hypothesis": ()}])[0]
@@ -174,11 +175,23 @@ def explain_observations(
     )
 
 
-def _searched(base: Twin, data: Sequence, processes: int, progress) -> tuple:
+def _begun(rig, observations: Sequence, turning: ShaftLines | None) -> tuple[Twin, list]:
+    """The paper's line and the observations as fitted, of a shaft that turns as `turning` says."""
+    highest = HIGHEST_HZ if observations[0].orders is not None else None
+    data = prepare(as_turned(observations, turning), rig, highest)
+    base = Twin(rig, data, uncertain_pump=True)
+    Forward(base, data)  # what the twin keeps of the pump is worked out before the processes part
+    return base, data
+
+
+def _search(base: Twin, data: Sequence, processes: int, progress) -> Search:
+    with workers(base, data, processes) as pool:
+        return search(pool, progress)
+
+
+def _answered(base: Twin, data: Sequence, found: Search, processes: int, progress) -> tuple:
     """Base, observations and what the search found: where the source is the lumped pump, that has
     been made to answer the line, and the search has gone on."""
-    with workers(base, data, processes) as pool:
-        found = search(pool, progress)
     known = answered(found.best.twin, data) if found.best.floor < ROUGH else None
     if known is None:
         return base, data, found
@@ -188,7 +201,8 @@ def _searched(base: Twin, data: Sequence, processes: int, progress) -> tuple:
 
 
 def _turning(rig, observations: Sequence) -> ShaftLines | None:
-    """How unevenly the shaft turns, by a line that is calibrated and no more; None where evenly."""
+    """How unevenly the shaft turns, by a line that is calibrated and no more; None where evenly.
+    The line as it is explained will tell better."""
     found = None
     if "pistons" in rig.pump:
         found = standing_out(observations, rig.pump["pistons"], HIGHEST_HZ)
@@ -199,7 +213,7 @@ def _turning(rig, observations: Sequence) -> ShaftLines | None:
         # What a swing takes from the ripple must not be put down to the pump, so that comes second.
         data = prepare(as_turned(observations, shaft), rig, HIGHEST_HZ)
         twin = fit_hypothesis(Twin(rig, data, uncertain_pump=uncertain_pump), (), data).twin
-        shaft = shaft_lines(twin, observations, HIGHEST_HZ)
+        shaft = shaft_lines(twin, observations, HIGHEST_HZ, ROUGH_SHARE)
     return shaft
 
 

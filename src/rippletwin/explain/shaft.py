@@ -26,7 +26,9 @@ from rippletwin.twin import Twin
 FLOOR = 0.02  # of the lines, where no orifice couples them: the line's own error and more
 RELATIVE = 0.01  # of the ripple: below it the lines are no effect worth a name
 SIGNIFICANCE = 1e-6
-SHARE = 0.7  # of the lines' energy that modulation must explain to be the name
+SHARE = 0.9  # of the lines' energy that modulation must explain to be the name
+ROUGH_SHARE = 0.7  # the same by a line that is only calibrated: it may be off by as much
+ANEW = 0.02  # rad at the highest order: below it a swing told anew changes nothing
 LOW = (4, 12, 1000)  # piston orders up to which modulation is first sought as a small one
 
 
@@ -70,8 +72,11 @@ def standing_out(
     return float(np.sqrt(lines / energy)), float(chdtrc(count, chi))
 
 
-def shaft_lines(twin: Twin, observations: Sequence, highest_hz: float) -> ShaftLines | None:
-    """Judge the periodic observations with all their orders; None where there are none."""
+def shaft_lines(
+    twin: Twin, observations: Sequence, highest_hz: float, share: float = SHARE
+) -> ShaftLines | None:
+    """Judge the periodic observations with all their orders; None where there are none. Modulation
+    that accounts for `share` of the lines' energy is the name."""
     pistons = twin.rig.pump.get("pistons")
     found = standing_out(observations, pistons, highest_hz) if pistons else None
     if found is None:
@@ -95,7 +100,7 @@ def shaft_lines(twin: Twin, observations: Sequence, highest_hz: float) -> ShaftL
         if point.ripple is not None:
             even[at] = Forward(twin, [o]).source.at(twin.theta)[0][~off]
         even[0] = point.mean_flow
-        b, rest, whole = _modulation(even, orders[off], flow[off], unit[:, off], pistons)
+        b, rest, whole = _modulation(even, orders, off, flow, unit, pistons)
         modulation[o.label] = b
         modulated += rest
         flows += whole
@@ -105,22 +110,36 @@ def shaft_lines(twin: Twin, observations: Sequence, highest_hz: float) -> ShaftL
     coherent = 1.0 - float(explained / max(lines, 1e-300))
     name, value = None, 0.0
     if relative > RELATIVE and p < SIGNIFICANCE and coherent > 0.5:
-        by_speed = modulated < (1.0 - SHARE) * flows
+        by_speed = modulated < (1.0 - share) * flows
         name = "speed_fluctuation" if by_speed else "piston_spread"
         value = float(np.mean(np.abs(list(modulation.values())) if by_speed else spread))
     return ShaftLines(relative, p, coherent, name, value, modulation)
 
 
+def apart(one: ShaftLines | None, other: ShaftLines | None, observations: Sequence) -> bool:
+    """Whether a shaft turns so differently by two judgements that the ripple tells."""
+    one, other = _swing(one), _swing(other)
+    top = {o.label: np.max(o.orders) for o in observations if o.orders is not None}
+    return any(
+        top.get(label, 0.0) * abs(one.get(label, 0.0) - other.get(label, 0.0)) > ANEW
+        for label in {*one, *other}
+    )
+
+
 def as_turned(observations: Sequence, shaft: ShaftLines | None) -> list:
     """The observations with the ripple that a shaft delivers which turns as `shaft` says."""
-    if shaft is None or shaft.name != "speed_fluctuation":
-        return list(observations)
+    swing = _swing(shaft)
     return [
         o
-        if o.flow_ripple is None or o.label not in shaft.modulation
-        else replace(o, flow_ripple=turned(o.flow_ripple, shaft.modulation[o.label]))
+        if o.flow_ripple is None or o.label not in swing
+        else replace(o, flow_ripple=turned(o.flow_ripple, swing[o.label]))
         for o in observations
     ]
+
+
+def _swing(shaft: ShaftLines | None) -> Mapping[str, complex]:
+    """Modulation of the recordings of a shaft that swings; empty of one that does not."""
+    return shaft.modulation if shaft is not None and shaft.name == "speed_fluctuation" else {}
 
 
 def turned(ripple: FlowRipple, modulation: complex) -> FlowRipple:
@@ -151,25 +170,30 @@ def _response(twin: Twin, observation) -> np.ndarray:
     return forward(twin.theta)[0]
 
 
-def _modulation(even, orders, flow, unit, pistons):
+def _modulation(even, orders, off, flow, unit, pistons):
     """Best modulation b, and the pressure energy at other orders with and without it taken off.
 
     even (K,) is the flow's spectrum at even speed from order 0; orders, flow (F,) and unit (S, F)
-    are what is not at piston orders. Far from its value b has other minima, so that it is first
-    sought where it is small: at low orders.
+    are what there is, at piston orders too where not `off` (F,). Those tell only how large the
+    whole ripple is: the impedance that the line was given may be some per cent wrong, and b would
+    be as much. Far from its value b has other minima, so that it is first sought where it is small:
+    at low orders.
     """
     root = np.sqrt(np.sum(np.abs(unit) ** 2, axis=0))
     target = root * flow
 
     def left(b):
-        rest = target - root * peaks(swung(even, complex(*b), 4 * len(even)))[orders]
+        swing = root * peaks(swung(even, complex(*b), 4 * len(even)))[orders]
+        pumped = swing[~off]
+        size = np.vdot(pumped, target[~off]).real / np.vdot(pumped, pumped).real
+        rest = target[off] - size * swing[off]
         return np.concatenate([rest.real, rest.imag])
 
     none, step, found = left((0, 0)), 1e-6, []
     slope = np.stack([(left(d) - none) / step for d in ((step, 0), (0, step))], axis=1)
     for most in LOW:
-        low = np.tile(orders < most * pistons, 2)
+        low = np.tile(orders[off] < most * pistons, 2)
         start = np.linalg.lstsq(-slope[low], none[low], rcond=None)[0]
         found.append(least_squares(left, start, x_scale=1e-3))
     best = min(found, key=lambda f: f.cost)
-    return complex(*best.x), 2.0 * float(best.cost), float(np.sum(np.abs(target) ** 2))
+    return complex(*best.x), 2.0 * float(best.cost), float(np.sum(np.abs(target[off]) ** 2))
