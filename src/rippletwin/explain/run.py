@@ -24,6 +24,7 @@ from rippletwin.explain.search import Search, again, search
 from rippletwin.explain.shaft import (
     RELATIVE,
     ROUGH_SHARE,
+    SHARE,
     ShaftLines,
     apart,
     as_turned,
@@ -40,7 +41,7 @@ from rippletwin.spectra import observe, revolutions_of
 from rippletwin.twin import Twin
 
 HIGHEST_HZ = 4000.0
-ROUGH = 10.0 * FLOOR  # relative model error above which the pressure at the pump is not known
+ROUGH = 10.0 * FLOOR  # relative model error above which pressure and flow at the pump are unknown
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ def explain_observations(
     base, data, found = *_begun(rig, observations, turning), None
     if not reason:
         found = _search(base, data, processes, progress)
-        shaft = shaft_lines(found.best.twin, observations, HIGHEST_HZ)
+        shaft = _shaft(found.best, observations)
         if apart(shaft, turning, data):
             turning = shaft
             base, data = _begun(rig, observations, turning)
@@ -167,7 +168,7 @@ def explain_observations(
         judgement=judgement,
         validation=validation,
         single=tuple(single),
-        shaft=shaft_lines(judgement.accepted.twin, observations, HIGHEST_HZ),
+        shaft=_shaft(judgement.accepted, observations),
         blind=tuple(blind),
         located=locate.locate(found.base, data),
         without=without,
@@ -215,6 +216,12 @@ def _turning(rig, observations: Sequence) -> ShaftLines | None:
         twin = fit_hypothesis(Twin(rig, data, uncertain_pump=uncertain_pump), (), data).twin
         shaft = shaft_lines(twin, observations, HIGHEST_HZ, ROUGH_SHARE)
     return shaft
+
+
+def _shaft(fit: Fit, observations: Sequence) -> ShaftLines | None:
+    """How the shaft turns by the line as it is explained, as far as it is."""
+    share = SHARE if fit.floor < ROUGH else ROUGH_SHARE
+    return shaft_lines(fit.twin, observations, HIGHEST_HZ, share)
 
 
 def _others(pool: Workers, found: Search) -> list[Fit]:
