@@ -7,6 +7,7 @@ import pytest
 
 from explain_made import POINTS, make
 from rippletwin.effects import EFFECTS, Place
+from rippletwin.explain.descent import descend
 from rippletwin.explain.detect import drift, interior_test, pull
 from rippletwin.explain.fit import fit_hypothesis, refine
 from rippletwin.explain.locate import locate
@@ -73,6 +74,21 @@ def test_followed_derivatives_know_what_the_line_stores():
         assert np.linalg.norm(columns[k] - quotient) < 0.005 * size
         if p.name.startswith("wave_speed"):
             assert np.linalg.norm(held[k] - quotient) > 0.01 * size
+
+
+def test_no_fit_leads_where_no_steady_state_is_found():
+    """Air so strong that substitution finds no steady state is infinitely unlikely, however well
+    what was found last may fit; a descent that sets out from there ends there."""
+    values = TRUTH | {"entrained_air@line.gas_fraction": 8e-3}
+    _, observations, truth = make(np.random.default_rng(1), AIR, values)
+    posterior, theta = Posterior(truth, observations), truth.theta.copy()
+    assert np.isfinite(posterior.objective(theta, posterior.predict(theta)))
+    theta[truth.index["entrained_air@line.gas_fraction"]] += 3.5
+    prediction = posterior.predict(theta)
+    assert np.all(np.isfinite(prediction))
+    assert posterior.objective(theta, prediction) == np.inf
+    assert descend(posterior, theta, 3)[1] == np.inf
+    assert refine(truth.with_(effects=()), AIR, observations, [theta]).evidence == -np.inf
 
 
 def test_a_fit_from_one_start_ends_at_the_very_mode():

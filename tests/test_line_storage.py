@@ -6,7 +6,7 @@ import pytest
 from line_rig import DENSITY, network
 from rippletwin.line.drains import Basis
 from rippletwin.line.parts import Pipe
-from rippletwin.line.storage import TOLERANCE, FullAmplitude, Storage, _fixed_point
+from rippletwin.line.storage import TOLERANCE, FullAmplitude, Storage
 
 LENGTH, DIAMETER, SPEED, PRESSURE = 6.6, 0.02, 1000.0, 1e7
 AREA = 0.25 * np.pi * DIAMETER**2
@@ -112,8 +112,49 @@ def test_substitution_is_mixed_past_several_sharp_resonances(diverging):
     far = np.linspace(3.0, 6.0, diverging) * np.exp(1j * rng.uniform(0, 2 * np.pi, diverging))
     map_ = (turn * np.r_[far, np.full(40 - diverging, 0.1)]) @ np.conj(turn).T
     b = rng.normal(size=40) + 1j * rng.normal(size=40)
-    found = _fixed_point(
-        lambda x: (map_ @ x.ravel() + b).reshape(4, 10), np.zeros((4, 10), complex)
-    )
+    full = FullAmplitude([slice(0, 10)], np.arange(1, 11))
+    found = full._steady(lambda x: (map_ @ x.ravel() + b).reshape(4, 10), (4, 10))
+    assert full.solved
     exact = np.linalg.solve(np.eye(40) - map_, b).reshape(4, 10)
     assert np.abs(found - exact).max() < 10 * TOLERANCE * np.abs(exact).max()
+
+
+def test_a_solution_leads_to_the_next():
+    """Of a map and of one that differs by a hundredth: resumed, the second solution is the exact
+    one too, in at most a third of the passes that it takes from nothing."""
+    rng = np.random.default_rng(5)
+    turn = np.linalg.qr(rng.normal(size=(40, 40)) + 1j * rng.normal(size=(40, 40)))[0]
+    far = np.r_[np.linspace(-6.0, -3.0, 20), np.full(20, 0.1)]
+    b, passes = rng.normal(size=40) + 1j * rng.normal(size=40), []
+
+    def solve(full, size):
+        map_, count = size * (turn * far) @ np.conj(turn).T, 0
+
+        def function(x):
+            nonlocal count
+            count += 1
+            return (map_ @ x.ravel() + b).reshape(4, 10)
+
+        found, exact = full._steady(function, (4, 10)), np.linalg.solve(np.eye(40) - map_, b)
+        assert full.solved
+        assert np.abs(found.ravel() - exact).max() < 10 * TOLERANCE * np.abs(exact).max()
+        passes.append(count)
+
+    full = FullAmplitude([slice(0, 10)], np.arange(1, 11))
+    full.resumed = True
+    solve(full, 1.0)
+    solve(full, 1.01)
+    solve(FullAmplitude([slice(0, 10)], np.arange(1, 11)), 1.01)
+    assert passes[1] <= passes[2] / 3
+
+
+def test_where_there_is_no_steady_state_none_is_claimed():
+    """x = 2 |x| + 1 has no solution, and the next map, x = x/2 + 1, is solved all the same: what
+    was seen of the first is forgotten."""
+    full = FullAmplitude([slice(0, 10)], np.arange(1, 11))
+    full.resumed = True
+    full._steady(lambda x: 2.0 * np.abs(x) + 1.0 + 0j, (4, 10))
+    assert not full.solved
+    found = full._steady(lambda x: 0.5 * x + 1.0, (4, 10))
+    assert full.solved
+    np.testing.assert_allclose(found, 2.0, rtol=10 * TOLERANCE)

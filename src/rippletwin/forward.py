@@ -69,6 +69,7 @@ class Forward:
         self._orifice = None
         self._ripples = [point.ripple for point in points]
         self._periodic = [r for r, ripple in enumerate(self._ripples) if ripple is not None]
+        self.solved = True
         self._full = FullAmplitude([self.slices[r] for r in self._periodic], self.order)
         if rig.load.kind == "orifice" and self._periodic:
             self._orifice = Orifice(
@@ -186,8 +187,9 @@ class Forward:
         """Give `network` the full-amplitude state at its load, and what its line stores beyond."""
         if network.storage:
             wide, seen, whole = self._widened(network, theta, self._far)
-            law = wide._law(whole, theta, tolerance=ROUGH)
+            law = wide._law(whole, theta, tolerance=min(ROUGH, wide._full.tolerance))
             state = [x[seen] for x in wide._full.drain(whole, law)]
+            self.solved = wide._full.solved
             positions, leaving = whole.drains
             network.drains = positions, leaving[:, seen]
             if self._orifice is not None:

@@ -261,7 +261,7 @@ def _followed(posterior: Posterior, theta: np.ndarray, rounds: int = 0) -> np.nd
     if not posterior.forward.stores:
         return theta
     theta, value = descend(posterior, theta, LAST_STEPS)
-    for _ in range(rounds):
+    for _ in range(rounds if np.isfinite(value) else 0):
         posterior.follow(theta)
         last = value
         theta, value = descend(posterior, theta, LAST_STEPS)
@@ -273,7 +273,7 @@ def _followed(posterior: Posterior, theta: np.ndarray, rounds: int = 0) -> np.nd
 def conclude(posterior: Posterior, hypothesis: Hypothesis, theta: np.ndarray) -> Fit:
     """The fit at a mode: evidence and covariance."""
     prediction, twin = posterior.predict(theta), posterior.twin.with_(theta=theta)
-    if not np.all(np.isfinite(prediction)):
+    if not posterior.holds(prediction):
         # No start leads anywhere: the hypothesis says nothing of these data.
         unknown = np.eye(len(theta))
         return Fit(hypothesis, twin, np.inf, -np.inf, unknown, np.inf, 0.0, 0.0)

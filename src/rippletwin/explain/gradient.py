@@ -12,10 +12,12 @@ orders below the linear part, and so is what segments store beyond proportion to
 is no small part next to a sharp resonance: columns are wrong by some per cent, and where wave
 speeds, air and a branch can stand in for each other a fit stops units of log likelihood too soon.
 `follow` makes up for it by difference quotients at one place. With `hold_storage` what is stored is
-held in predictions too, which is all that makes them slow.
+held in predictions too, which is all that makes them slow; else each begins where the last ended.
 """
 
 from __future__ import annotations
+
+from functools import cached_property
 
 import numpy as np
 
@@ -25,7 +27,7 @@ from rippletwin.line.segment import series_impedance, shunt_admittance
 from rippletwin.twin import Arrays
 
 STEP = 1e-5  # of the difference quotients, in prior standard deviations
-FOLLOWED = 3e-4  # the same where the storage is solved anew, to a tolerance of its own
+FOLLOWED, FINELY = 3e-4, 1e-6  # the same where the storage is solved anew, and to what tolerance
 
 
 class DifferentiableForward(Forward):
@@ -59,7 +61,8 @@ class DifferentiableForward(Forward):
     def follow(self, theta: np.ndarray) -> None:
         """Find `missed` (P, S, F), what `derivatives` at theta lack because they hold what segments
         store; from here on they have it, there and, as long as it changes little, about there."""
-        self.missed = None
+        self.missed, full = None, self._far[0]._full
+        usual, full.tolerance = full.tolerance, FINELY
         readings = np.concatenate(self(theta), axis=1)
         held = self.derivatives(theta)
         missed = np.zeros_like(held)
@@ -68,7 +71,7 @@ class DifferentiableForward(Forward):
             moved[k] += FOLLOWED
             slope = (np.concatenate(self(moved), axis=1) - readings) / FOLLOWED
             missed[k] = slope - held[k]
-        self.missed = missed
+        self.missed, full.tolerance = missed, usual
 
     def linear_load(self, theta: np.ndarray) -> np.ndarray | None:
         """Readings (S, F) with the orifice linear and what segments store beyond proportion as it
@@ -137,6 +140,7 @@ class DifferentiableForward(Forward):
             return
         linear = network.load_state()
         if self.hold_storage:
+            self.solved = True
             self._drain_as_held(network)
             self._balance_load(network, theta)
         else:
@@ -147,6 +151,12 @@ class DifferentiableForward(Forward):
         if self._orifice is not None:
             p, q = network.load[1]
             self._remainder = (q - linear[1] / linear[0] * p) / factor
+
+    @cached_property
+    def _far(self):
+        wide, seen = super()._far
+        wide._full.resumed = True
+        return wide, seen
 
     def __call__(self, theta):
         prediction = super().__call__(theta)

@@ -113,10 +113,15 @@ class Posterior:
         """Predictions of all observations side by side, (S, F)."""
         return np.concatenate(self.forward(theta), axis=1)
 
+    def holds(self, prediction: np.ndarray) -> bool:
+        """Whether the last prediction is one: of a line without loss at its resonance it is
+        infinite, and where much is stored no steady state may be found."""
+        return self.forward.solved and bool(np.all(np.isfinite(prediction)))
+
     def objective(self, theta: np.ndarray, prediction: np.ndarray) -> float:
-        """Minus the log posterior at the present errors, but for a constant; infinite where the
-        prediction is, as of a line without loss at its resonance."""
-        if not np.all(np.isfinite(prediction)):
+        """Minus the log posterior at the present errors, but for a constant, theta being what was
+        predicted last; infinite where nothing `holds`."""
+        if not self.holds(prediction):
             return np.inf
         r, log_determinant = self.whitened(prediction)
         prior = 0.5 * float(np.sum(theta[self.prior] ** 2))

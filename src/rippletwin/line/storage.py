@@ -2,10 +2,11 @@
 
 Where the compressibility depends on the pressure itself, a length dx stores g(p) dx beyond its
 linear part, the harmonics of one recording couple all along the line, and s g(p) dx leaves it as
-a flow of its own (`rippletwin.line.drains`). Substitution, together with the load's law, mixed as
-Anderson (1965, J. ACM 12:547) does: g is a tenth or less of what the line stores in proportion, but
-at a sharp resonance the flows of one pass move the pressure as much as the source does, and at
-several of them by more: what is mixed must know as many directions as there are of these.
+a flow of its own (`rippletwin.line.drains`). Substitution, together with the load's law, mixed
+(`rippletwin.line.mixing`): g is a tenth or less of what the line stores in proportion, but at a
+sharp resonance the flows of one pass move the pressure as much as the source does, and at several
+of them by more: what is mixed must know as many directions as there are of these. Recordings do
+not couple, and each has directions of its own.
 """
 
 from __future__ import annotations
@@ -18,10 +19,12 @@ from numba import njit
 from scipy.fft import irfft, next_fast_len, rfft
 
 from rippletwin.line.drains import Basis
+from rippletwin.line.mixing import Mixing
 
 A_WAVE = 2  # places on the shortest wave: what it takes up itself hardly matters
-PASSES, TOLERANCE = 80, 0.005  # of the largest flow: what a pass still changes
-MIXED = 30  # passes before, at most: each takes one direction out in which substitution diverges
+PASSES, TOLERANCE = 80, 0.0005  # of a recording's largest flow: what a pass still changes
+HOPELESS = 25, 0.5  # passes after which this much must have been reached
+SHARES = (0.35, 0.7, 1.0)  # of what is stored, one after the other, where all at once fails
 FINE = 3  # samples a wave of the highest harmonic: what is folded of its square stays above half
 FURTHEST = 0.9  # of the law's pressure: there it is held
 
@@ -40,9 +43,18 @@ class Storage(NamedTuple):
 
 
 class FullAmplitude:
-    """Which columns are harmonics of which recording; `slices`, `orders` as in `Orifice`."""
+    """Which columns are harmonics of which recording; `slices`, `orders` as in `Orifice`.
+
+    recordings  (columns, harmonics, samples a period) of each
+    tolerance   of what leaves, relative to a recording's largest flow
+    resumed     whether a solution begins where the last one ended: far fewer passes, and an answer
+                that is the same only to `tolerance`
+    solved      whether the last one is a steady state; else it is the nearest found to that
+    """
 
     def __init__(self, slices: Sequence[slice], orders: np.ndarray):
+        self.tolerance, self.resumed, self.solved = TOLERANCE, False, True
+        self._leaving, self._mixed = None, []
         self.recordings = []
         for part in slices:
             own = np.asarray(orders[part]).astype(int)
@@ -69,25 +81,45 @@ class FullAmplitude:
                 flow[:, part] = network.s[part] * volume[:, None] * share
             return flow
 
-        leaving = _fixed_point(stored, np.zeros((len(x), len(network.s)), complex))
+        leaving = self._steady(stored, (len(x), len(network.s)))
         network.drains = x, leaving
         return law(*basis.relation(leaving))
 
+    def _steady(self, stored: Callable, shape: tuple) -> np.ndarray:
+        """What leaves (N, F) where `stored` of it is the same, or the nearest found to that."""
+        self.solved = False
+        if self.resumed and self._leaving is not None and self._leaving.shape == shape:
+            value = self._fixed_point(stored, self._leaving)
+        for shares in ((1.0,), SHARES):
+            if self.solved:
+                break
+            self._mixed = [Mixing() for _ in self.recordings]
+            value = np.zeros(shape, complex)
+            for share in shares:
+                value = self._fixed_point(lambda leaving: share * stored(leaving), value)
+                if not self.solved:
+                    break
+        self._leaving = value if self.solved else None
+        return value
 
-def _fixed_point(function: Callable, x: np.ndarray) -> np.ndarray:
-    """x (complex) with function(x) = x, to TOLERANCE or as near as PASSES come."""
-    tried, given = [], []
-    for _ in range(PASSES):
-        value = function(x)
-        tried = [*tried[1 - MIXED :], x]
-        given = [*given[1 - MIXED :], value]
-        if not np.abs(value - x).max() > TOLERANCE * np.abs(value).max():
-            break
-        left = np.array([(b - a).view(float).ravel() for a, b in zip(tried, given)])
-        change = left[-1] - left[:-1]
-        share = np.linalg.lstsq(change @ change.T, change @ left[-1], rcond=1e-12)[0]
-        x = value - sum(c * (value - before) for c, before in zip(share, given))
-    return value
+    def _fixed_point(self, function: Callable, x: np.ndarray) -> np.ndarray:
+        """x (N, F), complex, with function(x) = x, or as near as PASSES come."""
+        parts, reached = [part for part, *_ in self.recordings], np.inf
+        for mixed in self._mixed:
+            mixed.begin()
+        for done in range(1, PASSES + 1):
+            value = function(x)
+            off, size = np.abs(value - x).max(axis=0), np.abs(value).max(axis=0)
+            error = max(off[part].max() / max(size[part].max(), 1e-300) for part in parts)
+            reached = min(reached, error)
+            self.solved = bool(error <= self.tolerance)
+            hopeless = done > HOPELESS[0] and reached > HOPELESS[1]
+            if self.solved or hopeless or not np.isfinite(error):
+                break
+            x = x.copy()
+            for mixed, part in zip(self._mixed, parts):
+                x[:, part] = mixed.step(x[:, part], value[:, part])
+        return value
 
 
 def _share(law, pressure, harmonic, samples):
