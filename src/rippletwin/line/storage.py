@@ -96,19 +96,19 @@ class FullAmplitude:
             self._mixed = [Mixing() for _ in self.recordings]
             value = np.zeros(shape, complex)
             for share in shares:
-                value = self._fixed_point(lambda leaving: share * stored(leaving), value)
+                value = self._fixed_point(stored, value, share)
                 if not self.solved:
                     break
         self._leaving = value if self.solved else None
         return value
 
-    def _fixed_point(self, function: Callable, x: np.ndarray) -> np.ndarray:
-        """x (N, F), complex, with function(x) = x, or as near as PASSES come."""
+    def _fixed_point(self, function: Callable, x: np.ndarray, share: float = 1.0) -> np.ndarray:
+        """x (N, F), complex, with share function(x) = x, or as near as PASSES come."""
         parts, reached = [part for part, *_ in self.recordings], np.inf
         for mixed in self._mixed:
             mixed.begin()
         for done in range(1, PASSES + 1):
-            value = function(x)
+            value = share * function(x)
             off, size = np.abs(value - x).max(axis=0), np.abs(value).max(axis=0)
             error = max(off[part].max() / max(size[part].max(), 1e-300) for part in parts)
             reached = min(reached, error)
