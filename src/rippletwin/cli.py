@@ -131,7 +131,7 @@ def explain(commands) -> None:
         if not arguments.no_figures:
             from rippletwin.figures.explain import draw
 
-            draw(explanation, arguments.out)
+            draw(explanation, arguments.out, processes=arguments.processes)
         print(json.dumps(result) if arguments.json_only else result["sentence"])
         return 0
 

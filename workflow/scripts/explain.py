@@ -15,5 +15,5 @@ explanation = explain(
 )
 folder = Path(snakemake.output.verdict).parent
 verdict = write(explanation, folder)
-draw(explanation, folder)
+draw(explanation, folder, processes=snakemake.threads)
 tell(verdict["sentence"])

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from itertools import pairwise
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -22,16 +25,26 @@ SAMPLES = 720
 TITLE = 78  # letters that titles side by side have room for
 
 
-def draw(explanation, folder: str | Path, suffixes: Sequence[str] = (".png", ".svg")) -> list[Path]:
+def draw(
+    explanation,
+    folder: str | Path,
+    suffixes: Sequence[str] = (".png", ".svg"),
+    processes: int = 1,
+) -> list[Path]:
     """Write every figure that applies into `folder`/figures, once a suffix; returns the paths."""
-    folder = Path(folder) / "figures"
-    paths = []
-    for name, make in FIGURES.items():
-        figure = make(explanation)
-        if figure is not None:
-            new = [folder / f"explain_{name}{suffix}" for suffix in suffixes]
-            style.save(figure, *new)
-            paths += new
+    one = partial(_draw, explanation, Path(folder) / "figures", suffixes)
+    if processes < 2:
+        return [path for name in FIGURES for path in one(name)]
+    with ProcessPoolExecutor(processes, get_context("fork")) as pool:
+        return [path for paths in pool.map(one, FIGURES) for path in paths]
+
+
+def _draw(explanation, folder: Path, suffixes: Sequence[str], name: str) -> list[Path]:
+    figure = FIGURES[name](explanation)
+    if figure is None:
+        return []
+    paths = [folder / f"explain_{name}{suffix}" for suffix in suffixes]
+    style.save(figure, *paths)
     return paths
 
 
