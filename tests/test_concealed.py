@@ -14,9 +14,14 @@ import pytest
 
 from concealed import jail
 from concealed.commitments import digests
+from concealed.oracle import worth_in
 from concealed.score import score
-from concealed.summary import Rate, failed, rate
+from concealed.summary import Rate, failed, rate, scores
 from concealed.tool import NOTHING, crash
+from explain_made import make
+from rippletwin.effects import EFFECTS, Place
+from rippletwin.explain.thresholds import ACCEPT
+from rippletwin.twin import Twin
 from virtualrig.conceal import NUMERICS, compared
 from virtualrig.draw import MIX, UNCERTAINTY, draw, generator, kinds
 from virtualrig.draw_effects import Bare, load_dynamics
@@ -277,13 +282,13 @@ def verdict(kind, *claims, equivalents=()):
     }  # fmt: skip
 
 
-def marked(truth_, verdict_, **changes):
+def marked(truth_, verdict_, worth=None, **changes):
     rows = [{"delay": 1.1, "delay_sd": 0.05, "impedance": 4.0, "impedance_sd": 1.0}]
     baselines = {
         "nominal": 0.5, "calibrated": 0.1, "corrected": 0.01, "bic": None, "sparse": None,
         "segments": {"calibrated": rows, "corrected": rows}, "seconds": 1.0,
     }  # fmt: skip
-    return score(truth_, verdict_, baselines | changes)
+    return score(truth_, verdict_, baselines | changes, worth)
 
 
 def test_right_name_place_and_interval():
@@ -296,6 +301,36 @@ def test_right_name_place_and_interval():
     far = marked(truth(), verdict("named", claim("leak", position=(4.0, 4.5), conductance=(3, 4))))
     assert far["right"] and far["in_place"] == [False] and far["intervals"] == [False]
     assert failed(far) == "wrong place"
+
+
+def test_what_the_truth_is_worth_parts_what_data_hold_from_what_they_do_not():
+    """A hose wall that changes the ripple is worth far more than chance gives; where a line without
+    made the data the same claim is worth nothing; what the library has not has no worth."""
+    hose = ((EFFECTS["viscoelastic_wall"], Place("segment 2", 1)),)
+    strength = {"compliance_ratio": 0.2, "retardation_time": 3e-4}
+    values = {f"viscoelastic_wall@segment 2.{name}": x for name, x in strength.items()}
+    true = {"name": "viscoelastic_wall", "element": "segment 2", "position": None}
+    found = []
+    for made in (hose, ()):
+        bench, data, _ = make(np.random.default_rng(1), made, values)
+        found.append(worth_in(Twin(bench, data), data, [true | {"parameters": strength}]))
+    assert found[0] > 5 * ACCEPT and found[1] < ACCEPT
+    unknown = {"name": "accumulator", "element": "position", "position": 1.0, "parameters": {}}
+    assert worth_in(Twin(bench, data), data, [unknown]) is None
+
+
+def test_rows_say_whether_the_data_hold_the_effect():
+    """A missed plain effect counts against the tool, and is left out where the truth itself is
+    worth less than chance gives."""
+    rows = [
+        marked(truth(), verdict("consistent"), worth=2.0),
+        marked(truth(), verdict("named", claim("leak", conductance=(1.5, 2.5))), worth=30.0),
+    ]
+    rates = {what: str(found) for what, _, found in scores(rows)}
+    assert rates["Plain single effects: right effect or class named"].startswith("50%")
+    assert rates["Of these, worth 8 of log evidence to one who knows: right effect"].startswith(
+        "100% (1 of 1"
+    )
 
 
 def test_a_tool_that_ended_with_an_error_is_scored():

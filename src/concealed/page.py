@@ -107,12 +107,12 @@ def _misfits(rows: list[dict]) -> list[str]:
 
 def _cases(rows: list[dict]) -> list[str]:
     return _table(
-        ("case", "kind", "truth", "change", "nominal", "calibrated", "swallowed", "corrected",
-         "verdict", "said"),
+        ("case", "kind", "truth", "change", "worth", "nominal", "calibrated", "swallowed",
+         "corrected", "verdict", "said"),
         [
             (
                 str(row["case"]), row["kind"], row["effects"] or "-", f"{row['change']:.1%}",
-                f"{row['misfit_nominal']:.1%}", f"{row['misfit_calibrated']:.2%}",
+                _worth(row), f"{row['misfit_nominal']:.1%}", f"{row['misfit_calibrated']:.2%}",
                 f"{row['swallowed']:.0%}", f"{row['misfit_corrected']:.2%}", row["verdict"],
                 row["said"] or "-",
             )
@@ -128,10 +128,15 @@ def _failures(rows: list[dict]) -> list[str]:
         if what is not None:
             lines += [
                 f"* **Case {row['case']}: {what}.** True: {row['effects'] or 'no effect'} "
-                f"(change {row['change']:.1%}, {row['points']} points, {row['sensors']} sensors, "
-                f"noise {row['noise']:.0f} Pa). It said ({row['verdict']}): {row['sentence']}"
+                f"(change {row['change']:.1%}, worth {_worth(row)}, {row['points']} points, "
+                f"{row['sensors']} sensors, noise {row['noise']:.0f} Pa). "
+                f"It said ({row['verdict']}): {row['sentence']}"
             ]
     return [*(lines or ["None."]), ""]
+
+
+def _worth(row: dict) -> str:
+    return "-" if row["worth"] is None else f"{row['worth']:.0f}"
 
 
 def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:

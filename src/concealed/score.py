@@ -14,10 +14,11 @@ GOOD_FIT = 0.05
 """Relative misfit up to which one who only recalibrates is content."""
 
 
-def score(truth: dict, verdict: dict, baselines: dict) -> dict:
+def score(truth: dict, verdict: dict, baselines: dict, worth: float | None = None) -> dict:
     """A flat row of one case; the keys are those of docs/concealed.md.
 
-    `truth` is what the seal held, `verdict` verdict.json, `baselines` what concealed.tool wrote.
+    `truth` is what the seal held, `verdict` verdict.json, `baselines` what concealed.tool wrote,
+    `worth` what concealed.oracle found.
     """
     true = truth["effects"]
     said = claims(verdict)
@@ -39,6 +40,7 @@ def score(truth: dict, verdict: dict, baselines: dict) -> dict:
         "points": truth["points"],
         "sensors": truth["sensors"],
         "plain": truth["change"] >= PLAIN,
+        "worth": worth,
         "verdict": verdict["verdict"],
         "said": " + ".join(f"{claim['name']} ({claim['element']})" for claim in said),
         "alarm": loud,

@@ -7,6 +7,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.stats import beta
 
+from rippletwin.explain.thresholds import ACCEPT
+
 CHANGES = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, np.inf)
 NEAR_FLOOR = 1.2
 PROBABILITIES = (0.0, 0.5, 0.8, 0.95, 0.99, 1.0)
@@ -75,6 +77,11 @@ def scores(rows: list[dict]) -> list[tuple[str, str, Rate]]:
             "",
             rate(row["right"] and row["clean"] for row in singles),
         ),
+        (
+            f"Of these, worth {ACCEPT:.0f} of log evidence to one who knows: right effect",
+            "at least 90 %",
+            rate(row["right"] for row in singles if held(row)),
+        ),
         ("Rightly named, two sensors: right place", "at least 75 %", rate(placed[2])),
         ("Rightly named, three sensors: right place", "at least 95 %", rate(placed[3])),
         ("All single effects: right effect", "", rate(row["right"] for row in of("single"))),
@@ -119,6 +126,11 @@ def scores(rows: list[dict]) -> list[tuple[str, str, Rate]]:
             rate(abs(z) < 2 for z in deviations),
         ),
     ]
+
+
+def held(row: dict) -> bool:
+    """Whether the data hold the effect, as far as `concealed.oracle` can tell."""
+    return row["worth"] is None or row["worth"] >= ACCEPT
 
 
 def _alarms(rows: list[dict]) -> Rate:

@@ -22,10 +22,11 @@ def read(path: str) -> dict:
 
 
 rows = []
-for case, (seal, key, verdict, baselines) in enumerate(
-    zip(paths.seals, paths.seal_keys, paths.verdicts, paths.baselines, strict=True)
+for case, (seal, key, *written) in enumerate(
+    zip(paths.seals, paths.seal_keys, paths.verdicts, paths.baselines, paths.worths, strict=True)
 ):
     truth = open_seal(read(seal), Path(key).read_bytes())
-    rows.append({"case": case} | score(truth, read(verdict), read(baselines)))
+    verdict, baselines, oracle = map(read, written)
+    rows.append({"case": case} | score(truth, verdict, baselines, oracle["worth"]))
 Path(snakemake.output.rows).write_text(json.dumps(rows, indent=1) + "\n")
 tell(f"{len(rows)} cases scored")

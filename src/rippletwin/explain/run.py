@@ -100,7 +100,7 @@ def explain(
         )
     # Linear algebra on large arrays: threads suffice, each with one of its own.
     with threadpool_limits(1), ThreadPoolExecutor(max(processes, 1)) as pool:
-        read = list(pool.map(partial(_observed, rig=case.rig), case.healthy))
+        read = list(pool.map(partial(observed, rig=case.rig), case.healthy))
     observations = [parts[0] for parts in read]
     early, late = ([parts[k] for parts in read if len(parts) > 1] for k in (1, 2))
     reason = contradiction.find(case.rig, case.healthy, observations, early, late)
@@ -125,13 +125,13 @@ def explain_observations(
     With `draws` the threshold is that of so many recordings drawn without an effect.
     """
     turning = _turning(rig, observations)
-    base, data, found = *_begun(rig, observations, turning), None
+    base, data, found = *begin(rig, observations, turning), None
     if not reason:
         found = _search(base, data, processes, progress)
         shaft = _shaft(found.best, observations)
         if apart(shaft, turning, data):
             turning = shaft
-            base, data = _begun(rig, observations, turning)
+            base, data = begin(rig, observations, turning)
             found = _search(base, data, processes, progress)
         base, data, found = _answered(base, data, found, processes, progress)
     early, late = (prepare(as_turned(part, turning), rig, HIGHEST_HZ) for part in (early, late))
@@ -176,8 +176,9 @@ def explain_observations(
     )
 
 
-def _begun(rig, observations: Sequence, turning: ShaftLines | None) -> tuple[Twin, list]:
-    """The paper's line and the observations as fitted, of a shaft that turns as `turning` says."""
+def begin(rig, observations: Sequence, turning: ShaftLines | None = None) -> tuple[Twin, list]:
+    """The paper's line, not yet fitted, and the observations as fits take them, of a shaft that
+    turns as `turning` says."""
     highest = HIGHEST_HZ if observations[0].orders is not None else None
     data = prepare(as_turned(observations, turning), rig, highest)
     base = Twin(rig, data, uncertain_pump=True)
@@ -254,7 +255,7 @@ def _alone(pool: Workers, base: Fit) -> list[Fit]:
     )
 
 
-def _observed(recording, rig) -> list:
+def observed(recording, rig) -> list:
     """The observation of a recording; of a periodic one then those of both halves of its
     revolutions."""
     if recording.kind != "periodic":
@@ -269,4 +270,4 @@ def _observed(recording, rig) -> list:
     return [observe(recording, rig, HIGHEST_HZ, revolutions=part) for part in parts]
 
 
-__all__ = ["Explanation", "explain", "explain_observations"]
+__all__ = ["Explanation", "begin", "explain", "explain_observations", "observed"]
