@@ -312,11 +312,12 @@ def test_what_the_truth_is_worth_parts_what_data_hold_from_what_they_do_not():
     true = {"name": "viscoelastic_wall", "element": "segment 2", "position": None}
     found = []
     for made in (hose, ()):
-        bench, data, _ = make(np.random.default_rng(1), made, values)
-        found.append(worth_in(Twin(bench, data), data, [true | {"parameters": strength}]))
+        bench, data, twin = make(np.random.default_rng(1), made, values)
+        effects = [true | {"parameters": strength}]
+        found.append(worth_in(Twin(bench, data), data, effects, twin.values()))
     assert found[0] > 5 * ACCEPT and found[1] < ACCEPT
     unknown = {"name": "accumulator", "element": "position", "position": 1.0, "parameters": {}}
-    assert worth_in(Twin(bench, data), data, [unknown]) is None
+    assert worth_in(Twin(bench, data), data, [unknown], {}) is None
 
 
 def test_rows_say_whether_the_data_hold_the_effect():

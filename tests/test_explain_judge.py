@@ -3,6 +3,7 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from explain_made import rig
@@ -12,6 +13,7 @@ from rippletwin.explain import validate, workers
 from rippletwin.explain.detect import PULL, Alarms
 from rippletwin.explain.fit import Fit
 from rippletwin.explain.judge import ADEQUATE, SURE, equivalents, judge, places
+from rippletwin.explain.locate import side_by_side
 from rippletwin.explain.search import Search
 from rippletwin.explain.steps import relatives, simplify
 from rippletwin.explain.thresholds import ACCEPT
@@ -117,10 +119,11 @@ def test_every_effect_is_compared_with_its_relatives():
     assert places(search) == ()
 
 
-@pytest.mark.parametrize(("large", "small"), [(LARGE, SMALL), (VOLUME, END)])
+@pytest.mark.parametrize(("large", "small"), [(LARGE, [SMALL]), (VOLUME, [END, SMALL])])
 @pytest.mark.parametrize("cost", [ACCEPT - 1, ACCEPT + 1])
 def test_the_larger_of_two_must_be_worth_its_physics(large, small, cost):
-    """A passage beside a volume, a place of its own for a volume: kept if they bring ACCEPT."""
+    """A passage beside a volume at the pump, a place of its own for a volume, which may as well be
+    at either end of the line: kept if they bring ACCEPT."""
     best = fit(100.0, HOSE, large)
     asked = []
 
@@ -130,8 +133,8 @@ def test_the_larger_of_two_must_be_worth_its_physics(large, small, cost):
 
     pool = SimpleNamespace(base=SimpleNamespace(rig=rig()), fit=answer)
     taken = simplify(pool, best, [HOSE, VOLUME, END, SMALL, LARGE])
-    assert [job["hypothesis"] for job in asked] == [(HOSE, small)]
-    assert taken.hypothesis == ((HOSE, small) if cost < ACCEPT else (HOSE, large))
+    assert [job["hypothesis"] for job in asked] == [(HOSE, each) for each in small]
+    assert taken.hypothesis == ((HOSE, small[0]) if cost < ACCEPT else (HOSE, large))
 
 
 def test_effects_that_do_not_transfer_are_dropped_weakest_first(monkeypatch):
@@ -171,3 +174,12 @@ def test_what_removes_most_of_the_unseen_misfit_may_have_folds_that_disagree(
     deviations apart do not, unless two thirds of the misfit are gone; more misfit never holds."""
     scores = [{"held_out": validate.Score(x, 0.0)} for x in (0.10, after)]
     assert validate.Validation(*scores, (), disagreement).holds is holds
+
+
+def test_what_is_not_finite_is_not_told():
+    """An effect with which no steady state is found where the fit is blind to the source has no
+    evidence there: it is left out of what JSON could not hold, another stays."""
+    search = Search(fit(0.0), [fit(9.0, HOSE), fit(5.0, VOLUME)], fit(9.0, HOSE))
+    blind = [fit(0.0), fit(-np.inf, HOSE), fit(3.0, VOLUME)]
+    (told,) = side_by_side(search, blind)
+    assert told["informed"] == 5.0 and told["source_free"] == 3.0

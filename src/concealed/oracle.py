@@ -1,32 +1,43 @@
 """What the truth is worth to one who knows it: the bound on what a search can find in the data."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 from pathlib import Path
 
+import numpy as np
+
 from rippletwin.case import load_case
 from rippletwin.explain.fit import Fit, Hypothesis
+from rippletwin.explain.posterior import Posterior
 from rippletwin.explain.run import begin, observed
 from rippletwin.explain.search import library
+from rippletwin.explain.starts import align
 from rippletwin.explain.workers import Workers, carry
 from rippletwin.twin import Twin
 
 
-def worth(case_folder: str | Path, effects: list[dict]) -> float | None:
-    """Log evidence that the true `effects`, as a seal has them, add to the line of a case without
-    any; see `worth_in`."""
-    if not effects:
+def worth(case_folder: str | Path, truth: dict) -> float | None:
+    """Log evidence that the true effects add to the line of a case without any, `truth` being what
+    a seal holds; see `worth_in`."""
+    if not truth["effects"]:
         return None
     case = load_case(case_folder, states={"healthy"})
     base, data = begin(case.rig, [observed(each, case.rig)[0] for each in case.healthy])
-    return worth_in(base, data, effects)
+    rig = truth["seal"]
+    line = {"viscosity": rig["fluid"]["kinematic_viscosity"]}
+    for k, segment in enumerate(rig["line"]["segments"], 1):
+        line |= {f"{name}[{k}]": segment[name] for name in ("wave_speed", "diameter", "length")}
+    return worth_in(base, data, truth["effects"], line)
 
 
-def worth_in(base: Twin, data: Sequence, effects: list[dict]) -> float | None:
+def worth_in(
+    base: Twin, data: Sequence, effects: list[dict], line: Mapping[str, float]
+) -> float | None:
     """Log evidence that the true `effects` add to the twin `base` of the observations `data`.
 
     Both are fitted as `explain` fits, but the effects set out from their true strengths and places,
-    and the line without them also from where they leave it. Less than `ACCEPT` no search can tell
+    also on the true `line` (its parameters by name), and the line without them also from where they
+    leave it. Less than `ACCEPT` no search can tell
     from chance; where it is more, one that finds nothing has failed. None where nothing can be
     added: an effect that the library has not, or one at shaft orders alone.
     """
@@ -41,13 +52,19 @@ def worth_in(base: Twin, data: Sequence, effects: list[dict]) -> float | None:
     ]
     if not all(choices):
         return None
-    known = _best(
-        pool.fit(
-            [{"hypothesis": h, "starts": [_start(rig, h, effects)]} for h in product(*choices)]
-        )
-    )
-    line = pool.fit([{"hypothesis": ()}, {"hypothesis": (), "theta": carry(known, (), base)}])
-    return known.evidence - _best(line).evidence
+    jobs = []
+    for hypothesis in product(*choices):
+        start = _start(rig, hypothesis, effects)
+        jobs.append({"hypothesis": hypothesis, "starts": [start]})
+        twin = base.with_(effects=hypothesis)
+        theta = np.zeros(len(twin.parameters))
+        for k, p in enumerate(twin.parameters):
+            theta[k] = p.prior.coordinate(line[p.name]) if p.name in line else start.get(p.name, 0)
+        aligned = align(Posterior(twin, data), theta)[1]
+        jobs.append({"hypothesis": hypothesis, "theta": aligned})
+    known = _best(pool.fit(jobs))
+    without = pool.fit([{"hypothesis": ()}, {"hypothesis": (), "theta": carry(known, (), base)}])
+    return known.evidence - _best(without).evidence
 
 
 def _start(rig, hypothesis: Hypothesis, effects: list[dict]) -> dict[str, float]:

@@ -10,6 +10,6 @@ from virtualrig.seal import open_seal
 tell = start(snakemake)
 sealed = json.loads(Path(snakemake.input.seal).read_text())
 truth = open_seal(sealed, Path(snakemake.input.key).read_bytes())
-found = worth(snakemake.input.case, truth["effects"])
+found = worth(snakemake.input.case, truth)
 Path(snakemake.output[0]).write_text(json.dumps({"worth": found}) + "\n")
 tell(f"worth {found}")

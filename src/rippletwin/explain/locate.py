@@ -197,7 +197,8 @@ def blind(pool, search) -> list[Fit]:
 
 
 def side_by_side(search, blind_fits: Sequence[Fit]) -> list[dict]:
-    """Log evidence over the base with the source's ripple known as stated, and blind to it."""
+    """Log evidence over the base with the source's ripple known as stated, and blind to it; not of
+    an effect with which no steady state is found there."""
     informed = {f.label: f.evidence for f in compared(search)}
     unseen = {f.label: f.evidence for f in blind_fits}
     return [
@@ -207,7 +208,7 @@ def side_by_side(search, blind_fits: Sequence[Fit]) -> list[dict]:
             "source_free": float(unseen[label] - unseen[""]),
         }
         for label in informed
-        if label and label in unseen
+        if label and np.isfinite(unseen.get(label, -np.inf))
     ]
 
 

@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
+import numpy as np
+
 from rippletwin.case import Rig, Uncertainty
 from rippletwin.explain import detect
 from rippletwin.explain.fit import Fit
@@ -28,7 +30,7 @@ class WithoutEffect:
     """A fit without one effect, the data sheet being free.
 
     effect     name of what was left out
-    evidence   log evidence lost with it, the data sheet as stated
+    evidence   log evidence lost with it, the data sheet as stated; None where nothing fits so
     misfit     relative, in sample, the data sheet free
     parameter  the line's parameter that goes furthest from the sheet
     value, nominal   its values, `unit`
@@ -37,7 +39,7 @@ class WithoutEffect:
     """
 
     effect: str
-    evidence: float
+    evidence: float | None
     misfit: float
     parameter: str
     value: float
@@ -68,7 +70,7 @@ def without_each(pool: Workers, base: Fit, accepted: Fit) -> tuple[WithoutEffect
         found.append(
             WithoutEffect(
                 effect=effect.name,
-                evidence=lost,
+                evidence=lost if np.isfinite(lost) else None,
                 misfit=misfit,
                 parameter=parameter.name,
                 value=fit.twin.values()[parameter.name],

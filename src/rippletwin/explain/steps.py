@@ -13,7 +13,8 @@ from rippletwin.explain.workers import Workers, counter, dropping, in_common, ra
 MOST = 4  # effects at a time
 STAND_INS = 10  # single effects tried in the place of another
 BETTER = 1.0  # log evidence by which what is put in the place of another must be better
-LIMITS = {"line_volume": "load_volume"}  # effects at any place that are another at the line's end
+LIMITS = {"line_volume": (("load_volume", None), ("source_impedance", "volume"))}
+"""Effects at any place, and what they are at the line's ends: name and form."""
 
 
 def extensions(pool: Workers, best: Fit, found: Sequence, progress) -> list[Fit]:
@@ -110,7 +111,7 @@ def _contains(member, other, rig) -> bool:
     """Whether an effect is a special case of another: of its equations, or where it may be."""
     (effect, place), (less, where) = member, other
     if effect is not less:
-        return LIMITS.get(effect.name) == less.name
+        return (less.name, where.form) in LIMITS.get(effect.name, ())
     names = [{p.name for p in e.parameters(rig, at)} for e, at in (member, other)]
     return place.element == where.element and names[1] < names[0]
 

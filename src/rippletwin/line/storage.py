@@ -24,7 +24,7 @@ from rippletwin.line.mixing import Mixing
 A_WAVE = 2  # places on the shortest wave: what it takes up itself hardly matters
 PASSES, TOLERANCE = 80, 0.0005  # of a recording's largest flow: what a pass still changes
 HOPELESS = 25, 0.5  # passes after which this much must have been reached
-SHARES = (0.35, 0.7, 1.0)  # of what is stored, one after the other, where all at once fails
+LEAST = 1.0 / 16.0  # of what is stored, the smallest share by which more of it is tried
 FINE = 3  # samples a wave of the highest harmonic: what is folded of its square stays above half
 FURTHEST = 0.9  # of the law's pressure: there it is held
 
@@ -86,20 +86,29 @@ class FullAmplitude:
         return law(*basis.relation(leaving))
 
     def _steady(self, stored: Callable, shape: tuple) -> np.ndarray:
-        """What leaves (N, F) where `stored` of it is the same, or the nearest found to that."""
-        self.solved = False
+        """What leaves (N, F) where `stored` of it is the same, or the nearest found to that.
+
+        Where it cannot be had all at once from nothing, share by share. A solution that would not
+        lead to this one is worth one trial from nothing: a fit that steps too far steps back.
+        """
+        least = LEAST
         if self.resumed and self._leaving is not None and self._leaving.shape == shape:
-            value = self._fixed_point(stored, self._leaving)
-        for shares in ((1.0,), SHARES):
+            value, least = self._fixed_point(stored, self._leaving), 1.0
             if self.solved:
-                break
-            self._mixed = [Mixing() for _ in self.recordings]
-            value = np.zeros(shape, complex)
-            for share in shares:
-                value = self._fixed_point(stored, value, share)
-                if not self.solved:
-                    break
-        self._leaving = value if self.solved else None
+                self._leaving = value
+                return value
+        begun, share, step = np.zeros(shape, complex), 0.0, 1.0
+        self.solved = False
+        while share < 1.0 and step >= least:
+            if not self.solved:
+                self._mixed = [Mixing() for _ in self.recordings]
+            value = self._fixed_point(stored, begun, share + step)
+            if self.solved:
+                begun, share = value, share + step
+            else:
+                step *= 0.5
+        if self.solved:
+            self._leaving = value
         return value
 
     def _fixed_point(self, function: Callable, x: np.ndarray, share: float = 1.0) -> np.ndarray:
