@@ -148,6 +148,19 @@ def test_a_solution_leads_to_the_next():
     assert passes[1] <= passes[2] / 3
 
 
+def test_a_solution_of_another_size_does_not_lead_to_this_one():
+    """After one of four places, one of six that fails and then four again: the first is resumed,
+    with what was seen on its own way."""
+    full = FullAmplitude([slice(0, 10)], np.arange(1, 11))
+    full.resumed = True
+    full._steady(lambda x: 1.0 - 3.0 * x, (4, 10))
+    full._steady(lambda x: np.where(x.real > 0.0, -1.0, 1.0) + 0j, (6, 10))
+    assert not full.solved
+    found = full._steady(lambda x: 1.0 - 3.1 * x, (4, 10))
+    assert full.solved
+    np.testing.assert_allclose(found, 1.0 / 4.1, rtol=10 * TOLERANCE)
+
+
 def test_where_there_is_no_steady_state_none_is_claimed():
     """What is 1 below nothing and -1 above has no solution, and the next map, x = x/2 + 1, is
     solved all the same: what was seen of the first is forgotten."""

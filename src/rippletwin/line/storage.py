@@ -54,7 +54,7 @@ class FullAmplitude:
 
     def __init__(self, slices: Sequence[slice], orders: np.ndarray):
         self.tolerance, self.resumed, self.solved = TOLERANCE, False, True
-        self._leaving, self._mixed = None, []
+        self._last = None  # what leaves there, and what was seen on the way
         self.recordings = []
         for part in slices:
             own = np.asarray(orders[part]).astype(int)
@@ -92,30 +92,37 @@ class FullAmplitude:
         lead to this one is worth one trial from nothing: a fit that steps too far steps back.
         """
         least = LEAST
-        if self.resumed and self._leaving is not None and self._leaving.shape == shape:
-            value, least = self._fixed_point(stored, self._leaving), 1.0
+        if self.resumed and self._last is not None and self._last[0].shape == shape:
+            leaving, mixed = self._last
+            value, least = self._fixed_point(stored, leaving, mixed), 1.0
             if self.solved:
-                self._leaving = value
+                self._last = value, mixed
                 return value
+            self._last = leaving, self._nothing_seen()
         begun, share, step = np.zeros(shape, complex), 0.0, 1.0
         self.solved = False
         while share < 1.0 and step >= least:
             if not self.solved:
-                self._mixed = [Mixing() for _ in self.recordings]
-            value = self._fixed_point(stored, begun, share + step)
+                mixed = self._nothing_seen()
+            value = self._fixed_point(stored, begun, mixed, share + step)
             if self.solved:
                 begun, share = value, share + step
             else:
                 step *= 0.5
         if self.solved:
-            self._leaving = value
+            self._last = value, mixed
         return value
 
-    def _fixed_point(self, function: Callable, x: np.ndarray, share: float = 1.0) -> np.ndarray:
+    def _nothing_seen(self) -> list[Mixing]:
+        return [Mixing() for _ in self.recordings]
+
+    def _fixed_point(
+        self, function: Callable, x: np.ndarray, mixed: Sequence[Mixing], share: float = 1.0
+    ) -> np.ndarray:
         """x (N, F), complex, with share function(x) = x, or as near as PASSES come."""
         parts, reached = [part for part, *_ in self.recordings], np.inf
-        for mixed in self._mixed:
-            mixed.begin()
+        for each in mixed:
+            each.begin()
         for done in range(1, PASSES + 1):
             value = share * function(x)
             off, size = np.abs(value - x).max(axis=0), np.abs(value).max(axis=0)
@@ -126,8 +133,8 @@ class FullAmplitude:
             if self.solved or hopeless or not np.isfinite(error):
                 break
             x = x.copy()
-            for mixed, part in zip(self._mixed, parts):
-                x[:, part] = mixed.step(x[:, part], value[:, part])
+            for each, part in zip(mixed, parts):
+                x[:, part] = each.step(x[:, part], value[:, part])
         return value
 
 
