@@ -24,7 +24,7 @@ from rippletwin.line.mixing import Mixing
 A_WAVE = 2  # places on the shortest wave: what it takes up itself hardly matters
 PASSES, TOLERANCE = 80, 0.0005  # of a recording's largest flow: what a pass still changes
 HOPELESS = 25, 0.5  # passes after which this much must have been reached
-LEAST = 1.0 / 16.0  # of what is stored, the smallest share by which more of it is tried
+SHARES = (0.35, 0.7, 1.0)  # of what is stored, one after the other, where all at once fails
 FINE = 3  # samples a wave of the highest harmonic: what is folded of its square stays above half
 FURTHEST = 0.9  # of the law's pressure: there it is held
 
@@ -54,7 +54,7 @@ class FullAmplitude:
 
     def __init__(self, slices: Sequence[slice], orders: np.ndarray):
         self.tolerance, self.resumed, self.solved = TOLERANCE, False, True
-        self._last = None  # what leaves there, and what was seen on the way
+        self._leaving, self._mixed = None, []
         self.recordings = []
         for part in slices:
             own = np.asarray(orders[part]).astype(int)
@@ -86,43 +86,27 @@ class FullAmplitude:
         return law(*basis.relation(leaving))
 
     def _steady(self, stored: Callable, shape: tuple) -> np.ndarray:
-        """What leaves (N, F) where `stored` of it is the same, or the nearest found to that.
-
-        Where it cannot be had all at once from nothing, share by share. A solution that would not
-        lead to this one is worth one trial from nothing: a fit that steps too far steps back.
-        """
-        least = LEAST
-        if self.resumed and self._last is not None and self._last[0].shape == shape:
-            leaving, mixed = self._last
-            value, least = self._fixed_point(stored, leaving, mixed), 1.0
-            if self.solved:
-                self._last = value, mixed
-                return value
-            self._last = leaving, self._nothing_seen()
-        begun, share, step = np.zeros(shape, complex), 0.0, 1.0
+        """What leaves (N, F) where `stored` of it is the same, or the nearest found to that."""
         self.solved = False
-        while share < 1.0 and step >= least:
-            if not self.solved:
-                mixed = self._nothing_seen()
-            value = self._fixed_point(stored, begun, mixed, share + step)
+        if self.resumed and self._leaving is not None and self._leaving.shape == shape:
+            value = self._fixed_point(stored, self._leaving)
+        for shares in ((1.0,), SHARES):
             if self.solved:
-                begun, share = value, share + step
-            else:
-                step *= 0.5
-        if self.solved:
-            self._last = value, mixed
+                break
+            self._mixed = [Mixing() for _ in self.recordings]
+            value = np.zeros(shape, complex)
+            for share in shares:
+                value = self._fixed_point(stored, value, share)
+                if not self.solved:
+                    break
+        self._leaving = value if self.solved else None
         return value
 
-    def _nothing_seen(self) -> list[Mixing]:
-        return [Mixing() for _ in self.recordings]
-
-    def _fixed_point(
-        self, function: Callable, x: np.ndarray, mixed: Sequence[Mixing], share: float = 1.0
-    ) -> np.ndarray:
+    def _fixed_point(self, function: Callable, x: np.ndarray, share: float = 1.0) -> np.ndarray:
         """x (N, F), complex, with share function(x) = x, or as near as PASSES come."""
         parts, reached = [part for part, *_ in self.recordings], np.inf
-        for each in mixed:
-            each.begin()
+        for mixed in self._mixed:
+            mixed.begin()
         for done in range(1, PASSES + 1):
             value = share * function(x)
             off, size = np.abs(value - x).max(axis=0), np.abs(value).max(axis=0)
@@ -133,8 +117,8 @@ class FullAmplitude:
             if self.solved or hopeless or not np.isfinite(error):
                 break
             x = x.copy()
-            for each, part in zip(mixed, parts):
-                x[:, part] = each.step(x[:, part], value[:, part])
+            for mixed, part in zip(self._mixed, parts):
+                x[:, part] = mixed.step(x[:, part], value[:, part])
         return value
 
 
