@@ -4,8 +4,6 @@ from collections.abc import Mapping, Sequence
 from itertools import product
 from pathlib import Path
 
-import numpy as np
-
 from rippletwin.case import load_case
 from rippletwin.explain.fit import Fit, Hypothesis
 from rippletwin.explain.posterior import Posterior
@@ -13,6 +11,7 @@ from rippletwin.explain.run import begin, observed
 from rippletwin.explain.search import library
 from rippletwin.explain.starts import align
 from rippletwin.explain.workers import Workers, carry
+from rippletwin.parameters import coordinates
 from rippletwin.twin import Twin
 
 
@@ -37,47 +36,40 @@ def worth_in(
 
     Both are fitted as `explain` fits, but the effects set out from their true strengths and places,
     also on the true `line` (its parameters by name), and the line without them also from where they
-    leave it. Less than `ACCEPT` no search can tell
-    from chance; where it is more, one that finds nothing has failed. None where nothing can be
-    added: an effect that the library has not, or one at shaft orders alone.
+    leave it. Less than `ACCEPT` no search can tell from chance; where it is more, one that finds
+    nothing has failed. None where nothing can be added: an effect that the library has not, or one
+    at shaft orders alone.
     """
-    rig, pool = base.rig, Workers(base, data)
+    pool, found = Workers(base, data), library(base.rig, data)
     choices = [
-        [
-            (effect, place)
-            for effect, place in library(rig, data)
-            if (effect.name, place.element) == (true["name"], true["element"])
-        ]
+        [c for c in found if (c[0].name, c[1].element) == (true["name"], true["element"])]
         for true in effects
     ]
     if not all(choices):
         return None
     jobs = []
     for hypothesis in product(*choices):
-        start = _start(rig, hypothesis, effects)
+        twin, values = base.with_(effects=hypothesis), _values(base.rig, hypothesis, effects)
+        theta = coordinates(twin.parameters, {**line, **values})
+        start = {name: theta[twin.index[name]] for name in values}
         jobs.append({"hypothesis": hypothesis, "starts": [start]})
-        twin = base.with_(effects=hypothesis)
-        theta = np.zeros(len(twin.parameters))
-        for k, p in enumerate(twin.parameters):
-            theta[k] = p.prior.coordinate(line[p.name]) if p.name in line else start.get(p.name, 0)
-        aligned = align(Posterior(twin, data), theta)[1]
-        jobs.append({"hypothesis": hypothesis, "theta": aligned})
+        jobs.append({"hypothesis": hypothesis, "theta": align(Posterior(twin, data), theta)[1]})
     known = _best(pool.fit(jobs))
     without = pool.fit([{"hypothesis": ()}, {"hypothesis": (), "theta": carry(known, (), base)}])
     return known.evidence - _best(without).evidence
 
 
-def _start(rig, hypothesis: Hypothesis, effects: list[dict]) -> dict[str, float]:
-    """Coordinates, by name, of the true parameters; a place is the one on the drawing."""
-    start = {}
+def _values(rig, hypothesis: Hypothesis, effects: list[dict]) -> dict[str, float]:
+    """The true parameters by name; a place is the one on the drawing."""
+    values = {}
     for (effect, place), true in zip(hypothesis, effects, strict=True):
-        values = true["parameters"]
+        own = true["parameters"]
         if true["position"] is not None:
-            values = values | {"position": true["position_nominal"]}
+            own = own | {"position": true["position_nominal"]}
         for p in effect.parameters(rig, place):
-            if p.name in values:
-                start[f"{effect.name}@{place}.{p.name}"] = float(p.prior.coordinate(values[p.name]))
-    return start
+            if p.name in own:
+                values[f"{effect.name}@{place}.{p.name}"] = own[p.name]
+    return values
 
 
 def _best(fits: list[Fit]) -> Fit:
