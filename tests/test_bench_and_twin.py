@@ -15,11 +15,11 @@ from rippletwin.case import FlowRipple, Fluid, Load, Rig, Segment, Sensor
 from rippletwin.effects import candidates
 from rippletwin.spectra import Observation
 from rippletwin.twin import Twin
-from virtualrig.conceal import NUMERICS, REFINE, driving
 from virtualrig.draw import HIGHEST_HZ
 from virtualrig.draw_effects import LIBRARY, Bare
 from virtualrig.orbit import Bench
 from virtualrig.recorder import Point, sense
+from virtualrig.resolution import NUMERICS, REFINE, driving
 from virtualrig.rig import build
 
 NO_VALUES = {"piston_spread", "speed_fluctuation"}  # the bench's and the twin's differ

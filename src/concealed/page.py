@@ -74,11 +74,24 @@ def markdown(rows: list[dict], origin: dict) -> str:
                 ("checked against", "error, Pa rms", "allowed, Pa rms"),
                 [
                     (c["truth"], f"{c['error']:.0f}", f"{c['allowed']:.0f}")
-                    for c in origin["checks"]
+                    for c in [*origin["checks"], *_refined(rows)]
                 ],
             ),
         ]
     )
+
+
+def _refined(rows: list[dict]) -> list[dict]:
+    """The estimated errors of cases whose mesh was refined until they were small, as checks."""
+    return [
+        {
+            "truth": f"finer meshes, case {k}",
+            "error": row["numerics"]["error"],
+            "allowed": row["numerics"]["allowed"],
+        }
+        for k, row in enumerate(rows)
+        if row["numerics"] is not None
+    ]
 
 
 def _misfits(rows: list[dict]) -> list[str]:

@@ -37,6 +37,7 @@ def score(truth: dict, verdict: dict, baselines: dict, worth: float | None = Non
         "effects": " + ".join(effect["name"] for effect in true),
         "change": truth["change"],
         "noise": truth["noise"],
+        "numerics": truth["mesh"],
         "points": truth["points"],
         "sensors": truth["sensors"],
         "plain": truth["change"] >= PLAIN,

@@ -10,16 +10,26 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ive
 
-from virtualrig.conceal import NUMERICS, REFINE, SETTLED, driving
-from virtualrig.draw import HIGHEST_HZ, Drawn, draw
+from virtualrig.draw import Drawn, draw
 from virtualrig.orbit import Bench, Orbit
-from virtualrig.rig import Rig, build
-
-ALLOWED = 0.1
-"""Of the noise: the largest error at any sensor, rms below HIGHEST_HZ."""
+from virtualrig.resolution import (
+    ALLOWED,
+    NUMERICS,
+    REFINE,
+    SETTLED,
+    built,
+    driving,
+    harmonics,
+    orders,
+    resolved,
+    rms,
+    settled,
+)
+from virtualrig.rig import Rig
 
 SMALL = 1e-3
-FINER = {"frequency": 8000.0, "points": 9.0, "degree": 8, "modes": 14}
+FINER, WIDER = {"points": 9.0, "degree": 8, "modes": 14}, 1.5
+"""Of a finer mesh, and by how much its band of frequencies is wider."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +61,7 @@ def checks(count: int, commit: str, number: int) -> list[Check]:
 def against_matrices(drawn: Drawn, friction: str) -> Check:
     """The bare line of a drawn rig at small ripple; the error is scaled to the whole ripple."""
     effects = [{"name": "unsteady_friction"}] if friction == "unsteady" else []
-    rig = build(drawn.sheet, drawn.seal | {"effects": effects, "numerics": NUMERICS})
+    rig = built(drawn, NUMERICS, effects=effects)
     point = drawn.points[0]
     flow = driving(rig, point)(point.speed_rpm)
     small = flow.mean() + SMALL * (flow - flow.mean())
@@ -60,11 +70,11 @@ def against_matrices(drawn: Drawn, friction: str) -> Check:
     orbit = Bench(rig, flow=small, refine=REFINE).settle(
         point.speed_rpm, point.load_pressure, valve, SMALL * SETTLED * noise
     )
-    orders = _orders(point.speed_rpm)
+    seen = orders(point.speed_rpm)
     # harmonics of the straight lines that the bench draws between the samples
-    drive = 2 * np.fft.rfft(small)[orders] / len(small) * np.sinc(orders / len(small)) ** 2
-    truth = transfer_matrix(rig, drive, orders * point.speed_rpm / 60, orbit, friction)
-    error = _rms(_harmonics(orbit, orders) - truth) / SMALL
+    drive = 2 * np.fft.rfft(small)[seen] / len(small) * np.sinc(seen / len(small)) ** 2
+    truth = transfer_matrix(rig, drive, seen * point.speed_rpm / 60, orbit, friction)
+    error = rms(harmonics(orbit, seen) - truth) / SMALL
     return Check(f"exact solution, {friction} friction", float(error.max()), ALLOWED * noise)
 
 
@@ -105,25 +115,8 @@ def transfer_matrix(
 
 def against_finer(drawn: Drawn) -> Check:
     """A drawn rig, whatever it conceals, at full ripple on a finer mesh and with smaller steps."""
-    point, orders = drawn.points[0], _orders(drawn.points[0].speed_rpm)
-    found = []
-    for numerics, refine in ((NUMERICS, REFINE), (FINER, 2 * REFINE)):
-        rig = build(drawn.sheet, drawn.seal | {"numerics": numerics})
-        orbit = Bench(rig, flow=driving(rig, point), refine=refine).settle(
-            point.speed_rpm, point.load_pressure, tolerance=SETTLED * rig.noise
-        )
-        found.append(_harmonics(orbit, orders))
-    error = _rms(found[0] - found[1])
+    numerics, _ = resolved(drawn)
+    finer = numerics | FINER | {"frequency": WIDER * numerics["frequency"]}
+    point, rig = drawn.points[0], built(drawn, numerics)
+    error = rms(settled(rig, point) - settled(built(drawn, finer), point, 2))
     return Check("finer mesh, whole ripple", float(error.max()), ALLOWED * rig.noise)
-
-
-def _orders(speed_rpm: float) -> np.ndarray:
-    return np.arange(1, int(HIGHEST_HZ * 60 / speed_rpm) + 1)
-
-
-def _harmonics(orbit: Orbit, orders: np.ndarray) -> np.ndarray:
-    return 2 * np.fft.rfft(orbit.pressure, axis=1)[:, orders] / orbit.pressure.shape[1]
-
-
-def _rms(harmonics: np.ndarray) -> np.ndarray:
-    return np.sqrt(np.sum(np.abs(harmonics) ** 2, axis=1) / 2)
