@@ -19,8 +19,9 @@ def alone(pool: Workers, found: Sequence, progress=None) -> tuple[Fit, list[Fit]
     tell = counter(progress, "single effects", len(found) + 1)
     fits = pool.fit([{"hypothesis": h} for h in [(), *((c,) for c in found)]], tell)
     base, singles = _lowest(pool, fits[0], fits[1:]), fits[1:]
-    if base.floor <= GOOD:
-        # A line that fits without the effect has no other valley for it than a weak one nearby.
+    if base.floor <= GOOD or ranked(singles)[0].floor > GOOD:
+        # A line that fits without the effect has no other valley for it than a weak one nearby;
+        # and where no effect fits, that line may be the right one all the same.
         tell = counter(progress, "weak effects", len(found))
         near = pool.fit([{"hypothesis": f.hypothesis, "fit": base} for f in singles], tell)
         singles = [max(pair, key=lambda f: f.evidence) for pair in zip(singles, near)]

@@ -26,7 +26,12 @@ def extensions(pool: Workers, best: Fit, found: Sequence, progress) -> list[Fit]
         extended(best, candidate, rig) for candidate in found if candidate not in best.hypothesis
     ]
     tell = counter(progress, f"{len(best.hypothesis) + 1} effects", len(jobs))
-    return ranked(pool.fit(jobs, tell))
+    fits = ranked(pool.fit(jobs, tell))
+    if fits and best.floor > GOOD and fits[0].floor > GOOD:
+        # What is there may be right as it is, though far from all.
+        near = pool.fit([{"hypothesis": f.hypothesis, "fit": best} for f in fits])
+        fits = ranked([max(pair, key=lambda f: f.evidence) for pair in zip(fits, near)])
+    return fits
 
 
 def extended(best: Fit, candidate, rig) -> dict:
