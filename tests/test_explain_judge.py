@@ -15,7 +15,8 @@ from rippletwin.explain.fit import Fit
 from rippletwin.explain.judge import ADEQUATE, SURE, equivalents, judge, places
 from rippletwin.explain.locate import side_by_side
 from rippletwin.explain.search import Search
-from rippletwin.explain.steps import relatives, simplify
+from rippletwin.explain.singles import alone
+from rippletwin.explain.steps import extensions, relatives, simplify
 from rippletwin.explain.thresholds import ACCEPT
 from rippletwin.explain.validate import Score, Validation
 
@@ -135,6 +136,39 @@ def test_the_larger_of_two_must_be_worth_its_physics(large, small, cost):
     taken = simplify(pool, best, [HOSE, VOLUME, END, SMALL, LARGE])
     assert [job["hypothesis"] for job in asked] == [(HOSE, each) for each in small]
     assert taken.hypothesis == ((HOSE, small[0]) if cost < ACCEPT else (HOSE, large))
+
+
+@pytest.mark.parametrize(("floor", "asked"), [(0.004, False), (0.3, True)])
+def test_where_no_effect_fits_every_one_is_begun_about_what_is_there(monkeypatch, floor, asked):
+    """Fits from nominal values that leave `floor`: only where that is much are effects begun about
+    the line as it is without them, and beside the first about the fit with it."""
+    monkeypatch.setattr("rippletwin.explain.singles.carry", lambda *_: None)
+    begun = []
+
+    def answer(jobs, tell=None):
+        about = [job["hypothesis"] for job in jobs if "fit" in job]
+        begun.extend(about)
+        return [
+            fit(50.0 if "fit" in job else 10.0, *job["hypothesis"], floor=0.004 if about else floor)
+            if job["hypothesis"]
+            else fit(0.0, floor=0.3)
+            for job in jobs
+        ]
+
+    pool = SimpleNamespace(
+        base=SimpleNamespace(rig=rig()), fit=answer, observations=("point 1", "point 2")
+    )
+    base, singles = alone(pool, [HOSE, VOLUME])
+    assert base.evidence == 0.0
+    assert begun == ([(HOSE,), (VOLUME,)] if asked else [])
+    assert [f.evidence for f in singles] == ([50.0, 50.0] if asked else [10.0, 10.0])
+    monkeypatch.setattr(
+        "rippletwin.explain.steps.restarted", lambda best, h, rig: {"hypothesis": h}
+    )
+    begun.clear()
+    step = extensions(pool, fit(10.0, HOSE, floor=0.3), [HOSE, VOLUME], None)
+    assert begun == ([(HOSE, VOLUME)] if asked else [])
+    assert step[0].evidence == (50.0 if asked else 10.0)
 
 
 def test_effects_that_do_not_transfer_are_dropped_weakest_first(monkeypatch):
