@@ -14,6 +14,7 @@ from rippletwin.explain.locate import locate
 from rippletwin.explain.metric import source_scale
 from rippletwin.explain.posterior import FLOOR, SIZE, Posterior
 from rippletwin.explain.search import again, search
+from rippletwin.explain.singles import alone
 from rippletwin.explain.starts import PROMISING, promising
 from rippletwin.explain.thresholds import ACCEPT
 from rippletwin.explain.validate import validate
@@ -324,3 +325,17 @@ def test_a_smaller_prediction_is_no_likelier():
     assert costs[1] < min(costs[0], costs[2])
     assert abs(costs[0] - costs[2]) < 0.1
     assert max(costs) - costs[1] < 1.5 * (0.01 / SIZE) ** 2
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_little_air_is_worth_what_the_truth_is(seed):
+    """0.15 % of air at one operating point, of which the line alone swallows nearly all (1) or most
+    (2): the search gives it the log evidence that a fit from the truth has."""
+    values = TRUTH | {"entrained_air@line.gas_fraction": 1.5e-3}
+    one = {"sensors": 2, "points": POINTS[:1], "source": 0.005, "noise": 500.0}
+    bench, data, truth = make(np.random.default_rng(seed), AIR, values, **one)
+    pool = Workers(Twin(bench, data), data)
+    known = refine(pool.base, AIR, data, [truth.theta])
+    base, (air,) = alone(pool, AIR)
+    assert known.evidence - base.evidence > ACCEPT
+    assert air.evidence == pytest.approx(known.evidence, abs=0.5)

@@ -9,6 +9,7 @@ from explain_made import make, rig
 from rippletwin.case import Uncertainty
 from rippletwin.effects import EFFECTS, Place
 from rippletwin.explain.fit import prepare, refine
+from rippletwin.explain.judge import Judgement, examined
 from rippletwin.explain.sheet import freed, loosened, without_each
 from rippletwin.explain.workers import Workers
 from rippletwin.twin import Twin
@@ -36,7 +37,7 @@ def test_air_at_one_pressure_is_a_slower_wave():
     fit, pool = accepted(EFFECTS["entrained_air"], values, **small)
     (base,) = pool.fit([{"hypothesis": ()}])
     (found,) = without_each(pool, base, fit)
-    assert found.effect == "entrained_air" and found.rivals
+    assert found.effect == "entrained_air" and found.rivals and not found.refutes
     free = freed(pool, [base], fit)[0][1].twin.values()
     with_air = fit.twin.values()
     fraction, n = (v for p, v in with_air.items() if p.startswith("entrained_air"))
@@ -59,8 +60,28 @@ def test_no_sheet_stands_in_for_friction_that_grows_with_frequency():
     fit, pool = accepted(EFFECTS["unsteady_friction"], {})
     (base,) = pool.fit([{"hypothesis": ()}])
     (found,) = without_each(pool, base, fit)
-    assert not found.rivals
+    assert not found.rivals and not found.refutes
     assert found.evidence == fit.evidence - base.evidence > 100.0
+
+
+def test_what_one_number_of_the_line_accounts_for_refutes_an_effect():
+    """A liquid nine times as viscous as the sheet says takes the same share of every frequency. A
+    wall that yields with delay damps too, and a fit with it is the best that the sheet allows; with
+    the viscosity free and no wall the data are met to their noise."""
+    hypothesis = ((EFFECTS["viscoelastic_wall"], Place("segment 1")),)
+    points = {"points": ((1000, PRESSURE),), "source": 0.0, "noise": 500.0}
+    bench, recorded, _ = make(np.random.default_rng(5), values={"viscosity": 2.9e-4}, **points)
+    data = prepare(recorded, bench)
+    pool = Workers(Twin(bench, data), data)
+    base, wall = pool.fit([{"hypothesis": ()}, {"hypothesis": hypothesis}])
+    (found,) = without_each(pool, base, wall)
+    assert wall.evidence > base.evidence
+    assert found.refutes and found.parameter == "viscosity"
+    assert found.value == pytest.approx(2.9e-4, rel=0.02)
+    named = Judgement("ambiguous", wall, (("viscoelastic_wall", "side_branch"),))
+    assert examined(named, [found]) == Judgement("unexplained", wall)
+    assert examined(named, [replace(found, refutes=False)]) == named
+    assert examined(Judgement("consistent", base), [found]).verdict == "consistent"
 
 
 def test_loosened_is_never_tighter_than_stated():

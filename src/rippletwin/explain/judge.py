@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from rippletwin.explain.fit import Fit
 from rippletwin.explain.locate import extent
 from rippletwin.explain.posterior import FLOOR
 from rippletwin.explain.search import Search
+from rippletwin.explain.sheet import WithoutEffect
 from rippletwin.explain.thresholds import ACCEPT, GOOD, SURE
 from rippletwin.explain.validate import Validation
 
@@ -80,6 +81,19 @@ def judge(
         return Judgement("unexplained", other if stands_in else best)
     classes = equivalents(search)
     return Judgement("ambiguous" if classes else "named", best, classes)
+
+
+def examined(judgement: Judgement, without: Sequence[WithoutEffect]) -> Judgement:
+    """The judgement once it is known what a free data sheet would make of the data `without` each
+    accepted effect: no name is left where one of them refutes it.
+
+    What the explanation leaves in the data has then been put down to the ripple's error, and is
+    nothing of the kind: one number of the line, far from the sheet, accounts for it. Which is
+    missing neither the sheet nor the library says.
+    """
+    if judgement.verdict in ("named", "ambiguous") and any(w.refutes for w in without):
+        return replace(judgement, verdict="unexplained", equivalents=())
+    return judgement
 
 
 def _nothing_missing(base: Fit, alarms: Alarms, verdict: str = "consistent") -> Judgement:

@@ -18,7 +18,7 @@ from rippletwin.explain.answer import answered
 from rippletwin.explain.bootstrap import Chance, chance
 from rippletwin.explain.fit import Fit, fit_hypothesis, prepare
 from rippletwin.explain.intervals import profiled
-from rippletwin.explain.judge import Judgement, judge
+from rippletwin.explain.judge import Judgement, examined, judge
 from rippletwin.explain.posterior import FLOOR
 from rippletwin.explain.search import Search, again, search
 from rippletwin.explain.shaft import (
@@ -160,6 +160,7 @@ def explain_observations(
             by_chance = chance(found.base, data, draws, processes, progress)
         judgement = judge(found, alarms, checked, reason, by_chance)
         without = without_each(pool, found.base, judgement.accepted)
+        judgement = examined(judgement, without)
     return Explanation(
         rig=rig,
         observations=tuple(data),

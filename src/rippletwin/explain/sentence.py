@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rippletwin.explain import detect, locate
-from rippletwin.explain.judge import join, places, span
+from rippletwin.explain.judge import ADEQUATE, join, places, span
 from rippletwin.explain.run import Explanation
 
 CHANCE = {
@@ -58,9 +58,12 @@ def sentence(e: Explanation, result: dict, found: list[dict], base) -> str:
                 f"{result['stand_in']['follows']}."
             )
         elif found:
+            unaccounted = ""
+            if e.judgement.accepted.floor > ADEQUATE:
+                unaccounted = ", which the pump and the sensors do not account for"
             words.append(
                 f"Of what has a name {join(names)} comes nearest: misfit on unseen data "
-                f"{before:.1%} to {after:.1%}, which the pump and the sensors do not account for."
+                f"{before:.1%} to {after:.1%}{unaccounted}."
             )
             words += _against_the_sheet(e, ".")
     if kind in ("named", "ambiguous", "unexplained") and result["next_recording"]:

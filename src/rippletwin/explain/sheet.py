@@ -15,6 +15,7 @@ import numpy as np
 from rippletwin.case import Rig, Uncertainty
 from rippletwin.explain import detect
 from rippletwin.explain.fit import Fit
+from rippletwin.explain.posterior import FLOOR
 from rippletwin.explain.thresholds import ACCEPT
 from rippletwin.explain.validate import score
 from rippletwin.explain.workers import Workers, in_common
@@ -22,7 +23,9 @@ from rippletwin.parameters import coordinates
 from rippletwin.twin import Twin
 
 LOOSER, MOST = 20.0, 0.3  # times the stated uncertainty, and at most (relative, or m)
-NEARLY = 2.0  # times the accepted misfit: a fit as good as this could be taken for the explanation
+NEARLY = 2.0
+"""Times the accepted misfit: a fit as good as this could be taken for the explanation; one whose
+misfit is smaller by as much, what is below the model error aside, shows that it is none."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,8 @@ class WithoutEffect:
     value, nominal   its values, `unit`
     pull       how far that is, in standard deviations as stated
     rivals     whether the fit is nearly as good as the accepted one, or hardly any evidence is lost
+    refutes    whether it is so much better, and so far from the sheet, that what is accepted cannot
+               be what is missing
     """
 
     effect: str
@@ -47,6 +52,7 @@ class WithoutEffect:
     unit: str
     pull: float
     rivals: bool
+    refutes: bool
 
 
 def without_each(pool: Workers, base: Fit, accepted: Fit) -> tuple[WithoutEffect, ...]:
@@ -59,7 +65,7 @@ def without_each(pool: Workers, base: Fit, accepted: Fit) -> tuple[WithoutEffect
     held = [base]
     if len(rests) > 1:
         held = pool.fit([{"hypothesis": r, "starts": [in_common(accepted, r)]} for r in rests])
-    limit = NEARLY * score(accepted, pool.observations).misfit
+    reached = score(accepted, pool.observations).misfit
     found = []
     free = freed(pool, held, accepted)
     for (effect, _), stated, (misfit, fit) in zip(accepted.hypothesis, held, free):
@@ -77,7 +83,8 @@ def without_each(pool: Workers, base: Fit, accepted: Fit) -> tuple[WithoutEffect
                 nominal=parameter.nominal,
                 unit=parameter.unit,
                 pull=pull,
-                rivals=misfit < limit or lost < ACCEPT,
+                rivals=misfit < NEARLY * reached or lost < ACCEPT,
+                refutes=pull > detect.PULL and NEARLY * max(misfit, FLOOR) < reached,
             )
         )
     return tuple(found)

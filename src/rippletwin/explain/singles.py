@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rippletwin.explain.fit import Fit
+from rippletwin.explain.steps import weighed
 from rippletwin.explain.thresholds import GOOD
 from rippletwin.explain.workers import Workers, carry, counter, ranked
 
@@ -25,7 +26,7 @@ def alone(pool: Workers, found: Sequence, progress=None) -> tuple[Fit, list[Fit]
         tell = counter(progress, "weak effects", len(found))
         near = pool.fit([{"hypothesis": f.hypothesis, "fit": base} for f in singles], tell)
         singles = [max(pair, key=lambda f: f.evidence) for pair in zip(singles, near)]
-    return base, polish(pool, ranked(singles))
+    return base, weighed(pool, base, polish(pool, ranked(singles)))
 
 
 def _lowest(pool: Workers, base: Fit, singles: Sequence[Fit]) -> Fit:

@@ -7,11 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from rippletwin.explain.fit import Fit, Hypothesis
+from rippletwin.explain.posterior import FLOOR
 from rippletwin.explain.thresholds import ACCEPT, GOOD, needed_of
 from rippletwin.explain.workers import Workers, counter, dropping, in_common, ranked, scan
 
 MOST = 4  # effects at a time
 STAND_INS = 10  # single effects tried in the place of another
+NEAR = 10.0 * FLOOR  # relative model error from which derivatives of storage lead to the mode
 BETTER = 1.0  # log evidence by which what is put in the place of another must be better
 LIMITS = {"line_volume": (("load_volume", None), ("source_impedance", "volume"))}
 """Effects at any place, and what they are at the line's ends: name and form."""
@@ -31,7 +33,7 @@ def extensions(pool: Workers, best: Fit, found: Sequence, progress) -> list[Fit]
         # What is there may be right as it is, though far from all.
         near = pool.fit([{"hypothesis": f.hypothesis, "fit": best} for f in fits])
         fits = ranked([max(pair, key=lambda f: f.evidence) for pair in zip(fits, near)])
-    return fits
+    return weighed(pool, best, fits)
 
 
 def extended(best: Fit, candidate, rig) -> dict:
@@ -139,6 +141,22 @@ def backward(pool: Workers, best: Fit) -> Fit:
 def settled(pool: Workers, best: Fit) -> Fit:
     """The fit at its exact mode, where that takes derivatives of what the line stores: what is
     added to a fit that stopped short of it would be taken for what is missing."""
-    if not best.stores:
-        return best
-    return pool.fit([{"hypothesis": best.hypothesis, "theta": best.twin.theta}])[0]
+    return _exact(pool, [best])[0]
+
+
+def weighed(pool: Workers, best: Fit, step: list[Fit]) -> list[Fit]:
+    """A step's fits as they can be held against each other, best first: where the newest effect is
+    the first that stores something, its mode is narrow, and a fit that stopped short of it may have
+    lost all that the effect is worth. Far from the mode, where that takes long, nothing is lost."""
+    if best.stores:
+        return step
+    near = [f for f in step if f.floor <= NEAR]
+    return ranked([*_exact(pool, near), *(f for f in step if f.floor > NEAR)])
+
+
+def _exact(pool: Workers, fits: Sequence[Fit]) -> list[Fit]:
+    """The fits, at their exact mode those of lines that store beyond proportion."""
+    storing = [f for f in fits if f.stores]
+    again = pool.fit([{"hypothesis": f.hypothesis, "theta": f.twin.theta} for f in storing])
+    better = {id(f): new for f, new in zip(storing, again)}
+    return [better.get(id(f), f) for f in fits]
