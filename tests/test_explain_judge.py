@@ -98,12 +98,13 @@ def test_what_only_comes_nearest_has_no_name(floor, at, verdict):
 
 
 def test_every_effect_is_compared_with_its_relatives():
-    """Of hose and delay the delay was taken in first: the other effects of its sensor are fitted
-    beside the hose, one does as well, and both are a class. Of one effect alone nothing is asked:
-    every other has been tried."""
+    """Of hose and delay the delay was taken in first: the other effects of its sensor, and a delay
+    of the other sensor, are fitted beside the hose; they do as well, and are a class of names and
+    one of places. Of one effect alone nothing is asked: every other has been tried."""
     delay, dynamics = (
         (EFFECTS[n], Place("sensor p1", 0)) for n in ("sensor_delay", "sensor_dynamics")
     )
+    elsewhere = (EFFECTS["sensor_delay"], Place("sensor p2", 1))
     other = (EFFECTS["sensor_gain"], Place("sensor p2", 1))
     best, asked = fit(100.0, delay, HOSE), []
 
@@ -112,12 +113,12 @@ def test_every_effect_is_compared_with_its_relatives():
         return [fit(98.0, *job["hypothesis"]) for job in jobs]
 
     pool = SimpleNamespace(fit=answer)
-    found = relatives(pool, best, [HOSE, delay, dynamics, other, VOLUME])
-    assert asked == [(HOSE, dynamics)]
+    found = relatives(pool, best, [HOSE, delay, dynamics, elsewhere, other, VOLUME])
+    assert asked == [(HOSE, dynamics), (HOSE, elsewhere)]
     assert relatives(pool, fit(100.0, delay), [delay, dynamics]) == []
     search = Search(fit(0.0), [], best, found)
     assert equivalents(search) == (("sensor_delay", "sensor_dynamics"),)
-    assert places(search) == ()
+    assert places(search) == (("sensor_delay at sensor p1", "sensor_delay at sensor p2"),)
 
 
 @pytest.mark.parametrize(("large", "small"), [(LARGE, [SMALL]), (VOLUME, [END, SMALL])])

@@ -82,16 +82,17 @@ def exchange(pool: Workers, best: Fit, singles: Sequence[Fit], rounds: int = 2) 
 
 
 def relatives(pool: Workers, best: Fit, found: Sequence) -> list[Fit]:
-    """`best` with each of several effects exchanged for every other on the same element, best
-    first: those that might be taken for it were never tried beside what was taken in after it.
-    What no line is without is known to be there."""
+    """`best` with each of several effects exchanged for every other on the same element, and for
+    itself anywhere else, best first: those that might be taken for it were never tried beside what
+    was taken in after it, or from a line still far off. What no line is without is known to be
+    there."""
     members = best.hypothesis if len(best.hypothesis) > 1 else ()
     jobs = [
         {"hypothesis": (*best.without(k), candidate), "fit": best}
         for k, (effect, place) in enumerate(members)
         for candidate in found
-        if candidate[1].element == place.element and candidate not in best.hypothesis
-        if not effect.certain
+        if candidate[1].element == place.element or candidate[0].name == effect.name
+        if candidate not in best.hypothesis and not effect.certain
     ]
     return ranked(pool.fit(jobs))
 
