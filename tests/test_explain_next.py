@@ -106,7 +106,7 @@ def test_gains_of_two_sensors_are_one_class():
 
     best = fit("sensor_gain", "p1", 100.0)
     others = [fit("sensor_gain", "p2", 99.0), fit("sensor_delay", "p2", 10.0)]
-    search = SimpleNamespace(best=best, rivals=[best, *others])
+    search = SimpleNamespace(best=best, rivals=[best, *others], seats=[])
     assert places(search) == (("sensor_gain at sensor p1", "sensor_gain at sensor p2"),)
     assert rivals(search) == others[:1]
 

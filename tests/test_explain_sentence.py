@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from rippletwin.explain.sentence import at_one_pressure
 from rippletwin.explain.verdict import sentence
 
 
@@ -58,3 +59,19 @@ def test_the_pump_is_told_where_it_is_not_the_sheets():
     assert "its port plate 0.50 deg late" in sentence(e, result, [], None)
     timing["ci95"] = [-0.1, 1.1]
     assert "port plate" not in sentence(e, result, [], None)
+
+
+@pytest.mark.parametrize(
+    ("name", "pressures", "told"),
+    [
+        ("entrained_air", (9e6,), True),
+        ("entrained_air", (9e6, 9.1e6), True),
+        ("entrained_air", (9e6, 7e6), False),
+        ("unsteady_friction", (9e6,), False),
+    ],
+)
+def test_air_at_one_pressure_may_be_another_liquid(name, pressures, told):
+    """A liquid that stiffens by another law was called air where one pressure was recorded (sealed
+    trials 9 and 15): the words say so there, and nowhere else."""
+    (words,) = at_one_pressure([name, "leak"], pressures) or ("",)
+    assert ("any liquid that stiffens" in words) is told

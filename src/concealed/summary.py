@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.stats import beta
+from scipy.stats import binomtest
 
 from rippletwin.explain.thresholds import ACCEPT
 
@@ -27,10 +27,10 @@ class Rate:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Clopper and Pearson, Biometrika 26, 1934; (0, 1) of nothing."""
-        k, n = self.hits, self.count
-        low = beta.ppf(0.025, k, n - k + 1) if k else 0.0
-        high = beta.ppf(0.975, k + 1, n - k) if k < n else 1.0
+        """95 %, Clopper and Pearson, Biometrika 26, 1934; (0, 1) of nothing."""
+        if not self.count:
+            return 0.0, 1.0
+        low, high = binomtest(self.hits, self.count).proportion_ci()
         return float(low), float(high)
 
     def __str__(self) -> str:

@@ -13,13 +13,13 @@ from rippletwin.explain.fit import Fit
 from rippletwin.explain.locate import extent
 from rippletwin.explain.posterior import FLOOR
 from rippletwin.explain.search import Search
+from rippletwin.explain.seats import classes
 from rippletwin.explain.sheet import WithoutEffect
-from rippletwin.explain.thresholds import ACCEPT, GOOD, SURE
+from rippletwin.explain.thresholds import ACCEPT, EQUIVALENT, GOOD, SURE
 from rippletwin.explain.validate import Validation
 
 VERDICTS = ("consistent", "named", "ambiguous", "unexplained", "calibration_only", "bad_data")
 
-EQUIVALENT = 3.0
 """Log evidence within which two explanations cannot be told apart: twenty to one."""
 
 ADEQUATE = 2.0 * FLOOR
@@ -121,18 +121,24 @@ def equivalents(search: Search) -> tuple[tuple[str, ...], ...]:
 
 
 def places(search: Search) -> tuple[tuple[str, ...], ...]:
-    """Classes of places at which one effect does alike, as of two sensors' gains of which
-    only the ratio is seen: "name at place" each. The effect has a name all the same."""
+    """Classes of places at which one effect does alike, as of two sensors' gains of which only the
+    ratio is seen, or along the line: "name at place" each. The effect has a name all the same."""
     found = []
     for (own, place), stand_ins in _stand_ins(search):
         at = {f"{own} at {where}" for (fit, where), name in stand_ins if name == own}
         found.append(tuple(sorted({f"{own} at {place}", *at})))
-    return tuple(names for names in found if len(names) > 1)
+    return (*(names for names in found if len(names) > 1), *classes(search.best, _seats(search)))
 
 
 def rivals(search: Search) -> list[Fit]:
-    """Fits as good as the best explanation that differ from it in one effect."""
-    return [fit for _, stand_ins in _stand_ins(search) for (fit, _), _ in stand_ins]
+    """Fits as good as the best explanation that differ from it in one effect, or in its place."""
+    others = [fit for _, stand_ins in _stand_ins(search) for (fit, _), _ in stand_ins]
+    return [*others, *_seats(search)]
+
+
+def _seats(search: Search) -> list[Fit]:
+    """The search's seats that are still those of its best explanation."""
+    return [f for f in search.seats if set(f.hypothesis) == set(search.best.hypothesis)]
 
 
 def _stand_ins(search: Search) -> list[tuple[tuple, list[tuple]]]:

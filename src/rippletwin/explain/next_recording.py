@@ -58,7 +58,7 @@ def propose(accepted: Fit, rivals: Sequence[Fit], observations: Sequence) -> Pro
 
     `observations` are those that were fitted: the next one has their kind of noise and source.
     """
-    rivals = [fit for fit in rivals if fit.hypothesis != accepted.hypothesis]
+    rivals = [fit for fit in rivals if fit is not accepted]
     if not rivals:
         return None
     best = None

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from rippletwin.effects import Effect, Place, candidates
 from rippletwin.explain.fit import Fit
+from rippletwin.explain.seats import seated
 from rippletwin.explain.singles import alone
 from rippletwin.explain.steps import (
     BETTER,
@@ -47,6 +48,7 @@ class Search:
     best     the accepted hypothesis (may be the base)
     rivals   fits of every step that took effects in or could have: alternatives to `best`
     others   passive networks that compete, best first
+    seats    `best` with an effect elsewhere along the line that does as well, best first
     """
 
     base: Fit
@@ -54,6 +56,7 @@ class Search:
     best: Fit
     rivals: list[Fit] = field(default_factory=list)
     others: list[Fit] = field(default_factory=list)
+    seats: list[Fit] = field(default_factory=list)
 
     def gain(self, fit: Fit) -> float:
         """Log evidence over the base."""
@@ -92,20 +95,27 @@ def _stepwise(pool: Workers, begun: Search, found: Sequence, progress) -> Search
     if best.hypothesis:
         step = extensions(pool, best, found, progress)
     while True:
-        new = step[0] if step else None
-        if new is None or new.evidence - best.evidence < needed(new):
-            certain = [f for f in step if f.hypothesis[-1][0].certain]
-            # What no line is without is taken in with something else, never alone.
-            if not (best.hypothesis and certain):
+        new = _taken(best, step)
+        if new is None:
+            moved, seats = seated(pool, best)
+            if moved is best:
                 break
-            new = certain[0]
-            if new.evidence - best.evidence < CERTAIN:
-                break
-        best, rivals = new, rivals if step is singles else [*rivals, *step]
-        best = simplify(pool, exchange(pool, backward(pool, best), singles), found)
-        best = settled(pool, best)
+            best = moved
+        else:
+            best, rivals = new, rivals if step is singles else [*rivals, *step]
+            best = simplify(pool, exchange(pool, backward(pool, best), singles), found)
+            best = settled(pool, best)
         step = extensions(pool, best, found, progress)
     close = relatives(pool, best, found)
     if close and close[0].evidence > best.evidence + BETTER:
-        best = close[0]
-    return Search(base, singles, best, [*rivals, *close])
+        best, seats = seated(pool, close[0])
+    return Search(base, singles, best, [*rivals, *close], seats=seats)
+
+
+def _taken(best: Fit, step: Sequence[Fit]) -> Fit | None:
+    """The fit of a step that goes on from `best`; None where none adds what is needed."""
+    if step and step[0].evidence - best.evidence >= needed(step[0]):
+        return step[0]
+    # What no line is without is taken in with something else, never alone.
+    certain = [f for f in step if f.hypothesis[-1][0].certain] if best.hypothesis else []
+    return certain[0] if certain and certain[0].evidence - best.evidence >= CERTAIN else None

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from rippletwin.explain import detect, locate
 from rippletwin.explain.judge import ADEQUATE, join, places, span
 from rippletwin.explain.run import Explanation
 
+SAME = 0.05  # relative; mean pressures closer than this are one
 CHANCE = {
     "consistent": "The recordings are what the twin predicts within the data sheet's tolerances.",
     "calibration_only": "The line's nominal values are off by more than their stated tolerances, "
@@ -42,6 +45,9 @@ def sentence(e: Explanation, result: dict, found: list[dict], base) -> str:
                 ] = None
         words += numbers
         words += _against_the_sheet(e, ", which is what rejects it.")
+        words += at_one_pressure(
+            [f["effect"].name for f in found], [o.load_pressure for o in e.observations]
+        )
         if kind == "ambiguous":
             classes = "; ".join(join(names) for names in result["equivalents"])
             words.append(f"These recordings cannot tell apart {classes}.")
@@ -116,6 +122,19 @@ def _against_the_sheet(e: Explanation, end: str) -> list[str]:
         f"data sheet{end}"
         for w in e.without
         if w.rivals and w.pull > detect.PULL
+    ]
+
+
+def at_one_pressure(names: Sequence[str], pressures: Sequence[float | None]) -> list[str]:
+    """What else accepted effects `names` may be where all `pressures` (Pa) are one: air is any
+    liquid that yields less the more it is pressed. What tells their laws apart is how that goes
+    on from one pressure to another."""
+    known = [p for p in pressures if p is not None]
+    if "entrained_air" not in names or not known or max(known) > (1 + SAME) * min(known):
+        return []
+    return [
+        "At one mean pressure any liquid that stiffens as it is compressed would do as well as "
+        "air: record at another."
     ]
 
 

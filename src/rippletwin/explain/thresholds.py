@@ -14,6 +14,7 @@ SURE = 2.0 * ACCEPT
 """Log evidence from which something is missing even where the line fits without and no explanation
 holds on data left out."""
 
+EQUIVALENT = 3.0  # two explanations closer than this cannot be told apart: twenty to one
 CERTAIN = -3.0  # the same for an effect that no real line is without: twenty to one against it
 GOOD = 1.25 * FLOOR  # relative model error at which a fit is as good as it can be believed
 

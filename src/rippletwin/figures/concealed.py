@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from scipy.stats import binomtest
 
 from rippletwin.figures import style
 
@@ -110,7 +111,7 @@ def bias(rows: list[dict]) -> Figure:
 
 def probabilities(rows: list[dict]) -> Figure:
     """Stated probability of named effects against how often such a name is right, pooled between
-    the values of STATED."""
+    the values of STATED, with exact 95 % intervals."""
     stated = np.array([pair for r in rows for pair in r["stated"]], float).reshape(-1, 2)
     pool = np.digitize(stated[:, 0], STATED)
     fig, axes = style.figure(1, 1, height=2.6)
@@ -120,7 +121,8 @@ def probabilities(rows: list[dict]) -> Figure:
         group = stated[pool == k]
         if len(group):
             p, right = group.mean(axis=0)
-            spread = np.sqrt(max(right * (1 - right), 0.25 / len(group)) / len(group))
+            low, high = binomtest(int(group[:, 1].sum()), len(group)).proportion_ci()
+            spread = [[right - low], [high - right]]
             ax.errorbar(p, right, spread, fmt="o", color=style.CORRECTED, ms=4, capsize=2)
     ax.set_xlabel("stated probability, pooled at 0.5, 0.9 and 0.99")
     ax.set_ylabel("share that is right")
