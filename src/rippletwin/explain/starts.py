@@ -20,6 +20,7 @@ line, all wave speeds are scaled together."""
 PROMISING, ALIKE = 4, 0.7
 """How many of the starts about a good fit are followed, and the correlation of what two of them do
 above which they are one."""
+ANGLES = 16  # in a turn of the highest order
 MOST = 0.1
 """Largest model error before the last limit: more would leave the fit to its priors, and it would
 never leave a wrong valley."""
@@ -89,11 +90,12 @@ def align(posterior: Posterior, theta: np.ndarray) -> tuple[float, np.ndarray]:
         free = np.sum(np.abs(weighted))
         index = twin.index.get(f"angle[{o.label}]")
         if index is not None and not posterior.source_free:
-            order = np.gcd.reduce(np.asarray(o.orders, int))
-            orders = np.asarray(o.orders) / order
-            grid = 2 * np.pi * np.arange(int(16 * orders[-1])) / int(16 * orders[-1])
-            likeness = (np.exp(-1j * np.outer(grid, orders)) @ weighted).real
-            turn = grid[np.argmax(likeness)] / order
+            orders = np.asarray(o.orders, int)
+            order = np.gcd.reduce(orders)
+            lines = np.zeros(ANGLES * orders[-1] // order, complex)
+            lines[orders // order] = weighted
+            likeness = np.fft.fft(lines).real
+            turn = 2 * np.pi * np.argmax(likeness) / (len(lines) * order)
             free = np.max(likeness)
             parameter = twin.parameters[index]
             angle = parameter.value(theta[index]) + turn
