@@ -12,22 +12,20 @@ from collections.abc import Sequence
 import numpy as np
 
 from rippletwin.explain.fit import Fit
+from rippletwin.explain.steps import BETTER
 from rippletwin.explain.thresholds import EQUIVALENT
 from rippletwin.explain.workers import Workers, carry, ranked
 
 PLACES = 2  # on the shortest wave: as many valleys
-BETTER = 1.0  # log evidence by which another seat must be better
 APART = 0.25  # of the shortest wave, by which two seats differ
 
 
-def seated(pool: Workers, best: Fit, rounds: int = 3) -> tuple[Fit, list[Fit]]:
+def seated(pool: Workers, best: Fit) -> tuple[Fit, list[Fit]]:
     """`best`, or what it becomes in a better seat, and the fits with one effect in another seat
     within EQUIVALENT of it, best first."""
-    for _ in range(rounds):
-        found = seats(pool, best)
-        if not found or found[0].evidence < best.evidence + BETTER:
-            break
-        best = found[0]
+    found = seats(pool, best)
+    if found and found[0].evidence > best.evidence + BETTER:
+        return seated(pool, found[0])
     return best, [f for f in found if f.evidence > best.evidence - EQUIVALENT]
 
 
@@ -39,8 +37,7 @@ def seats(pool: Workers, best: Fit) -> list[Fit]:
     """
     if best.stores:
         return []
-    delay = max(best.twin.rig.delay, 1e-9)
-    waves = delay * max(o.frequency_hz[-1] for o in pool.observations)
+    waves = best.twin.rig.delay * max(o.frequency_hz[-1] for o in pool.observations)
     count, apart = int(np.ceil(PLACES * waves)), APART * best.twin.rig.length / waves
     taken = [positions(best)]
     jobs = []

@@ -14,7 +14,7 @@ from rippletwin.explain.workers import Workers, counter, dropping, in_common, ra
 MOST = 4  # effects at a time
 STAND_INS = 10  # single effects tried in the place of another
 NEAR = 10.0 * FLOOR  # relative model error from which derivatives of storage lead to the mode
-BETTER = 1.0  # log evidence by which what is put in the place of another must be better
+BETTER = 1.0  # log evidence by which what is put in the place of another, or elsewhere, is better
 LIMITS = {"line_volume": (("load_volume", None), ("source_impedance", "volume"))}
 """Effects at any place, and what they are at the line's ends: name and form."""
 
