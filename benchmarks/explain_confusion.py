@@ -25,16 +25,16 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from rippletwin.case import load_case
-from rippletwin.explain.fit import prepare
-from rippletwin.explain.metric import smooth_basis
-from rippletwin.explain.run import HIGHEST_HZ
-from rippletwin.explain.search import library
-from rippletwin.explain.singles import alone
-from rippletwin.explain.workers import workers
-from rippletwin.misfit import relative_misfit
-from rippletwin.spectra import observe
-from rippletwin.twin import Twin
+from rippletwin.calibration.misfit import relative_misfit
+from rippletwin.calibration.whitening import smooth_basis
+from rippletwin.case.load import load_case
+from rippletwin.explanation.explain import HIGHEST_HZ
+from rippletwin.explanation.fit_jobs import open_workers
+from rippletwin.explanation.search.single_effects import fit_single_effects
+from rippletwin.explanation.search.stepwise_search import applicable_candidates
+from rippletwin.spectra.frequency_selection import select_fitted_frequencies
+from rippletwin.spectra.observation import observe
+from rippletwin.twin.twin import Twin
 
 SOURCE = 0.02
 ALIKE = 3.0  # log evidence: twenty to one
@@ -43,7 +43,7 @@ ALIKE = 3.0  # log evidence: twenty to one
 def truths(rig, observations) -> list:
     """Each effect once: in the line's second segment or at its first place."""
     chosen = {}
-    for effect, place in library(rig, observations):
+    for effect, place in applicable_candidates(rig, observations):
         if effect.name not in chosen or place.element == "segment 2":
             chosen[effect.name] = (effect, place)
     return list(chosen.values())
@@ -86,8 +86,8 @@ def _complex(rng, *shape) -> np.ndarray:
 
 def best_of_each(rig, observations, processes: int) -> dict[str, tuple[float, str]]:
     """Name -> (log evidence over the paper's line, place) of each effect at its best place."""
-    with workers(Twin(rig, observations), observations, processes) as pool:
-        base, singles = alone(pool, library(rig, observations))
+    with open_workers(Twin(rig, observations), observations, processes) as pool:
+        base, singles = fit_single_effects(pool, applicable_candidates(rig, observations))
     best = {}
     for fit in singles:  # best first
         best.setdefault(fit.names[0], (fit.evidence - base.evidence, str(fit.hypothesis[0][1])))
@@ -122,7 +122,7 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=2)
     options = parser.parse_args()
     case = load_case(options.case, states={"healthy"})
-    observations = prepare(
+    observations = select_fitted_frequencies(
         [observe(r, case.rig, HIGHEST_HZ) for r in case.healthy], case.rig, HIGHEST_HZ
     )
     rows = []

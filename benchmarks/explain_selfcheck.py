@@ -25,19 +25,20 @@ from pathlib import Path
 
 import numpy as np
 
-from rippletwin.case import FlowRipple, Fluid, Load, Rig, Segment, Sensor
-from rippletwin.effects import candidates
-from rippletwin.explain.fit import refine
-from rippletwin.explain.intervals import effects_own, intervals
-from rippletwin.explain.judge import span
-from rippletwin.explain.run import explain_observations
-from rippletwin.explain.search import library
-from rippletwin.explain.verdict import verdict
-from rippletwin.forward import Forward
-from rippletwin.misfit import relative_misfit
-from rippletwin.pump import ConstantPressure, simulate
-from rippletwin.spectra import Observation
-from rippletwin.twin import Twin
+from rippletwin.calibration.frequency_continuation import refine
+from rippletwin.calibration.misfit import relative_misfit
+from rippletwin.case.model import FlowRipple, Fluid, Load, Rig, Segment, Sensor
+from rippletwin.explanation.checks.profile_intervals import effect_intervals, own_parameter_indices
+from rippletwin.explanation.explain import explain_observations
+from rippletwin.explanation.search.stepwise_search import applicable_candidates
+from rippletwin.explanation.verdict.places import element_and_extent
+from rippletwin.explanation.verdict.verdict_file import verdict_dict
+from rippletwin.pump.outlets import ConstantPressure
+from rippletwin.pump.simulation import simulate
+from rippletwin.spectra.observation import Observation
+from rippletwin.twin.effects.library import candidates
+from rippletwin.twin.forward_model import ForwardModel
+from rippletwin.twin.twin import Twin
 
 REVOLUTIONS, SAMPLES = 160, 3072
 DETECTABLE = 15.0  # log evidence of the true explanation, fitted from the truth, over none
@@ -150,7 +151,7 @@ def draw(rng, kind: str, geometry: bool = False):
             theta[k] = rng.uniform(-np.pi / 9, np.pi / 9) / 0.01
     true = [replace(o, flow_ripple=r) for o, r in zip(observations, true_ripples)]
     recorded = []
-    for o, h in zip(observations, Forward(twin, true)(theta)):
+    for o, h in zip(observations, ForwardModel(twin, true)(theta)):
         error = rng.normal(size=(*h.shape, 2)) @ np.array([1, 1j]) / np.sqrt(2)
         recorded.append(replace(o, values=h + error * np.sqrt(o.covariance[0, 0, 0].real)))
     return rig, recorded, twin.with_(theta=theta)
@@ -158,7 +159,7 @@ def draw(rng, kind: str, geometry: bool = False):
 
 def draw_effects(rng, rig, observations, count: int) -> tuple:
     """`count` different effects at places of theirs, every effect equally likely."""
-    allowed = library(rig, observations)
+    allowed = applicable_candidates(rig, observations)
     names = sorted({effect.name for effect, _ in allowed})
     chosen = rng.permutation(names)[:count]
     found = []
@@ -176,7 +177,7 @@ def run_case(number: int, kind: str, geometry: bool = False) -> dict:
     start = time.process_time()
     e = explain_observations(rig, observations, processes=1)
     seconds = time.process_time() - start
-    v = verdict(e)
+    v = verdict_dict(e)
     at = dict(zip((p.name for p in truth.parameters), truth.theta))
     parameters = base.with_(effects=truth.effects).parameters
     theta = np.array([at.get(p.name, 0.0) for p in parameters])
@@ -224,13 +225,15 @@ def placed(rig, truth, e) -> bool | None:
     for effect, place, values in truth.effect_values(truth.theta):
         own[effect.name] = (place, values)
     results = []
-    for entry in intervals(e.judgement.accepted):
+    for entry in effect_intervals(e.judgement.accepted):
         name = entry["effect"].name
         if name not in own:
             continue
         place, values = own[name]
         if "position" in values:
-            low, high = span(rig, entry["effect"], entry["place"], entry["parameters"])[1]
+            low, high = element_and_extent(
+                rig, entry["effect"], entry["place"], entry["parameters"]
+            )[1]
             results.append(low - 0.25 <= float(values["position"]) <= high + 0.25)
         else:
             results.append(place.element == entry["place"].element)
@@ -240,7 +243,7 @@ def placed(rig, truth, e) -> bool | None:
 def held(truth, accepted) -> list[bool]:
     """Whether the 95 % intervals of the effects' parameters hold the truth."""
     found = []
-    for _, _, own in effects_own(accepted.twin):
+    for _, _, own in own_parameter_indices(accepted.twin):
         for k in own:
             name = accepted.twin.parameters[k].name
             if name in truth.index:

@@ -12,9 +12,14 @@ import numpy as np
 import torch
 
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor
-from rippletwin.flow_sensor import band_limit, estimate_flow, network_of, pinn
-from rippletwin.pump import ConstantPressure, Slipper, simulate
-from rippletwin.twin import Twin
+from rippletwin.flow_sensor import pinn
+from rippletwin.flow_sensor.estimate import band_limit
+from rippletwin.flow_sensor.line_response import network_of
+from rippletwin.flow_sensor.spectral_inversion import estimate_flow
+from rippletwin.pump.faults import Slipper
+from rippletwin.pump.outlets import ConstantPressure
+from rippletwin.pump.simulation import simulate
+from rippletwin.twin.twin import Twin
 
 SPEED, PRESSURE, BAND, SAMPLES, WINDOWS = 1000 / 60, 9.484e6, 1500.0, 3072, 40
 SENSORS = {

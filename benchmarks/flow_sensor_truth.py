@@ -25,19 +25,26 @@ import numpy as np
 import torch
 import yaml
 
-from rippletwin import twin_file
-from rippletwin.calibrate import Settings, calibrate
-from rippletwin.case import Case, load_case
-from rippletwin.dataset import augment
-from rippletwin.explain.run import explain
-from rippletwin.flow_sensor import band_limit, estimate_flow, network_of, pinn
-from rippletwin.networks import build
-from rippletwin.pump import ConstantPressure, Cylinder, Slipper, simulate
-from rippletwin.report import load_twin
-from rippletwin.revolutions import cut_revolutions
-from rippletwin.spectra import noise_cycle_scatter, noise_mad, observe
-from rippletwin.training import TrainingSettings, predict, train
-from rippletwin.twin import Twin
+from rippletwin.calibration.calibrate import Settings, calibrate
+from rippletwin.case.load import load_case
+from rippletwin.case.model import Case
+from rippletwin.explanation.explain import explain
+from rippletwin.flow_sensor import pinn
+from rippletwin.flow_sensor.estimate import band_limit
+from rippletwin.flow_sensor.line_response import network_of
+from rippletwin.flow_sensor.spectral_inversion import estimate_flow
+from rippletwin.learning.dataset import augment
+from rippletwin.learning.networks import build
+from rippletwin.learning.training import TrainingSettings, predict, train
+from rippletwin.pump.faults import Cylinder, Slipper
+from rippletwin.pump.outlets import ConstantPressure
+from rippletwin.pump.simulation import simulate
+from rippletwin.spectra.angular_resampling import cut_revolutions
+from rippletwin.spectra.noise import noise_cycle_scatter, noise_mad
+from rippletwin.spectra.observation import observe
+from rippletwin.twin import twin_file
+from rippletwin.twin.twin import Twin
+from rippletwin.twin.twin_file import load_twin
 
 RIG = Path(__file__).resolve().parent.parent / "src" / "virtualrig"
 THIRD, THIRD_ERROR = 4.6, 0.012  # m: where the sheet has the third sensor, and how far off that is

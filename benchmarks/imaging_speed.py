@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-from rippletwin.imaging import SstSettings, sst_images, synchrosqueeze
+from rippletwin.learning.synchrosqueezing import SstSettings, sst_images, synchrosqueeze
 
 RATE, POINTS = 51200.0, 6144  # two revolutions at 1000 r/min
 

@@ -12,11 +12,11 @@ import time
 
 import numpy as np
 
-from rippletwin.line.balance import balance_orifice
-from rippletwin.line.chain import Network
-from rippletwin.line.moc import simulate
-from rippletwin.line.parts import End, Line, Pipe
-from rippletwin.line.segment import series_impedance, shunt_admittance
+from harmonic_balance import balance_orifice
+from rippletwin.line.frequency_domain.line_network import Network
+from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
+from rippletwin.line.time_domain.line_elements import End, Line, Pipe
+from rippletwin.line.time_domain.method_of_characteristics import simulate
 
 DENSITY, VISCOSITY = 870.0, 3.2e-5
 PIPES = (

@@ -16,17 +16,21 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from rippletwin.case import Case, load_case
-from rippletwin.effects import EFFECTS, Place
-from rippletwin.explain.fit import Fit, Hypothesis, prepare, refine
-from rippletwin.explain.run import explain
-from rippletwin.explain.sheet import loosened
-from rippletwin.explain.validate import score
-from rippletwin.explain.verdict import write
-from rippletwin.figures.explain import draw
-from rippletwin.forward import reflection
-from rippletwin.spectra import observe
-from rippletwin.twin import Twin
+from rippletwin.calibration.fit import Fit, Hypothesis
+from rippletwin.calibration.frequency_continuation import refine
+from rippletwin.calibration.misfit import score_fit
+from rippletwin.case.load import load_case
+from rippletwin.case.model import Case
+from rippletwin.explanation.checks.prior_sensitivity import widen_priors
+from rippletwin.explanation.explain import explain
+from rippletwin.explanation.verdict.verdict_file import write_verdict
+from rippletwin.figures.explanation import draw
+from rippletwin.spectra.frequency_selection import select_fitted_frequencies
+from rippletwin.spectra.observation import observe
+from rippletwin.twin.effects.base import Place
+from rippletwin.twin.effects.library import EFFECTS
+from rippletwin.twin.forward_model import reflection
+from rippletwin.twin.twin import Twin
 
 SHEET = Path(__file__).resolve().parent.parent / "resources" / "air_tube" / "rig.yaml"
 ACOUSTICS: Hypothesis = (
@@ -67,7 +71,9 @@ def another_day(fit: Fit, observation) -> tuple[Fit, float]:
         return replace(fit, twin=fit.twin.with_(theta=theta))
 
     found = minimize_scalar(
-        lambda ratio: score(at(ratio), [observation]).misfit, bounds=(0.99, 1.01), method="bounded"
+        lambda ratio: score_fit(at(ratio), [observation]).misfit,
+        bounds=(0.99, 1.01),
+        method="bounded",
     )
     return at(found.x), float(found.x)
 
@@ -86,12 +92,12 @@ def main() -> None:
     arguments = parser.parse_args()
     cases = [case(run, arguments.folder / f"run_{k + 1}") for k, run in enumerate(arguments.runs)]
     whole = [observe(c.recordings[0], c.rig) for c in cases]
-    rig, data = cases[0].rig, prepare(whole[:1], cases[0].rig)
+    rig, data = cases[0].rig, select_fitted_frequencies(whole[:1], cases[0].rig)
     print(f"the runs differ by {difference(*whole):.2%} of the reflection coefficient\n")
     print("| | run 1 | run 2 | bore |\n|---|---|---|---|")
 
     def row(words: str, fit: Fit) -> None:
-        one, two = (score(fit, [o]).misfit for o in whole)
+        one, two = (score_fit(fit, [o]).misfit for o in whole)
         bore = fit.twin.values()["diameter[1]"]
         print(f"| {words} | {one:.1%} | {two:.1%} | {1e3 * bore:.2f} mm |", flush=True)
 
@@ -100,7 +106,7 @@ def main() -> None:
         words = "nothing fitted: steady friction" if not names else f"... {names[-1]}"
         row(words, nothing_fitted(fitted(rig, data, ACOUSTICS[:count])))
     row("steady friction, calibrated to run 1", fitted(rig, data, ()))
-    loose = loosened(rig)
+    loose = widen_priors(rig)
     row("... without the sheet's tolerances", fitted(loose, data, ()))
     row("unsteady friction, without the sheet's tolerances", fitted(loose, data, ACOUSTICS[:1]))
     explanation = explain(cases[0], processes=1)
@@ -108,7 +114,7 @@ def main() -> None:
     row("**explained**: " + ", ".join(accepted.names).replace("_", " "), accepted)
     warmer, ratio = another_day(accepted, whole[1])
     row(f"... with the wave speed {ratio - 1:+.2%}, that of run 2", warmer)
-    result = write(explanation, arguments.folder / "explained")
+    result = write_verdict(explanation, arguments.folder / "explained")
     draw(explanation, arguments.folder / "explained")
     print("\n" + result["sentence"])
 

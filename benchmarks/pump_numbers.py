@@ -14,8 +14,8 @@ import argparse
 
 import numpy as np
 
-from rippletwin.case import Fluid
-from rippletwin.pump import ripple_change
+from rippletwin.case.model import Fluid
+from rippletwin.pump.ripple_sensitivity import ripple_change
 from virtualrig.draw import draw
 from virtualrig.pump import Pump
 from virtualrig.source import constant_pressure_flow

@@ -16,9 +16,9 @@ import time
 import torch
 from torch import nn
 
-from rippletwin.architectures import ARCHITECTURES
-from rippletwin.networks import build
-from rippletwin.training import MALLOC_ENVIRONMENT
+from rippletwin.learning.architectures import ARCHITECTURES
+from rippletwin.learning.networks import build
+from rippletwin.learning.training import MALLOC_ENVIRONMENT
 
 
 def main() -> None:

@@ -16,8 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rippletwin.revolutions import cut_revolutions
-from rippletwin.wander import at_mean_speed, mean_speed
+from rippletwin.spectra.angular_resampling import cut_revolutions
+from rippletwin.spectra.speed_regression import harmonics_at_mean_speed, mean_speed
 from virtualrig.recorder import SAMPLING_RATE_HZ, Point, record
 from virtualrig.rig import SHEET, build, read_yaml
 
@@ -55,7 +55,12 @@ def harmonics(take, speed_rpm: float):
     orders = PISTONS * np.arange(1, int(HIGHEST_HZ / speed / PISTONS) + 1)
     spectra = 2 * np.fft.rfft(revolutions.windows, axis=2)[:, :, orders]
     spectra /= revolutions.windows.shape[2]
-    return speed, orders, spectra.mean(0), at_mean_speed(spectra, revolutions.speed_hz, orders)[0]
+    return (
+        speed,
+        orders,
+        spectra.mean(0),
+        harmonics_at_mean_speed(spectra, revolutions.speed_hz, orders)[0],
+    )
 
 
 def apart(values, even, orders) -> tuple[float, float]:

@@ -4,15 +4,15 @@ from collections.abc import Mapping, Sequence
 from itertools import product
 from pathlib import Path
 
-from rippletwin.case import load_case
-from rippletwin.explain.fit import Fit, Hypothesis
-from rippletwin.explain.posterior import Posterior
-from rippletwin.explain.run import begin, observed
-from rippletwin.explain.search import library
-from rippletwin.explain.starts import align
-from rippletwin.explain.workers import Workers, carry
-from rippletwin.parameters import coordinates
-from rippletwin.twin import Twin
+from rippletwin.calibration.fit import Fit, Hypothesis
+from rippletwin.calibration.multistart import align_shaft_angles
+from rippletwin.calibration.posterior import Posterior
+from rippletwin.case.load import load_case
+from rippletwin.explanation.explain import observe_whole_and_halves, prepare_base
+from rippletwin.explanation.fit_jobs import Workers, transfer_theta
+from rippletwin.explanation.search.stepwise_search import applicable_candidates
+from rippletwin.twin.parameters import coordinates
+from rippletwin.twin.twin import Twin
 
 
 def worth(case_folder: str | Path, truth: dict) -> float | None:
@@ -21,7 +21,9 @@ def worth(case_folder: str | Path, truth: dict) -> float | None:
     if not truth["effects"]:
         return None
     case = load_case(case_folder, states={"healthy"})
-    base, data = begin(case.rig, [observed(each, case.rig)[0] for each in case.healthy])
+    base, data = prepare_base(
+        case.rig, [observe_whole_and_halves(each, case.rig)[0] for each in case.healthy]
+    )
     rig = truth["seal"]
     line = {"viscosity": rig["fluid"]["kinematic_viscosity"]}
     for k, segment in enumerate(rig["line"]["segments"], 1):
@@ -40,7 +42,7 @@ def worth_in(
     nothing has failed. None where nothing can be added: an effect that the library has not, or one
     at shaft orders alone.
     """
-    pool, found = Workers(base, data), library(base.rig, data)
+    pool, found = Workers(base, data), applicable_candidates(base.rig, data)
     choices = [
         [c for c in found if (c[0].name, c[1].element) == (true["name"], true["element"])]
         for true in effects
@@ -53,9 +55,13 @@ def worth_in(
         theta = coordinates(twin.parameters, {**line, **values})
         start = {name: theta[twin.index[name]] for name in values}
         jobs.append({"hypothesis": hypothesis, "starts": [start]})
-        jobs.append({"hypothesis": hypothesis, "theta": align(Posterior(twin, data), theta)[1]})
+        jobs.append(
+            {"hypothesis": hypothesis, "theta": align_shaft_angles(Posterior(twin, data), theta)[1]}
+        )
     known = _best(pool.fit(jobs))
-    without = pool.fit([{"hypothesis": ()}, {"hypothesis": (), "theta": carry(known, (), base)}])
+    without = pool.fit(
+        [{"hypothesis": ()}, {"hypothesis": (), "theta": transfer_theta(known, (), base)}]
+    )
     return known.evidence - _best(without).evidence
 
 

@@ -9,7 +9,7 @@ from itertools import product
 
 import numpy as np
 
-from rippletwin.likelihood import Likelihood
+from rippletwin.calibration.likelihood import Likelihood
 
 LITTLE = {"normal": 0.2, "lognormal": -2.0, "uniform": 0.0}
 """Coordinate of a parameter that is not scanned, by the kind of its prior: a weak effect."""

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.stats import binomtest
 
-from rippletwin.explain.thresholds import ACCEPT
+from rippletwin.explanation.thresholds import ACCEPT
 
 CHANGES = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, np.inf)
 NEAR_FLOOR = 1.2

@@ -14,13 +14,13 @@ from types import SimpleNamespace
 import numpy as np
 
 from concealed.sparse import pick
-from rippletwin.case import load_case
-from rippletwin.explain.run import explain
-from rippletwin.explain.search import library
-from rippletwin.explain.verdict import write
-from rippletwin.likelihood import Likelihood
-from rippletwin.misfit import misfit
-from rippletwin.report import segment_table
+from rippletwin.calibration.likelihood import Likelihood
+from rippletwin.calibration.misfit import misfit
+from rippletwin.calibration.report import segment_table
+from rippletwin.case.load import load_case
+from rippletwin.explanation.explain import explain
+from rippletwin.explanation.search.stepwise_search import applicable_candidates
+from rippletwin.explanation.verdict.verdict_file import write_verdict
 
 
 def main(case_folder: str, out: str, processes: int = 1) -> None:
@@ -29,7 +29,7 @@ def main(case_folder: str, out: str, processes: int = 1) -> None:
     out = Path(out)
     try:
         explanation = explain(load_case(case_folder, states={"healthy"}), processes)
-        write(explanation, out)
+        write_verdict(explanation, out)
         seconds = time.perf_counter() - started
     except Exception as error:  # whatever it is: one case must not end the trial
         traceback.print_exc()
@@ -85,13 +85,13 @@ def baselines(explanation) -> dict:
             "corrected": segment_table(_as_calibration(accepted)),
         },
         "bic": bic(explanation),
-        "sparse": pick(base, library(explanation.rig, observations), observations),
+        "sparse": pick(base, applicable_candidates(explanation.rig, observations), observations),
     }
 
 
 def turned(likelihood: Likelihood) -> np.ndarray:
     """Nominal coordinates with each recording's shaft angle where the prediction fits best."""
-    from rippletwin.calibrate import align
+    from rippletwin.calibration.calibrate import align
 
     return align(likelihood, np.zeros(len(likelihood.twin.parameters)))
 

@@ -19,10 +19,10 @@ def check(commands) -> None:
     parser.add_argument("case", help="a folder with a rig.yaml")
 
     def run(arguments) -> int:
-        from rippletwin.case import load_case
-        from rippletwin.case.report import report
+        from rippletwin.case.load import load_case
+        from rippletwin.spectra.case_summary import summarise_case
 
-        for line in report(load_case(arguments.case)):
+        for line in summarise_case(load_case(arguments.case)):
             print(line)
         return 0
 
@@ -43,12 +43,12 @@ def calibrate(commands) -> None:
     parser.add_argument("--max-frequency", type=float, metavar="HZ", help="use nothing above it")
 
     def run(arguments) -> int:
-        from rippletwin import report
-        from rippletwin.calibrate import Settings
-        from rippletwin.calibrate import calibrate as fit
-        from rippletwin.case import load_case
-        from rippletwin.spectra import observe
-        from rippletwin.twin import Twin
+        from rippletwin.calibration import report
+        from rippletwin.calibration.calibrate import Settings
+        from rippletwin.calibration.calibrate import calibrate as fit
+        from rippletwin.case.load import load_case
+        from rippletwin.spectra.observation import observe
+        from rippletwin.twin.twin import Twin
 
         case = load_case(arguments.case, states={"healthy"})
         if not case.recordings:
@@ -102,17 +102,17 @@ def explain(commands) -> None:
         os.environ.setdefault("OMP_NUM_THREADS", "1")
         from tqdm import tqdm
 
-        from rippletwin.case import load_case
-        from rippletwin.explain.bootstrap import FEWEST
-        from rippletwin.explain.run import explain as find
-        from rippletwin.explain.verdict import write
+        from rippletwin.case.load import load_case
+        from rippletwin.explanation.checks.bootstrap import MIN_DRAWS
+        from rippletwin.explanation.explain import explain as find
+        from rippletwin.explanation.verdict.verdict_file import write_verdict
 
-        if arguments.bootstrap and arguments.bootstrap < FEWEST:
+        if arguments.bootstrap and arguments.bootstrap < MIN_DRAWS:
             raise InputError(
                 "command line",
                 "--bootstrap",
                 f"{arguments.bootstrap} draws tell no threshold",
-                f"give at least {FEWEST}, or leave it out",
+                f"give at least {MIN_DRAWS}, or leave it out",
             )
         case = load_case(arguments.case, states={"healthy"})
         bars = {}
@@ -127,9 +127,9 @@ def explain(commands) -> None:
         finally:
             for bar in bars.values():
                 bar.close()
-        result = write(explanation, arguments.out)
+        result = write_verdict(explanation, arguments.out)
         if not arguments.no_figures:
-            from rippletwin.figures.explain import draw
+            from rippletwin.figures.explanation import draw
 
             draw(explanation, arguments.out, processes=arguments.processes)
         print(json.dumps(result) if arguments.json_only else result["sentence"])

@@ -8,10 +8,10 @@ import xarray as xr
 
 from job import start
 from rippletwin import store
-from rippletwin.architectures import CLASSES
-from rippletwin.attention import alignment, attention, density, fault_region
-from rippletwin.networks import restored
-from rippletwin.training import predict
+from rippletwin.learning.architectures import CLASSES
+from rippletwin.learning.grad_cam import alignment, attention_density, attention_map, fault_region
+from rippletwin.learning.networks import restored
+from rippletwin.learning.training import predict
 
 WINDOWS = 16  # of each recording, for the mean heat
 
@@ -37,19 +37,19 @@ attended, blind = [], []
 trained, channels = torch.load(snakemake.input.weights), x["H"].shape[1]
 for seed, network in enumerate(restored(snakemake.wildcards.architecture, channels, trained)):
     shares = [
-        alignment(attention(network, x[fault], CLASSES.index(fault)), regions[fault])[0]
+        alignment(attention_map(network, x[fault], CLASSES.index(fault)), regions[fault])[0]
         for fault in faults
     ]
     blind.append([np.isnan(share).mean() for share in shares])
     attended.append([np.nan if np.isnan(s).all() else np.nanmean(s) for s in shares])
     if seed == 0:
-        heat = density(attention(network, first_turn, np.arange(len(CLASSES))))
+        heat = attention_density(attention_map(network, first_turn, np.arange(len(CLASSES))))
         called = []
         recorded_heat = []
         for part in windows:
             label, count = Counter(predict(network, part)[0].tolist()).most_common(1)[0]
             called.append((CLASSES[label], count / len(part)))
-            looked = density(attention(network, part, label))
+            looked = attention_density(attention_map(network, part, label))
             seen = ~np.isnan(looked.reshape(len(part), -1)).any(1)
             recorded_heat.append(looked[seen].mean(0) if seen.any() else looked[0])
 

@@ -6,8 +6,8 @@ import pandas as pd
 
 from job import start
 from rippletwin import store
-from rippletwin.architectures import ARCHITECTURES
-from rippletwin.selection import alignment_table, markdown, rank_table
+from rippletwin.learning.alignment_ranking import alignment_table, rank_table, ranking_markdown
+from rippletwin.learning.architectures import ARCHITECTURES
 
 tell = start(snakemake)
 shares = []
@@ -21,5 +21,5 @@ table = alignment_table(pd.concat(shares), pd.read_csv(snakemake.input.table))
 ranks = rank_table(table)
 table.to_csv(snakemake.output.table, index=False)
 ranks.to_csv(snakemake.output.ranks, index=False)
-Path(snakemake.output.page).write_text(markdown(table, ranks))
+Path(snakemake.output.page).write_text(ranking_markdown(table, ranks))
 tell(f"{len(table)} networks, {len(ranks)} rank correlations")

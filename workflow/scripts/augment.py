@@ -5,7 +5,7 @@ import xarray as xr
 
 from job import start
 from rippletwin import store
-from rippletwin.dataset import augment
+from rippletwin.learning.dataset import augment
 
 tell = start(snakemake)
 params, revolutions = snakemake.params, int(snakemake.wildcards.revolutions)

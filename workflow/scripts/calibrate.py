@@ -5,12 +5,13 @@ from pathlib import Path
 import xarray as xr
 
 from job import start
-from rippletwin import report, store
-from rippletwin.calibrate import Settings, calibrate
-from rippletwin.case import load_case
-from rippletwin.pareto import calibrate_pareto
-from rippletwin.spectra import observe
-from rippletwin.twin import Twin
+from rippletwin import store
+from rippletwin.calibration import report
+from rippletwin.calibration.calibrate import Settings, calibrate
+from rippletwin.calibration.pareto import calibrate_pareto
+from rippletwin.case.load import load_case
+from rippletwin.spectra.observation import observe
+from rippletwin.twin.twin import Twin
 
 tell = start(snakemake)
 params = snakemake.params

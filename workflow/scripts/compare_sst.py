@@ -8,11 +8,17 @@ import pandas as pd
 
 from job import start
 from rippletwin import store
-from rippletwin.case import load_case
-from rippletwin.dataset import remove_mean
-from rippletwin.figures import diagnosis, save
-from rippletwin.imaging import SstSettings, amplitude_scale, image_axes, sst_images
-from rippletwin.similarity import image_similarity
+from rippletwin.case.load import load_case
+from rippletwin.figures import diagnosis
+from rippletwin.figures.style import save
+from rippletwin.learning.dataset import remove_mean
+from rippletwin.learning.synchrosqueezing import (
+    SstSettings,
+    amplitude_scale,
+    image_axes,
+    image_similarity,
+    sst_images,
+)
 
 WINDOWS = 8  # of each recording, two revolutions each
 PICTURE = 128  # pixels a side of what is drawn; numbers are those of the networks' images

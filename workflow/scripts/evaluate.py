@@ -6,10 +6,10 @@ import torch
 
 from job import start
 from rippletwin import store
-from rippletwin.architectures import CLASSES
-from rippletwin.dataset import split_by_time
-from rippletwin.networks import restored
-from rippletwin.training import predict
+from rippletwin.learning.architectures import CLASSES
+from rippletwin.learning.dataset import split_by_time
+from rippletwin.learning.networks import restored
+from rippletwin.learning.training import predict
 
 tell = start(snakemake)
 torch.set_num_threads(snakemake.threads)

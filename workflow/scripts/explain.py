@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from job import start
-from rippletwin.case import load_case
-from rippletwin.explain.run import explain
-from rippletwin.explain.verdict import write
-from rippletwin.figures.explain import draw
+from rippletwin.case.load import load_case
+from rippletwin.explanation.explain import explain
+from rippletwin.explanation.verdict.verdict_file import write_verdict
+from rippletwin.figures.explanation import draw
 
 tell = start(snakemake)
 case = load_case(Path(snakemake.input.rig).parent, states={"healthy"})
@@ -14,6 +14,6 @@ explanation = explain(
     case, snakemake.threads, lambda what, done, total: tell(f"{what}: {done} of {total}")
 )
 folder = Path(snakemake.output.verdict).parent
-verdict = write(explanation, folder)
+verdict = write_verdict(explanation, folder)
 draw(explanation, folder, processes=snakemake.threads)
 tell(verdict["sentence"])

@@ -10,9 +10,11 @@ import xarray as xr
 
 from job import start
 from rippletwin import store
-from rippletwin.case import load_case
+from rippletwin.case.load import load_case
 from rippletwin.case.model import Segment
-from rippletwin.pump import ConstantPressure, Cylinder, Pipe, Slipper, simulate
+from rippletwin.pump.faults import Cylinder, Slipper
+from rippletwin.pump.outlets import ConstantPressure, Pipe
+from rippletwin.pump.simulation import simulate
 
 tell = start(snakemake)
 params, state = snakemake.params, snakemake.wildcards.state

@@ -2,12 +2,12 @@
 
 import numpy as np
 import xarray as xr
-
-from job import start
-from rippletwin import store
 from rippletwin.flow_sensor.line import network_of
 from rippletwin.flow_sensor.spectral import estimate_flow
 from rippletwin.report import load_twin
+
+from job import start
+from rippletwin import store
 from rippletwin.spectra import noise_cycle_scatter
 
 tell = start(snakemake)

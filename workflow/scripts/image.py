@@ -6,7 +6,7 @@ import numpy as np
 
 from job import start
 from rippletwin import store
-from rippletwin.imaging import SstSettings, amplitude_scale, sst_images
+from rippletwin.learning.synchrosqueezing import SstSettings, amplitude_scale, sst_images
 
 tell = start(snakemake)
 params = snakemake.params

@@ -7,9 +7,10 @@ import xarray as xr
 
 from job import start
 from rippletwin import store
-from rippletwin.case import load_case
-from rippletwin.dataset import remove_mean
-from rippletwin.spectra import noise_cycle_scatter, noise_mad, revolutions_of
+from rippletwin.case.load import load_case
+from rippletwin.learning.dataset import remove_mean
+from rippletwin.spectra.noise import noise_cycle_scatter, noise_mad
+from rippletwin.spectra.observation import revolutions_of
 
 tell = start(snakemake)
 params = snakemake.params

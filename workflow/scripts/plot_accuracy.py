@@ -3,9 +3,10 @@
 import pandas as pd
 
 from job import start
-from rippletwin.accuracy import summarise
-from rippletwin.architectures import ARCHITECTURES
-from rippletwin.figures import diagnosis, save
+from rippletwin.figures import diagnosis
+from rippletwin.figures.style import save
+from rippletwin.learning.accuracy import summarise
+from rippletwin.learning.architectures import ARCHITECTURES
 
 tell = start(snakemake)
 ours = summarise(pd.read_csv(snakemake.input.table))

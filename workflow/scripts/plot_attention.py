@@ -6,10 +6,11 @@ import numpy as np
 
 from job import start
 from rippletwin import store
-from rippletwin.architectures import ARCHITECTURES
-from rippletwin.case import load_case
-from rippletwin.figures import attention, save
-from rippletwin.imaging import SstSettings, image_axes
+from rippletwin.case.load import load_case
+from rippletwin.figures import attention
+from rippletwin.figures.style import save
+from rippletwin.learning.architectures import ARCHITECTURES
+from rippletwin.learning.synchrosqueezing import SstSettings, image_axes
 
 tell = start(snakemake)
 params, output = snakemake.params, snakemake.output

@@ -4,7 +4,8 @@ from pathlib import Path
 
 from job import start
 from rippletwin import store
-from rippletwin.figures import ripple, save
+from rippletwin.figures import ripple
+from rippletwin.figures.style import save
 
 tell = start(snakemake)
 ripples = store.load(snakemake.input.ripples)

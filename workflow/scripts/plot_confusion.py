@@ -3,9 +3,10 @@
 import pandas as pd
 
 from job import start
-from rippletwin.accuracy import CLASSES, TRUE_STATES, confusion_of
-from rippletwin.architectures import ARCHITECTURES
-from rippletwin.figures import diagnosis, save
+from rippletwin.figures import diagnosis
+from rippletwin.figures.style import save
+from rippletwin.learning.accuracy import CLASSES, TRUE_STATES, confusion_of
+from rippletwin.learning.architectures import ARCHITECTURES
 
 tell = start(snakemake)
 results = pd.read_csv(snakemake.input.table)

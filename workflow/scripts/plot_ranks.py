@@ -3,8 +3,9 @@
 import pandas as pd
 
 from job import start
-from rippletwin.architectures import ARCHITECTURES
-from rippletwin.figures import attention, save
+from rippletwin.figures import attention
+from rippletwin.figures.style import save
+from rippletwin.learning.architectures import ARCHITECTURES
 
 tell = start(snakemake)
 table = pd.read_csv(snakemake.input.table).fillna({"accuracy_std": 0, "alignment_std": 0})

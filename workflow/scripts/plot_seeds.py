@@ -11,9 +11,15 @@ import xarray as xr
 
 from job import start
 from rippletwin import store
-from rippletwin.case import load_case
-from rippletwin.figures import diagnosis, ripple, save
-from rippletwin.imaging import SstSettings, amplitude_scale, image_axes, sst_images
+from rippletwin.case.load import load_case
+from rippletwin.figures import diagnosis, ripple
+from rippletwin.figures.style import save
+from rippletwin.learning.synchrosqueezing import (
+    SstSettings,
+    amplitude_scale,
+    image_axes,
+    sst_images,
+)
 
 tell = start(snakemake)
 pistons = load_case(Path(snakemake.input.rig).parent, states=()).rig.pump["pistons"]

@@ -5,7 +5,7 @@ import xarray as xr
 
 from job import start
 from rippletwin import store
-from rippletwin.dataset import remove_mean
+from rippletwin.learning.dataset import remove_mean
 
 TURNS = 8  # beginnings, evenly spread over the revolution
 

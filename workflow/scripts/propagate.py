@@ -4,8 +4,8 @@ import xarray as xr
 
 from job import start
 from rippletwin import store
-from rippletwin.propagation import propagate, pump_change
-from rippletwin.report import load_twin
+from rippletwin.twin.propagation import propagate, pump_change
+from rippletwin.twin.twin_file import load_twin
 
 tell = start(snakemake)
 params = snakemake.params

@@ -7,9 +7,10 @@ import pandas as pd
 
 from job import start
 from rippletwin import store
-from rippletwin.accuracy import UNKNOWN, accuracy_table, answer_table, result_row, score
-from rippletwin.architectures import CLASSES
-from rippletwin.training import History
+from rippletwin.learning.accuracy import UNKNOWN, result_row, score
+from rippletwin.learning.architectures import CLASSES
+from rippletwin.learning.tables import accuracy_table, answer_table
+from rippletwin.learning.training import History
 
 tell = start(snakemake)
 params, paths = snakemake.params, snakemake.input

@@ -5,7 +5,7 @@ from pathlib import Path
 import pandas as pd
 
 from job import start
-from rippletwin.accuracy import answer_table
+from rippletwin.learning.tables import answer_table
 
 tell = start(snakemake)
 answers = pd.concat(

@@ -3,9 +3,9 @@
 import json
 from pathlib import Path
 
+from concealed.figures import draw
 from concealed.page import markdown
 from job import start
-from rippletwin.figures.concealed import draw
 
 tell = start(snakemake)
 rows = json.loads(Path(snakemake.input.rows).read_text())

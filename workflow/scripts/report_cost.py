@@ -6,8 +6,8 @@ from pathlib import Path
 import pandas as pd
 
 from job import start
-from rippletwin.accuracy import cost_table
-from rippletwin.report import load_twin
+from rippletwin.learning.tables import cost_table
+from rippletwin.twin.twin_file import load_twin
 
 tell = start(snakemake)
 results = pd.read_csv(snakemake.input.table)

@@ -5,7 +5,7 @@ import xarray as xr
 
 from job import start
 from rippletwin import store
-from rippletwin.flow_sensor.spectral import band_limit
+from rippletwin.flow_sensor.spectral_inversion import band_limit
 
 tell = start(snakemake)
 params = snakemake.params

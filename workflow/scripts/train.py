@@ -8,10 +8,10 @@ import torch
 
 from job import start
 from rippletwin import store
-from rippletwin.architectures import CLASSES
-from rippletwin.dataset import split_by_time
-from rippletwin.networks import build
-from rippletwin.training import TrainingSettings, train
+from rippletwin.learning.architectures import CLASSES
+from rippletwin.learning.dataset import split_by_time
+from rippletwin.learning.networks import build
+from rippletwin.learning.training import TrainingSettings, train
 
 tell = start(snakemake)
 params, paths = snakemake.params, snakemake.input.samples

@@ -8,7 +8,7 @@ import numpy as np
 
 from rippletwin.case.model import Recording, Rig
 from rippletwin.case.readers.signals import Signals
-from rippletwin.case.speed import speed_in_data
+from rippletwin.case.speed_estimate import estimate_speed
 from rippletwin.errors import InputError
 
 FEWEST_REVOLUTIONS = 4
@@ -241,7 +241,7 @@ def _unit_guess(mean: float, load: float | None) -> tuple[str, float] | None:
 
 def _check_speed(recording: Recording, rig: Rig) -> None:
     pistons = rig.pump["pistons"]
-    found = speed_in_data(
+    found = estimate_speed(
         recording.pressure, recording.sampling_rate_hz, pistons, recording.speed_rpm
     )
     if found is None or abs(found / recording.speed_rpm - 1) > SPEED_TOLERANCE:

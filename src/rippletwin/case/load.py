@@ -18,7 +18,7 @@ from rippletwin.case.model import (
     Uncertainty,
 )
 from rippletwin.case.readers import reader_of
-from rippletwin.case.sheet import read_sheet
+from rippletwin.case.rig_yaml import read_sheet
 from rippletwin.errors import InputError
 
 SAMPLED = ("periodic", "random")

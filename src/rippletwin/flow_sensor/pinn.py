@@ -32,8 +32,8 @@ import numpy as np
 import torch
 
 from rippletwin.flow_sensor.estimate import FlowEstimate, estimate
-from rippletwin.flow_sensor.line import LineResponse, NetworkFactory, line_response
-from rippletwin.flow_sensor.spectral import LOAD_ERROR, MODEL_ERROR
+from rippletwin.flow_sensor.line_response import LineResponse, NetworkFactory, line_response
+from rippletwin.flow_sensor.spectral_inversion import LOAD_ERROR, MODEL_ERROR
 from rippletwin.flow_sensor.trunk import Equations, Trunk, equations, pieces_of
 
 COLLOCATION = 48  # points a piece when a window is solved

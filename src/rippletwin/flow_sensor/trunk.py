@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from rippletwin.line.chain import Network
+from rippletwin.line.frequency_domain.line_network import Network
 
 
 class Trunk(nn.Module):

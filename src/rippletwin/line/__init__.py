@@ -1,0 +1,1 @@
+"""The hydraulic line, in the frequency domain and in the time domain."""

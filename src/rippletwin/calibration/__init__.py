@@ -1,0 +1,1 @@
+"""Calibration: posterior, optimiser and continuation that fit a twin to observations."""

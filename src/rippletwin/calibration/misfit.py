@@ -1,0 +1,112 @@
+"""How far a prediction is from a measurement: relative misfit and Theil's inequality coefficient.
+
+Both are taken on the ripple alone (no mean) from its complex harmonics, which by Parseval is the
+same as from the time signals over whole revolutions:
+
+    relative misfit   |measured - predicted| / |measured|
+    Theil's U         |measured - predicted| / (|measured| + |predicted|)
+
+with |.| the norm over sensors, frequencies and recordings. U lies between 0 (equal) and 1; it is
+U1 of Theil (1961), Economic Forecasts and Policy, 2nd ed., sec. 2.5, the coefficient used to
+validate simulations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rippletwin.calibration.fit import Fit
+from rippletwin.calibration.likelihood import comparable
+from rippletwin.calibration.multistart import align_shaft_angles
+from rippletwin.calibration.posterior import Posterior
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """Relative misfit and Theil's coefficient over everything and per sensor (by name)."""
+
+    relative: float
+    theil: float
+    relative_by_sensor: dict[str, float]
+    theil_by_sensor: dict[str, float]
+
+
+def relative_misfit(measured: np.ndarray, predicted: np.ndarray) -> float:
+    """|measured - predicted| / |measured| of arrays of one shape."""
+    return float(np.linalg.norm(measured - predicted) / np.linalg.norm(measured))
+
+
+def theil(measured: np.ndarray, predicted: np.ndarray) -> float:
+    """Theil's U1 of arrays of one shape; 0 where both vanish."""
+    total = np.linalg.norm(measured) + np.linalg.norm(predicted)
+    return float(np.linalg.norm(measured - predicted) / total) if total else 0.0
+
+
+def misfit(likelihood, theta: np.ndarray) -> Misfit:
+    """Misfits of the observations of `likelihood` at theta.
+
+    The amplitude of a free source is the most likely one at each frequency, hence the misfit is
+    then that of the ratios between sensors.
+    """
+    pairs = {}
+    for o, h in zip(likelihood.observations, likelihood.forward(theta)):
+        measured = comparable(o, likelihood.twin.rig).values
+        if o.source == "free":
+            h = h * (np.sum(np.conj(h) * measured, 0) / np.sum(np.abs(h) ** 2, 0))
+        for name, v, x in zip(_names(o), measured, h):
+            pairs.setdefault(name, []).append((v, x))
+    joined = {name: [np.concatenate(x) for x in zip(*p)] for name, p in pairs.items()}
+    everything = [np.concatenate(x) for x in zip(*joined.values())]
+    return Misfit(
+        relative_misfit(*everything),
+        theil(*everything),
+        {name: relative_misfit(*p) for name, p in joined.items()},
+        {name: theil(*p) for name, p in joined.items()},
+    )
+
+
+def _names(observation) -> list[str]:
+    if observation.kind == "input_impedance":
+        return ["reflection"]
+    return [getattr(s, "name", s) for s in observation.sensors]
+
+
+@dataclass(frozen=True)
+class Score:
+    """Relative complex misfit and Theil's coefficient."""
+
+    misfit: float
+    theil: float
+
+
+def score_fit(fit: Fit, observations: Sequence, turn: bool = False) -> Score:
+    """Misfits of a fit's predictions; free sources get their most likely amplitude.
+
+    With `turn` the shaft angles, which every recording has anew, are fitted first, alone.
+    """
+    twin = fit.twin
+    posterior = Posterior(twin, observations, None, fit.source_free)
+    posterior.floor, posterior.source_sd = fit.floor, fit.source_sd
+    theta = twin.theta
+    if turn:
+        theta = _fit_shaft_angles(posterior, theta)
+    h = posterior.best_source(posterior.predict(theta))
+    return Score(relative_misfit(posterior.values, h), theil(posterior.values, h))
+
+
+def _fit_shaft_angles(posterior: Posterior, theta: np.ndarray) -> np.ndarray:
+    """theta with the shaft angles fitted and all else held."""
+    angles = np.flatnonzero(~posterior.prior)
+    used = [k for k in angles if k in posterior.forward.source.angles]
+    if not used:
+        return theta
+    theta = align_shaft_angles(posterior, theta)[1]
+    for _ in range(6):
+        r, jacobian = posterior.linearise(theta, posterior.predict(theta))
+        step = np.linalg.lstsq(jacobian[:, used], -r, rcond=None)[0]
+        theta = theta.copy()
+        theta[used] += np.clip(step, -5.0, 5.0)
+    return theta

@@ -1,0 +1,189 @@
+"""A calibration as plain data (for twin.json) and as a page to read (for report.md)."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from rippletwin.calibration.calibrate import Calibration
+from rippletwin.calibration.misfit import Misfit
+from rippletwin.twin import twin_file
+
+
+def segment_table(calibration: Calibration) -> list[dict]:
+    """Delay L/a (s) and characteristic impedance rho a/A (Pa s/m3) of each segment, with sds.
+
+    These are what waves see; the data determine them better than a, D and L one by one. Standard
+    deviations are first order in the logarithms, with their covariance.
+    """
+    twin, covariance = calibration.twin, calibration.covariance
+    v = twin.arrays(twin.theta)
+    rows = []
+    for k, (a, d, length) in enumerate(zip(v.wave_speeds, v.diameters, v.lengths)):
+        names = [f"{name}[{k + 1}]" for name in ("wave_speed", "diameter", "length")]
+        index = [twin.index[name] for name in names]
+        sd = np.array([twin.parameters[i].prior.scale for i in index])
+        log_covariance = covariance[np.ix_(index, index)] * np.outer(sd, sd)
+        delay_weights, impedance_weights = np.array([-1, 0, 1]), np.array([1, -2, 0])
+        delay, impedance = length / a, twin.rig.fluid.density * a / (0.25 * np.pi * d**2)
+        rows.append(
+            {
+                "segment": k + 1,
+                "delay": float(delay),
+                "delay_sd": float(delay * _root(delay_weights, log_covariance)),
+                "impedance": float(impedance),
+                "impedance_sd": float(impedance * _root(impedance_weights, log_covariance)),
+            }
+        )
+    return rows
+
+
+def parameter_table(calibration: Calibration) -> list[dict]:
+    """Name, unit, nominal, value, sd and pull (prior standard deviations; None without prior)."""
+    twin = calibration.twin
+    return [
+        {
+            "name": p.name,
+            "place": p.place,
+            "unit": p.unit,
+            "nominal": p.nominal,
+            "value": float(p.value(u)),
+            "sd": p.value_sd(u, s),
+            "pull": None if p.flat else float(u),
+            "known": None if p.flat else float(s),
+        }
+        for p, u, s in zip(twin.parameters, twin.theta, calibration.sd)
+    ]
+
+
+def to_dict(calibration: Calibration) -> dict:
+    """Everything of a calibration as plain data; `twin_of` makes a twin of it again."""
+    return {
+        "twin": twin_file.to_dict(calibration.twin),
+        "covariance": calibration.covariance.tolist(),
+        "parameters": parameter_table(calibration),
+        "segments": segment_table(calibration),
+        "error_floor": calibration.floor,
+        "source_sd": calibration.source_sd,
+        "minus_log_posterior": calibration.objective,
+        "fit": {"before": _misfit(calibration.before), "after": _misfit(calibration.after)},
+        "warnings": list(calibration.warnings),
+    }
+
+
+def markdown(calibration: Calibration) -> str:
+    """The report: misfits, warnings, segments and parameters."""
+    before, after = calibration.before, calibration.after
+    lines = [
+        "# Calibration",
+        "",
+        "| sensor | relative misfit before | after | Theil before | after |",
+        "|---|---|---|---|---|",
+        f"| all | {before.relative:.1%} | {after.relative:.1%} "
+        f"| {before.theil:.3f} | {after.theil:.3f} |",
+    ]
+    for name in after.relative_by_sensor:
+        lines.append(
+            f"| {name} | {before.relative_by_sensor[name]:.1%} "
+            f"| {after.relative_by_sensor[name]:.1%} "
+            f"| {before.theil_by_sensor[name]:.3f} | {after.theil_by_sensor[name]:.3f} |"
+        )
+    lines += ["", "## Warnings", ""]
+    lines += [f"* {warning}" for warning in calibration.warnings] or ["None."]
+    lines += [
+        "",
+        "## Segments",
+        "",
+        "| segment | delay, ms | sd | impedance, MPa s/m3 | sd |",
+        "|---|---|---|---|---|",
+    ]
+    for row in segment_table(calibration):
+        lines.append(
+            f"| {row['segment']} | {1e3 * row['delay']:.4f} | {1e3 * row['delay_sd']:.2g} "
+            f"| {1e-6 * row['impedance']:.5g} | {1e-6 * row['impedance_sd']:.2g} |"
+        )
+    lines += [
+        "",
+        "## Parameters",
+        "",
+        "Pull: distance from the data sheet in its standard deviations. Known: posterior over",
+        "prior standard deviation; near 1 the data say nothing.",
+        "",
+        "| parameter | unit | data sheet | calibrated | sd | pull | known |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for row in parameter_table(calibration):
+        pull = "" if row["pull"] is None else f"{row['pull']:+.2f}"
+        known = "" if row["known"] is None else f"{row['known']:.2f}"
+        lines.append(
+            f"| {row['name']} | {row['unit']} | {row['nominal']:.5g} | {row['value']:.5g} "
+            f"| {row['sd']:.2g} | {pull} | {known} |"
+        )
+    lines += [
+        "",
+        f"Relative error floor of the model: {calibration.floor:.2%}; "
+        f"relative error of the source: {calibration.source_sd:.2%}.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def ripples(
+    calibration: Calibration, observations: Sequence, samples: int = 1024
+) -> list[dict[str, np.ndarray]]:
+    """Pressure ripples to draw, one dict a periodic observation.
+
+    label; sensors (S,); angle_deg (samples,) over one revolution; measured, nominal and calibrated
+    (S, samples) in Pa without mean, all from the same harmonics.
+    """
+    out = []
+    angle = 2 * np.pi * np.arange(samples) / samples
+    for o in observations:
+        if o.orders is None:
+            continue
+        turn = np.exp(1j * np.outer(o.orders, angle))
+        spectra = {
+            "measured": o.values,
+            "nominal": calibration.nominal.predict([o])[0],
+            "calibrated": calibration.twin.predict([o])[0],
+        }
+        out.append(
+            {
+                "label": o.label,
+                "sensors": np.array([s.name for s in o.sensors]),
+                "angle_deg": np.rad2deg(angle),
+                **{name: (x @ turn).real for name, x in spectra.items()},
+            }
+        )
+    return out
+
+
+def save(calibration: Calibration, folder: str | Path) -> None:
+    """Write twin.json and report.md into `folder`, each whole or not at all."""
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in (
+        ("twin.json", json.dumps(to_dict(calibration), indent=1) + "\n"),
+        ("report.md", markdown(calibration)),
+    ):
+        scratch = folder / f".{name}.new"
+        scratch.write_text(text)
+        os.replace(scratch, folder / name)
+
+
+def _root(weights: np.ndarray, covariance: np.ndarray) -> float:
+    return float(np.sqrt(weights @ covariance @ weights))
+
+
+def _misfit(m: Misfit) -> dict:
+    return {
+        "relative": m.relative,
+        "theil": m.theil,
+        "by_sensor": {
+            name: {"relative": m.relative_by_sensor[name], "theil": m.theil_by_sensor[name]}
+            for name in m.relative_by_sensor
+        },
+    }

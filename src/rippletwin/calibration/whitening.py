@@ -1,0 +1,85 @@
+"""What whitens residuals of which noise, a model error and a nominal source's error make part."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+CORRELATION_HZ = 1000.0  # l and f0 of `rippletwin.calibration.posterior`
+LEAST = 0.01  # of the strongest harmonic: smaller ones are uncertain by more than their own share
+KEPT = 1e-3  # of the kernel's largest eigenvalue
+
+
+class Whitening:
+    """Multiplication by an inverse root of the covariance sd^2 + source h h^H + smooth part.
+
+    h (S, F), sd (S, F), source (F,) the error of each frequency's source (0 known, inf free),
+    nominal the N frequencies that have a smooth error and its basis (J, N).
+    """
+
+    def __init__(self, h, sd, source, nominal, basis):
+        self._sd, self._u = sd, h / sd
+        self._size = np.maximum(np.sum(np.abs(self._u) ** 2, axis=0), 1e-300)
+        free = np.isinf(source)
+        stretch = 1.0 + np.where(free, 0.0, source) ** 2 * self._size
+        self._shorten = np.where(free, 1.0, 1.0 - 1.0 / np.sqrt(stretch))
+        power = np.sum(np.abs(h) ** 2, axis=0)
+        self._volume = np.where(free, self._size / np.maximum(power, 1e-300), stretch)
+        self._part, self._columns, self._grown = nominal, None, np.zeros(0)
+        if np.any(basis):
+            # Whitened so far, the smooth error is B c with unit c: I + B B^H in the span of B.
+            gram = (basis * (self._size / stretch)[nominal]) @ basis.T
+            grown, turn = np.linalg.eigh(gram)
+            grown = np.maximum(grown, 1e-12)
+            columns = (turn / np.sqrt(grown)).T @ basis  # orthonormal over (S, N) with u
+            self._columns = columns[:, None, :] * (self._u / np.sqrt(stretch))[:, nominal]
+            self._reduce = 1.0 - 1.0 / np.sqrt(1.0 + grown)
+            self._grown = grown
+
+    @cached_property
+    def log_determinant(self) -> float:
+        """Of the covariance, but for what a free source takes with it."""
+        rough = 2.0 * np.sum(np.log(self._sd)) + np.sum(np.log(self._volume))
+        return float(rough + np.sum(np.log1p(self._grown)))
+
+    def apply(self, x: np.ndarray) -> np.ndarray:
+        """x (..., S, F) multiplied."""
+        return self._shorten_smooth(self._shorten_rough(x / self._sd))
+
+    def adjoint(self, x: np.ndarray) -> np.ndarray:
+        """x (..., S, F) multiplied by the root's adjoint: adjoint(apply(x)) is C^-1 x."""
+        return self._shorten_rough(self._shorten_smooth(x)) / self._sd
+
+    def _shorten_rough(self, y):
+        along = np.sum(np.conj(self._u) * y, axis=-2) / self._size
+        return y - (self._shorten * along)[..., None, :] * self._u
+
+    def _shorten_smooth(self, y):
+        if self._columns is None:
+            return y
+        y = y.copy()
+        piece = y[..., self._part].reshape(*y.shape[:-2], -1)
+        columns = self._columns.reshape(len(self._columns), -1)
+        share = (piece @ np.conj(columns).T) * self._reduce
+        y[..., self._part] = (piece - share @ columns).reshape(*y.shape[:-1], -1)
+        return y
+
+
+def smooth_basis(frequency_hz: np.ndarray, recording: np.ndarray) -> np.ndarray:
+    """Basis (J, N) of errors smooth in frequency, basis.T @ basis = K; recording (N,) numbers."""
+    f = np.asarray(frequency_hz, float) / CORRELATION_HZ
+    kernel = 1.0 + (1.0 + np.outer(f, f)) * np.exp(-0.5 * np.subtract.outer(f, f) ** 2)
+    kernel = kernel * (0.5 + 0.5 * np.equal.outer(recording, recording))
+    values, vectors = np.linalg.eigh(kernel)
+    kept = values > KEPT * np.max(values, initial=0.0)
+    return np.sqrt(values[kept])[:, None] * vectors[:, kept].T
+
+
+def source_scale(source: np.ndarray) -> np.ndarray:
+    """g (F,) of a ripple's harmonics (F,) in ascending order, two neighbours a side counting."""
+    power = np.abs(source) ** 2
+    kernel = np.exp(-0.5 * np.arange(-2, 3) ** 2.0)
+    about = np.convolve(power, kernel / kernel.sum())[2:-2]
+    about = np.maximum(about, power) + LEAST**2 * np.max(power)
+    return np.sqrt(about / np.maximum(power, 1e-300))

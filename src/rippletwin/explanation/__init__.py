@@ -1,0 +1,1 @@
+"""Missing physics: search, localisation, checks and verdict."""

@@ -1,0 +1,1 @@
+"""Whether data and fits may be believed: contradictions, alarms, cross-validation, sensitivity."""

@@ -1,0 +1,1 @@
+"""Stepwise search over effects and their places."""

@@ -1,0 +1,38 @@
+"""Elements and stretches of the line in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rippletwin.explanation.localise.free_corrections import element_extent
+
+
+def element_and_extent(rig, effect, place, parameters: dict) -> tuple[str, list[float]]:
+    """Element and interval along the line (m) at which an effect acts."""
+    ends = np.cumsum([s.length for s in rig.line])
+    starts = ends - [s.length for s in rig.line]
+    if "position" in parameters:
+        low, high = parameters["position"]["ci95"]
+        middle = parameters["position"]["value"]
+        k = int(min(np.searchsorted(ends, middle), len(ends) - 1))
+        if low >= starts[k] and high <= ends[k]:
+            return f"segment {k + 1}", [low, high]
+        return stretch_between_sensors(rig, low, high), [low, high]
+    return place.element, list(element_extent(rig, place.element))
+
+
+def stretch_between_sensors(rig, low: float, high: float) -> str:
+    """The stretch between sensors, pump and load that holds an interval."""
+    marks = [("pump", 0.0), *((s.name, s.position) for s in rig.sensors), ("load", rig.length)]
+    marks.sort(key=lambda m: m[1])
+    left = [name for name, x in marks if x <= low] or ["pump"]
+    right = [name for name, x in marks if x >= high] or ["load"]
+    return f"between {left[-1]} and {right[0]}"
+
+
+def join_words(words: Sequence[str]) -> str:
+    """Words in a row as in a sentence."""
+    words = list(words)
+    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]

@@ -1,0 +1,46 @@
+"""Harmonics of one revolution: peak amplitudes of shaft orders, and phase modulation of a flow."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rippletwin.case.model import FlowRipple
+
+
+def phase_modulate(spectrum: np.ndarray, modulation: complex, count: int) -> np.ndarray:
+    """Flow (count,) at even instants of a revolution of a shaft that is ahead of even turning by
+    Re(b exp(j t)) rad at angle t, b = `modulation`: q(angle(t)) d angle/dt.
+
+    spectrum (F,) is that of q at even speed: peak amplitudes of orders 0 to F - 1, the mean first.
+    By Jacobi and Anger order k spreads to order n as j^(n-k) J_(n-k)(k |b|): small swings make
+    sidebands, and larger ones leave little of a high order itself.
+    """
+    instant = 2.0 * np.pi * np.arange(count) / count
+    swing = modulation * np.exp(1j * instant)
+    orders = np.flatnonzero(spectrum)
+    flow = (np.exp(1j * np.outer(instant + swing.real, orders)) @ spectrum[orders]).real
+    return flow * (1.0 - swing.imag)
+
+
+def peak_amplitudes(flow: np.ndarray) -> np.ndarray:
+    """Peak amplitudes (M // 2 + 1,) of shaft orders of a flow (M,) over one revolution."""
+    spectrum = np.fft.rfft(flow) * (2.0 / len(flow))
+    spectrum[0] /= 2.0
+    return spectrum
+
+
+def flow_harmonics(ripple: FlowRipple, orders: np.ndarray) -> np.ndarray:
+    """Peak complex amplitudes (F,), m3/s, at shaft `orders` (F,); that of order 0 is the mean.
+
+    Angles need not be evenly spaced: the ripple is taken as piecewise linear over the revolution.
+    """
+    angle = np.deg2rad(np.asarray(ripple.angle_deg, dtype=float))
+    count = max(4 * len(angle), 4 * int(np.max(orders, initial=0)))
+    even = angle[0] + 2 * np.pi * np.arange(count) / count
+    step = np.diff(angle)
+    if np.allclose(step, 2 * np.pi / len(angle), rtol=1e-6, atol=0):
+        even, flow = angle, np.asarray(ripple.flow, dtype=float)
+    else:
+        flow = np.interp(even, angle, ripple.flow, period=2 * np.pi)
+    spectrum = np.exp(-1j * np.outer(orders, even)) @ flow / len(even)
+    return np.where(np.asarray(orders) == 0, spectrum, 2 * spectrum)

@@ -1,0 +1,1 @@
+"""Datasets, images, networks, training, accuracy and attention."""

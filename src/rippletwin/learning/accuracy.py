@@ -1,0 +1,109 @@
+"""How often a classifier is right on recordings, and the paper's accuracy table.
+
+Recordings are healthy (H), slipper (S) or cylinder (C) of unknown severity, while the classifiers
+know two severities, C1 and C2. The paper counts a cylinder recording as right when a pressure
+classifier calls it C1 and a flow classifier C2; here that mapping is an argument, and accuracy with
+either severity is reported beside it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from rippletwin.learning.architectures import ARCHITECTURES, CLASSES
+
+TRUE_STATES = ("H", "S", "C")
+UNKNOWN = "?"  # state of a recording that is there to be diagnosed
+SEVERITY = {"pressure": "C1", "flow": "C2"}  # what the paper calls right for C
+
+
+def score(
+    truth: np.ndarray,
+    predicted: np.ndarray,
+    signal: str,
+    severity: dict[str, str] = SEVERITY,
+) -> dict[str, float | np.ndarray]:
+    """Accuracies (fractions) of predictions on recordings.
+
+    truth : (n,) states of the recordings, of ``TRUE_STATES`` (C1 or C2 where severity is known).
+        Windows of state ``UNKNOWN`` do not count.
+    predicted : (n,) indices into ``CLASSES``.  signal : a key of ``severity``.
+
+    Returns ``accuracy`` (the paper's scoring), ``accuracy_either`` (C1 and C2 both right for a C),
+    ``confusion`` (3, 4) counts and ``n``, the windows that count; the accuracies are NaN where
+    none does. Raises ValueError for a state that is none of these, or for no window at all.
+    """
+    truth, predicted = np.asarray(truth, dtype=str), np.asarray(predicted)
+    if truth.shape != predicted.shape or not truth.size:
+        raise ValueError(f"{truth.shape} states for {predicted.shape} predictions")
+    truth, predicted = truth[truth != UNKNOWN], predicted[truth != UNKNOWN]
+    if not truth.size:
+        nothing = np.zeros((len(TRUE_STATES), len(CLASSES)), dtype=int)
+        return {"accuracy": np.nan, "accuracy_either": np.nan, "confusion": nothing, "n": 0}
+    said = np.array(CLASSES)[predicted]
+    wanted = np.where(truth == "C", severity[signal], truth)
+    cylinder = np.isin(truth, ("C", "C1", "C2"))
+    either = np.where(cylinder, np.isin(said, ("C1", "C2")), said == truth)
+    return {
+        "accuracy": float((said == wanted).mean()),
+        "accuracy_either": float(either.mean()),
+        "confusion": confusion(truth, predicted),
+        "n": truth.size,
+    }
+
+
+def confusion(truth: np.ndarray, predicted: np.ndarray) -> np.ndarray:
+    """Counts (3 true states, 4 predicted classes); C1 and C2 of known severity count as C."""
+    truth = np.asarray(truth, dtype=str)
+    counts = np.zeros((len(TRUE_STATES), len(CLASSES)), dtype=int)
+    unknown = set(truth) - {*TRUE_STATES, *CLASSES}
+    if unknown:
+        raise ValueError(f"unknown states {sorted(unknown)}; known are H, S, C, C1, C2")
+    row = [TRUE_STATES.index(state[0]) for state in truth]
+    np.add.at(counts, (row, predicted), 1)
+    return counts
+
+
+def result_row(architecture: str, dataset: str, seed: int, scored: dict, history=None) -> dict:
+    """One training's line of the tidy results table; accuracies in per cent.
+
+    Confusion counts become columns ``H_H`` (true_predicted) and so on; ``history`` (of ``train``)
+    adds how the training ended.
+    """
+    row = {
+        "domain": ARCHITECTURES[architecture].domain,
+        "architecture": architecture,
+        "dataset": dataset,
+        "seed": seed,
+        "accuracy": 100 * scored["accuracy"],
+        "accuracy_either": 100 * scored["accuracy_either"],
+        "windows": scored["n"],
+    }
+    for i, true in enumerate(TRUE_STATES):
+        for j, said in enumerate(CLASSES):
+            row[f"{true}_{said}"] = int(scored["confusion"][i, j])
+    if history is not None:
+        row |= {
+            "epochs": history.epochs,
+            "converged": history.converged,
+            "validation_loss": history.validation_loss[history.best_epoch],
+            "validation_accuracy": 100 * history.validation_accuracy[history.best_epoch],
+        }
+    return row
+
+
+def confusion_of(rows: pd.DataFrame) -> np.ndarray:
+    """The (3, 4) confusion counts of tidy rows, summed."""
+    counts = [[rows[f"{true}_{said}"].sum() for said in CLASSES] for true in TRUE_STATES]
+    return np.array(counts, dtype=int)
+
+
+def summarise(rows: pd.DataFrame, column: str = "accuracy") -> pd.DataFrame:
+    """Mean, standard deviation (of the sample; 0 for one run) and runs of each table cell.
+
+    A cell whose windows are all of unknown state has a mean of NaN and no runs.
+    """
+    cells = rows.groupby(["architecture", "dataset"], sort=False)[column]
+    table = cells.agg(["mean", "std", "count"]).reset_index()
+    return table.fillna({"std": 0.0})

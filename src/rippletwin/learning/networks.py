@@ -1,0 +1,133 @@
+"""The ten classifiers of the paper: plain and residual networks on time windows and on images.
+
+Numbers are those of `rippletwin.learning.architectures`; docs/learning.md tells how the paper's tables are
+read where they leave a choice. A time window is convolved as an image of one row: the same
+arithmetic as a 1D convolution, for which the CPU kernels of torch are up to twice as fast in
+channels-last order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import torch
+from torch import nn
+
+from rippletwin.learning.architectures import ARCHITECTURES, CLASSES, Architecture
+
+WIDTH = 64  # feature maps of every plain layer and of the first residual stage
+
+
+def build(name: str, channels: int, classes: int = len(CLASSES)) -> Classifier:
+    """A fresh network, initialised from torch's global generator.
+
+    name : a key of ``ARCHITECTURES``; channels : 2 for two pressure sensors, 1 for the outlet flow.
+    Raises KeyError for an unknown name.
+    """
+    architecture = ARCHITECTURES[name]
+    return Classifier(architecture, channels, classes).to(memory_format=torch.channels_last)
+
+
+def restored(name: str, channels: int, weights: Iterable[dict]) -> Iterator[Classifier]:
+    """Trained networks of an architecture, one for each of `weights` (their state dictionaries).
+
+    name, channels : as for ``build``. Raises KeyError for an unknown name, RuntimeError for weights
+    of another architecture.
+    """
+    for state in weights:
+        network = build(name, channels)
+        network.load_state_dict(state)
+        yield network
+
+
+class Classifier(nn.Module):
+    """Feature maps, global average pooling, one linear layer: logits (n, classes).
+
+    ``scale`` is the only standardisation there is: one number for all samples, channels and times
+    (amplitude is the diagnosis). Training sets it to the root mean square of its inputs' distance
+    from silence, which is taken off first: then zero padding is silence, in images too.
+    """
+
+    def __init__(self, architecture: Architecture, channels: int, classes: int):
+        super().__init__()
+        self.architecture = architecture
+        self.register_buffer("scale", torch.ones(()))
+        layers = _residual if architecture.blocks else _plain
+        self.features, width = layers(architecture, channels)
+        self.pool = nn.AdaptiveAvgPool2d(1)
+        self.head = nn.Linear(width, classes)
+
+    def feature_maps(self, x: torch.Tensor) -> torch.Tensor:
+        """x (n, channels, M) or (n, channels, size, size) in the data's own unit -> the last maps
+        (n, width, rows, columns), one row for time windows."""
+        if self.architecture.domain == "time":
+            x = x.unsqueeze(-2)
+        x = (x - self.architecture.silence) / self.scale
+        return self.features(x.contiguous(memory_format=torch.channels_last))
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        """x as ``feature_maps`` takes it -> logits (n, classes)"""
+        return self.head(self.pool(self.feature_maps(x)).flatten(1))
+
+
+def _plain(a: Architecture, channels: int) -> tuple[nn.Sequential, int]:
+    pools = (
+        (nn.MaxPool2d((1, 3), (1, 2), (0, 1)), nn.MaxPool2d((1, 3), 1, (0, 1)))
+        if a.domain == "time"
+        else (nn.MaxPool2d(2), nn.MaxPool2d(2))
+    )
+    layers = []
+    for convolution, pool in zip((_first(a, channels), _same(a.domain, WIDTH, WIDTH)), pools):
+        layers += [convolution, nn.ReLU(inplace=True), pool]
+    return nn.Sequential(*layers), WIDTH
+
+
+def _residual(a: Architecture, channels: int) -> tuple[nn.Sequential, int]:
+    """He et al. 2016, table 1, basic blocks; the first convolution is the architecture's."""
+    pool = nn.MaxPool2d((1, 3), (1, 2), (0, 1)) if a.domain == "time" else nn.MaxPool2d(3, 2, 1)
+    layers = [_first(a, channels, bias=False), nn.BatchNorm2d(WIDTH), nn.ReLU(inplace=True), pool]
+    width = WIDTH
+    for stage, blocks in enumerate(a.blocks):
+        stage_width = WIDTH * 2**stage
+        for block in range(blocks):
+            stride = 2 if stage and not block else 1
+            layers.append(BasicBlock(a.domain, width, stage_width, stride))
+            width = stage_width
+    return nn.Sequential(*layers), width
+
+
+class BasicBlock(nn.Module):
+    """relu(x + F(x)), F two convolutions of three taps; x is projected where the shape changes."""
+
+    def __init__(self, domain: str, width_in: int, width: int, stride: int):
+        super().__init__()
+        self.residual = nn.Sequential(
+            _same(domain, width_in, width, stride, bias=False),
+            nn.BatchNorm2d(width),
+            nn.ReLU(inplace=True),
+            _same(domain, width, width, bias=False),
+            nn.BatchNorm2d(width),
+        )
+        self.shortcut = nn.Identity()
+        if stride != 1 or width_in != width:
+            strides = (1, stride) if domain == "time" else stride
+            self.shortcut = nn.Sequential(
+                nn.Conv2d(width_in, width, 1, strides, bias=False), nn.BatchNorm2d(width)
+            )
+        self.activation = nn.ReLU(inplace=True)
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        return self.activation(self.residual(x) + self.shortcut(x))
+
+
+def _first(a: Architecture, channels: int, bias: bool = True) -> nn.Conv2d:
+    if a.domain == "time":
+        shape = ((1, a.kernel), (1, a.stride), (0, a.padding))
+        return nn.Conv2d(channels, WIDTH, *shape, bias=bias, padding_mode="circular")
+    return nn.Conv2d(channels, WIDTH, a.kernel, a.stride, a.padding, bias=bias)
+
+
+def _same(domain: str, width_in: int, width: int, stride: int = 1, bias: bool = True) -> nn.Conv2d:
+    """Three taps (3 x 3 in an image), padded so that stride 1 keeps the shape."""
+    shape = ((1, 3), (1, stride), (0, 1)) if domain == "time" else (3, stride, 1)
+    return nn.Conv2d(width_in, width, *shape, bias=bias)

@@ -1,0 +1,206 @@
+"""The paper's claims about networks, checked against our accuracies by one stated rule.
+
+A claim about accuracy is a list of comparisons: one network against another on one dataset. Each is
+a difference of mean accuracies with its 95 % interval over seeds (Welch's t): it *supports* the
+claim where the interval lies above zero, *opposes* it where it lies below, and is *open* otherwise.
+A claim is
+
+* **reproduced** where more than half of its comparisons support it and none opposes it,
+* **partly** reproduced where some support it, but not so,
+* **not** reproduced where none supports it,
+* **untested** where no comparison could be made.
+
+The same rule is laid on the paper's own table, which says what it would take.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from scipy.stats import t as student
+
+from rippletwin.learning.accuracy import summarise
+from rippletwin.learning.architectures import ARCHITECTURES
+
+RECORDINGS = "experimental"  # the dataset that learns from recordings: no zero-shot claim is of it
+STRICT, EITHER, PAPER = "strict", "either severity", "the paper's table"
+PAPER_SEEDS = 10
+
+
+@dataclass(frozen=True)
+class Claim:
+    """What the paper says, and pairs of (better, worse) networks that would show it."""
+
+    text: str
+    pairs: tuple[tuple[str, str], ...]
+
+
+KERNELS_IN_TIME = Claim(
+    "Large kernels win in time: accuracy grows with the first kernel",
+    (("cnn1d_341_100", "cnn1d_3_1"), ("cnn1d_341_100", "cnn1d_150_50")),
+)
+KERNELS_IN_IMAGES = Claim(
+    "Small kernels win in time-frequency: accuracy falls with the first kernel",
+    (("cnn2d_3_1", "cnn2d_30_3"), ("cnn2d_3_1", "cnn2d_7_2")),
+)
+DEPTH = Claim(
+    "Depth costs robustness: deeper networks with the same first layer are less accurate",
+    (
+        ("cnn1d_341_100", "resnet34_1d"),
+        ("resnet18_1d", "resnet34_1d"),
+        ("cnn2d_3_1", "resnet34_2d"),
+        ("resnet18_2d", "resnet34_2d"),
+    ),
+)
+CALIBRATION = "Calibration decides: trained on CFD-MOC-P, networks beat those trained on CFD-P"
+LEARNABLE = "Trained on recordings, every network reaches 100 %"
+PERIOD = "A kernel of 341 samples spans one pumping period"
+
+
+def cells_of(results: pd.DataFrame, paper: pd.DataFrame) -> pd.DataFrame:
+    """Mean, standard deviation and number of seeds of every trained cell by three scores.
+
+    results : tidy accuracies in per cent (``accuracy.result_row``); paper : columns architecture,
+    dataset, mean, std. Columns score, architecture, dataset, mean, std, count.
+    """
+    scores = {
+        STRICT: summarise(results),
+        EITHER: summarise(results, "accuracy_either"),
+        PAPER: paper.assign(count=PAPER_SEEDS),
+    }
+    cells = pd.concat([table.assign(score=score) for score, table in scores.items()])
+    names = ["score", "architecture", "dataset", "mean", "std", "count"]
+    return cells.dropna(subset=["mean"]).reset_index(drop=True)[names]
+
+
+def paired_difference(better, worse) -> tuple[float, float, float]:
+    """Difference of two means and its 95 % interval (Welch 1947); better, worse: mean, std, count.
+
+    With fewer than two seeds on a side the interval is unknown: NaN. Without any spread on either
+    side it is the difference itself.
+    """
+    mean = float(better[0] - worse[0])
+    if min(better[2], worse[2]) < 2:
+        return mean, float("nan"), float("nan")
+    parts = np.array([std**2 / count for _, std, count in (better, worse)])
+    if not parts.any():
+        return mean, mean, mean
+    degrees = parts.sum() ** 2 / (parts**2 / [better[2] - 1, worse[2] - 1]).sum()
+    half = float(student.ppf(0.975, degrees) * np.sqrt(parts.sum()))
+    return mean, mean - half, mean + half
+
+
+def verdict_of_difference(low: float, high: float) -> str:
+    """What one comparison says of its claim: "supports", "opposes" or "open"."""
+    return "supports" if low > 0 else "opposes" if high < 0 else "open"
+
+
+def judge_claim(verdicts: list[str]) -> str:
+    """The claim's verdict by the rule at the head of this module."""
+    supporting = verdicts.count("supports")
+    if not verdicts:
+        return "untested"
+    if not supporting:
+        return "not"
+    clear = 2 * supporting > len(verdicts) and "opposes" not in verdicts
+    return "reproduced" if clear else "partly"
+
+
+def comparisons(cells: pd.DataFrame) -> pd.DataFrame:
+    """Every comparison that the cells (``cells_of``) allow.
+
+    Columns claim, score, dataset, better, worse (labels), difference, low, high (per cent of the
+    windows), verdict.
+    """
+    rows = []
+    for score, table in cells.groupby("score", sort=False):
+        runs = {(c.architecture, c.dataset): (c.mean, c.std, c.count) for c in table.itertuples()}
+        datasets = [name for name in dict.fromkeys(table.dataset) if name != RECORDINGS]
+        wanted = [
+            (claim.text, (better, dataset), (worse, dataset))
+            for claim in (KERNELS_IN_TIME, KERNELS_IN_IMAGES, DEPTH)
+            for dataset in datasets
+            for better, worse in claim.pairs
+        ] + [(CALIBRATION, (name, "CFD-MOC-P"), (name, "CFD-P")) for name in ARCHITECTURES]
+        for claim, better, worse in wanted:
+            if better in runs and worse in runs:
+                mean, low, high = paired_difference(runs[better], runs[worse])
+                rows.append(
+                    (claim, score, better[1], _label(better), _label(worse, beside=better))
+                    + (mean, low, high, verdict_of_difference(low, high))
+                )
+    names = "claim score dataset better worse difference low high verdict"
+    return pd.DataFrame(rows, columns=names.split())
+
+
+def judge_claims(compared: pd.DataFrame, cells: pd.DataFrame, period: float) -> pd.DataFrame:
+    """One row a claim and score: claim, score, verdict, evidence (a sentence).
+
+    compared : of ``comparisons``; cells : of ``cells_of``; period : samples between two pistons.
+    """
+    kernel = ARCHITECTURES["cnn1d_341_100"].kernel
+    spans = "reproduced" if abs(kernel - period) <= 1 else "not"
+    rows = [(PERIOD, "–", spans, f"{kernel} samples; one pumping period is {period:.1f} samples")]
+    scores = list(dict.fromkeys(cells.score))
+    for claim in (KERNELS_IN_TIME.text, KERNELS_IN_IMAGES.text, DEPTH.text, CALIBRATION):
+        for score in scores:
+            found = compared[(compared.claim == claim) & (compared.score == score)]
+            counts = found.verdict.value_counts()
+            evidence = "no comparison"
+            if len(found):
+                evidence = (
+                    f"{len(found)} comparisons: {counts.get('supports', 0)} support, "
+                    f"{counts.get('opposes', 0)} oppose; differences {found.difference.min():+.1f} "
+                    f"to {found.difference.max():+.1f}, median {found.difference.median():+.1f}"
+                )
+            rows.append((claim, score, judge_claim(list(found.verdict)), evidence))
+    for score in scores:
+        learnt = cells[(cells.score == score) & (cells.dataset == RECORDINGS)]["mean"]
+        full = int((learnt >= 100).sum())
+        word = "not" if not full else "reproduced" if full == len(learnt) else "partly"
+        evidence = f"{full} of {len(learnt)} networks; lowest mean {learnt.min():.1f} %"
+        if learnt.empty:
+            word, evidence = "untested", "no comparison"
+        rows.append((LEARNABLE, score, word, evidence))
+    return pd.DataFrame(rows, columns=["claim", "score", "verdict", "evidence"])
+
+
+def claims_markdown(judged: pd.DataFrame, compared: pd.DataFrame) -> str:
+    """The page: verdicts, the rule, every comparison of ours."""
+    lines = [
+        "# The paper's claims",
+        "",
+        "Accuracies on recordings. Each comparison is a difference of means, in per cent of the",
+        "windows, with its 95 % interval over seeds (Welch): it supports a claim where that",
+        "lies above zero, opposes it where it lies below, and is open otherwise. A claim is",
+        "reproduced where more than half of its comparisons support it and none opposes it, partly",
+        "where some support it but not so, not where none does; untested where nothing could be",
+        "compared. The same rule is laid on the paper's own table. Nothing corrects for the number",
+        "of comparisons: one in forty would support a claim by chance.",
+        "",
+        "| Claim | Score | Verdict | Numbers |",
+        "|---|---|---|---|",
+    ]
+    for row in judged.itertuples():
+        lines.append(f"| {row.claim} | {row.score} | **{row.verdict}** | {row.evidence} |")
+    for claim, rows in compared[compared.score != PAPER].groupby("claim", sort=False):
+        lines += [
+            "",
+            f"## {claim}",
+            "",
+            "| Score | Dataset | Better, says the paper | than | Difference | 95 % | |",
+            "|---|---|---|---|---|---|---|",
+        ]
+        for row in rows.itertuples():
+            lines.append(
+                f"| {row.score} | {row.dataset} | {row.better} | {row.worse} "
+                f"| {row.difference:+.1f} | {row.low:+.1f} to {row.high:+.1f} | {row.verdict} |"
+            )
+    return "\n".join(lines) + "\n"
+
+
+def _label(cell: tuple[str, str], beside: tuple[str, str] | None = None) -> str:
+    """The network, or the dataset where the network beside it is the same."""
+    return cell[1] if beside and cell[0] == beside[0] else ARCHITECTURES[cell[0]].title

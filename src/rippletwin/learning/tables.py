@@ -1,0 +1,110 @@
+"""Accuracy tables beside the paper's."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from rippletwin.learning.accuracy import (
+    summarise,
+)
+from rippletwin.learning.architectures import ARCHITECTURES, CLASSES
+
+DOMAIN_TITLES = {"time": "Time domain", "image": "Time-frequency domain"}
+
+
+def accuracy_table(rows: pd.DataFrame, paper: pd.DataFrame, column: str = "accuracy") -> str:
+    """The paper's table in markdown: ours, with the paper's mean and deviation in brackets.
+
+    rows : tidy results (``result_row``); paper : columns architecture, dataset, mean, std.
+    Datasets appear in the paper's order, each followed by that of the corrected twin, then those
+    the paper has not; a cell nobody ran, or nobody can score, is a dash.
+    """
+    ours, theirs = _cells(summarise(rows, column)), _cells(paper)
+    datasets = _in_order([*paper["dataset"], *rows["dataset"]])
+
+    lines = [
+        "| Input | Architecture | " + " | ".join(datasets) + " |",
+        "|---|---|" + "---|" * len(datasets),
+    ]
+    domain = None
+    for name, architecture in ARCHITECTURES.items():
+        first = DOMAIN_TITLES[architecture.domain] if architecture.domain != domain else ""
+        domain = architecture.domain
+        cells = []
+        for dataset in datasets:
+            cell = ours.get((name, dataset), "–")
+            if (name, dataset) in theirs:
+                cell += f" ({theirs[name, dataset]})"
+            cells.append(cell)
+        lines.append(f"| {first} | {architecture.title} | " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def cost_table(rows: pd.DataFrame, column: str = "accuracy") -> str:
+    """Markdown of what the left-out physics cost: each dataset beside the corrected twin's.
+
+    rows : tidy results (``result_row``). A line a network, and one for the mean of those networks
+    that ran on both; the cost is accuracy with the corrected twin less that with the calibrated,
+    in per cent of all windows. A cell nobody ran is a dash.
+    """
+    table = summarise(rows, column)
+    cells, means = _cells(table), table.set_index(["architecture", "dataset"])["mean"]
+    pairs = [(d, d + "+") for d in _in_order(rows["dataset"]) if d + "+" in set(rows["dataset"])]
+    ran = [name for name in ARCHITECTURES if name in set(rows["architecture"])]
+    head = [title for without, plus in pairs for title in (without, plus, "cost")]
+    lines = ["| Architecture | " + " | ".join(head) + " |", "|---|" + "---|" * len(head)]
+    for name in ran:
+        line = []
+        for pair in pairs:
+            without, plus = (means.get((name, dataset), np.nan) for dataset in pair)
+            cost = "–" if np.isnan(plus - without) else f"{plus - without:+.1f}"
+            line += [*(cells.get((name, dataset), "–") for dataset in pair), cost]
+        lines.append(f"| {ARCHITECTURES[name].title} | " + " | ".join(line) + " |")
+    line = []
+    for pair in pairs:
+        both = pd.DataFrame({d: means.xs(d, level="dataset") for d in pair}).dropna()
+        without, plus = (both[dataset].mean() for dataset in pair)
+        numbers = f"{without:.1f}", f"{plus:.1f}", f"{plus - without:+.1f}"
+        line += numbers if len(both) else ["–"] * 3
+    lines.append("| mean of networks | " + " | ".join(line) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def answer_table(answers: pd.DataFrame) -> str:
+    """Markdown of what networks say of recordings that cannot be scored: a class's share, per cent.
+
+    answers : columns recording, dataset, architecture and predicted (of ``CLASSES``), a row a
+    window and seed.
+    """
+    lines = [
+        "| Recording | Dataset | Architecture | windows | " + " | ".join(CLASSES) + " |",
+        "|---|---|---|---|" + "---|" * len(CLASSES),
+    ]
+    for keys, said in answers.groupby(["recording", "dataset", "architecture"], sort=False):
+        recording, dataset, architecture = keys
+        share = [f"{100 * (said['predicted'] == name).mean():.0f}" for name in CLASSES]
+        cells = [str(recording), dataset, ARCHITECTURES[architecture].title, str(len(said))]
+        lines.append("| " + " | ".join([*cells, *share]) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _in_order(datasets) -> list[str]:
+    """Each dataset once: a plus after its dataset, recordings last, else as they come."""
+    found = list(dict.fromkeys(datasets))
+    first = {dataset: k for k, dataset in reversed(list(enumerate(map(_without_plus, found))))}
+
+    def place(dataset):
+        return dataset == "experimental", first[_without_plus(dataset)], dataset
+
+    return sorted(found, key=place)
+
+
+def _without_plus(dataset: str) -> str:
+    return dataset.removesuffix("+")
+
+
+def _cells(table: pd.DataFrame) -> dict[tuple[str, str], str]:
+    keys = zip(table["architecture"], table["dataset"])
+    cells = {key: f"{m:.1f} ± {s:.1f}" for key, m, s in zip(keys, table["mean"], table["std"])}
+    return {key: text for key, text in cells.items() if not text.startswith("nan")}

@@ -1,0 +1,276 @@
+"""The line in the frequency domain: a source, segments in a row, inserts between them, a load.
+
+`Network` is a mutable description at given s: the effects of `rippletwin.twin.effects` change its
+arrays and append inserts, then it is asked for pressures, impedances or transfer matrices.
+
+Every answer comes from one sweep from the load to the pump in wave variables. Inside a segment
+
+    p = f + b,   q = (f - b)/Zc,   gamma = sqrt(Z'Y'),   Zc = gamma/Y'
+
+and a step of length d towards the pump multiplies f by exp(gamma d) and b by exp(-gamma d).
+The growing factor is taken out of both and put back as decay from the pump to the load, so
+nothing overflows however strong the loss, and only ratios of like-sized numbers are formed.
+(Transfer matrices of such lines: Wylie & Streeter 1993, Fluid Transients in Systems, ch. 12.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+LOADS = ("open", "closed", "anechoic", "impedance", "admittance", "state")
+
+
+class Insert(NamedTuple):
+    """A lumped element at `position` (m): a "shunt" admittance or a "series" impedance, (F,)."""
+
+    position: float
+    kind: str
+    immittance: np.ndarray
+
+
+@dataclass
+class Network:
+    """Source, line and load at the F values of `s`; SI units, peak amplitudes.
+
+    s                  (F,) 1/s, not zero
+    lengths            (n,) m, pump first
+    series, shunt      (n, F) Z' in Pa s/m4 and Y' in m2/(Pa s) of each segment
+    source_flow        (F,) or scalar, m3/s, of the ideal flow source at x = 0
+    source_admittance  (F,) or scalar, m3/(Pa s), parallel to that source
+    load               ("open" | "closed" | "anechoic", None), ("impedance", Z), ("admittance", Y)
+                       or ("state", (p, q)): the ratio p:q at the load, in any scale
+    inserts            list of Insert or of like tuples; those at one position are met in list
+                       order from pump to load
+    sensor_positions   (S,) m from the pump outlet
+    sensor_factor      (S, F) or broadcastable: what a sensor reads over the pressure at it
+    opening            (F,) of a valve at the load that follows the pressure, see `orifice`; what it
+                       does to a small ripple is an insert's
+    storage            what segments store beyond proportion to the pressure, at full amplitude
+    drains             (positions (N,), flows (N, F)) that leave the line whatever the pressure; for
+                       lines that let the ripple through, as with them no scale can be taken out
+    """
+
+    s: np.ndarray
+    lengths: np.ndarray
+    series: np.ndarray
+    shunt: np.ndarray
+    source_flow: np.ndarray | complex = 1.0
+    source_admittance: np.ndarray | complex = 0.0
+    load: tuple = ("closed", None)
+    inserts: list = field(default_factory=list)
+    sensor_positions: np.ndarray = ()
+    sensor_factor: np.ndarray | complex = 1.0
+    opening: np.ndarray | None = None
+    storage: list = field(default_factory=list)
+    drains: tuple | None = None
+
+    @property
+    def length(self) -> float:
+        """Length of the whole line, m."""
+        return float(np.sum(self.lengths))
+
+    def readings(self) -> np.ndarray:
+        """What the sensors read, (S, F) Pa: pressure at them times `sensor_factor`."""
+        return self.pressure_at(self.sensor_positions) * self.sensor_factor
+
+    def pressure_at(self, positions: np.ndarray) -> np.ndarray:
+        """Pressure at `positions` (S,), m, in any order: (S, F) Pa.
+
+        Beside an insert it is the value on the pump's side. Raises ValueError outside the line.
+        """
+        return self._respond(positions)[0]
+
+    def flow_at(self, positions: np.ndarray) -> np.ndarray:
+        """Flow towards the load at `positions` (S,): (S, F) m3/s; beside an insert, pump's side."""
+        return self._respond(positions)[1]
+
+    def input_impedance(self) -> np.ndarray:
+        """p/q at x = 0 looking at the line, (F,) Pa s/m3, inserts at x = 0 included."""
+        entry = self._sweep([self.load_state()])[2]
+        return entry[0, 0] / entry[0, 1]
+
+    def load_state(self) -> tuple[np.ndarray | complex, np.ndarray | complex]:
+        """A pair (p, q) in the load's ratio, each (F,) or scalar."""
+        kind, value = self.load
+        if kind == "open":
+            return 0.0, 1.0
+        if kind == "closed":
+            return 1.0, 0.0
+        if kind == "anechoic":
+            return np.sqrt(self.series[-1] / self.shunt[-1]), 1.0
+        if kind == "impedance":
+            return value, 1.0
+        if kind == "admittance":
+            return 1.0, value
+        if kind == "state":
+            return value
+        raise ValueError(f"load must be one of {LOADS}, not {kind!r}")
+
+    def load_relation(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(a, b, c), each (F,), with a p + b q = c at the load, whatever the load is.
+
+        This is Thévenin's theorem without its division, so it holds at resonance too.
+        """
+        _, _, entry, decay = self._sweep([(1.0, 0.0), (0.0, 1.0)])
+        a, b, *drained = entry[:, 1] + self.source_admittance * entry[:, 0]
+        return a, b, self.source_flow * decay - sum(drained)
+
+    def thevenin_at_load(self) -> tuple[np.ndarray, np.ndarray]:
+        """Open-circuit pressure (F,) Pa and source impedance (F,) Pa s/m3 seen by the load."""
+        a, b, c = self.load_relation()
+        return c / a, b / a
+
+    def transfer(self, start: float = 0.0, stop: float | None = None) -> np.ndarray:
+        """Matrix T (F, 2, 2) with [p, q](start) = T [p, q](stop), start <= stop, det T = 1.
+
+        Inserts at `start` are inside; those at `stop` only where it is the end of the line (the
+        default), so that T(0, x) T(x, l) = T(0, l). The elements grow as exp(gamma l): under
+        strong loss ask `pressure_at`, which does not form them.
+        """
+        end = self.length
+        stop = end if stop is None else stop
+        edges = np.clip(np.concatenate([[0.0], np.cumsum(self.lengths)]), start, stop)
+        inserts = [i for i in self.inserts if start <= i[0] < stop or i[0] == stop == end]
+        part = Network(
+            s=self.s,
+            lengths=np.diff(edges),
+            series=self.series,
+            shunt=self.shunt,
+            inserts=[(x - start, kind, value) for x, kind, value in inserts],
+        )
+        _, _, entry, decay = part._sweep([(1.0, 0.0), (0.0, 1.0)])
+        return (entry / decay).transpose(2, 1, 0)
+
+    def _respond(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Pressure and flow (S, F) at `positions` with the network's own source and load."""
+        pressure, flow, entry, decay = self._sweep([self.load_state()], positions)
+        own, *drained = entry[:, 1] + self.source_admittance * entry[:, 0]
+        if not drained:
+            scale = self.source_flow / own
+            return pressure[:, 0] * scale, flow[:, 0] * scale
+        scale = (self.source_flow * decay - drained[0]) / own
+        return tuple((x[:, 0] * scale + x[:, 1]) / decay for x in (pressure, flow))
+
+    def _sweep(self, states: list, positions: np.ndarray = ()) -> tuple[np.ndarray, ...]:
+        """Carry m load states (p, q) up to x = 0: pressure and flow (S, m, F) at the positions,
+        the pairs (m, 2, F) at x = 0, and the decay (F,) of the line.
+
+        What is met at x is scaled so that dividing by the decay of the whole line would give it
+        in the scale of `states`. Where there are drains, one more state follows: what they alone
+        make of a load at rest.
+        """
+        count = len(self.s)
+        at, leaving = self.drains or ((), np.empty((0, count), complex))
+        load = np.zeros((len(states) + (self.drains is not None), 2, count), complex)
+        for given, (p, q) in zip(load, states):
+            given[0], given[1] = p, q
+        values = np.empty((len(self.inserts), count), complex)
+        for row, (_, _, value) in zip(values, self.inserts):
+            row[:] = value
+        return _sweep(
+            np.ascontiguousarray(self.series, complex),
+            np.ascontiguousarray(self.shunt, complex),
+            np.array(self._plan(positions, at)),
+            values,
+            load,
+            np.ascontiguousarray(leaving, complex),
+            len(positions),
+        )
+
+    def _plan(self, positions: np.ndarray, drains: np.ndarray) -> list[tuple[int, int, float]]:
+        """Steps (what, index, distance) from the load to x = 0, for `_sweep`."""
+        starts = np.cumsum(self.lengths) - self.lengths
+        starts, here = starts.tolist(), self.length
+        # At one place inserts come before positions, the last of the list first.
+        order = [(-float(x), 0, -k) for k, (x, _, _) in enumerate(self.inserts)]
+        order += [(-float(x), 1, k) for k, x in enumerate(positions)]
+        order += [(-float(x), 2, k) for k, x in enumerate(drains)]
+        order.sort()
+        if order and (order[0][0] < -here * (1 + 1e-12) or order[-1][0] > 0.0):
+            raise ValueError(f"a position lies outside the line of {here} m")
+        k = len(starts) - 1
+        plan = [(_ENTER, k, 0.0)]
+        for x, what, index in [*order, (0.0, None, 0)]:
+            x = -x
+            while k > 0 and x < starts[k]:
+                plan.append((_WALK, k, here - starts[k]))
+                here = starts[k]
+                k -= 1
+                plan.append((_ENTER, k, 0.0))
+            plan.append((_WALK, k, max(here - x, 0.0)))
+            here = min(x, here)
+            if what == 1:
+                plan.append((_RECORD, index, 0.0))
+            elif what == 2:
+                plan.append((_DRAIN, index, 0.0))
+            elif what == 0:
+                kind = self.inserts[-index][1]
+                if kind not in ("shunt", "series"):
+                    raise ValueError(f"an insert is 'shunt' or 'series', not {kind!r}")
+                plan.append((_SHUNT if kind == "shunt" else _SERIES, -index, 0.0))
+                plan.append((_ENTER, k, 0.0))
+        return plan
+
+
+_ENTER, _WALK, _RECORD, _SHUNT, _SERIES, _DRAIN = range(6)
+
+
+@njit(cache=True, error_model="numpy")
+def _sweep(series, shunt, plan, values, load, leaving, stops):
+    """Follow `plan` at every frequency for every load state; see `Network._sweep`."""
+    states, count = load.shape[0], load.shape[2]
+    pressure = np.empty((stops, states, count), np.complex128)
+    flow = np.empty((stops, states, count), np.complex128)
+    entry = np.empty((states, 2, count), np.complex128)
+    total = np.empty(count, np.complex128)
+    p, q = np.empty(states, np.complex128), np.empty(states, np.complex128)
+    f, b = np.empty(states, np.complex128), np.empty(states, np.complex128)
+    factors = np.empty(len(plan), np.complex128)
+    for i in range(count):
+        p[:], q[:] = load[:, 0, i], load[:, 1, i]
+        gamma = zc = 0j
+        behind = 1.0 + 0j  # the factors taken out so far
+        for n in range(len(plan)):
+            what, index = int(plan[n, 0]), int(plan[n, 1])
+            if what == _ENTER:
+                gamma = np.sqrt(series[index, i] * shunt[index, i])
+                zc = gamma / shunt[index, i]  # on gamma's branch of the root
+                for m in range(states):
+                    zq = zc * q[m]
+                    f[m], b[m] = 0.5 * (p[m] + zq), 0.5 * (p[m] - zq)
+            elif what == _WALK:
+                factors[n] = np.exp(-gamma * plan[n, 2])
+                behind *= factors[n]
+                for m in range(states):
+                    b[m] *= factors[n] * factors[n]
+                    p[m], q[m] = f[m] + b[m], (f[m] - b[m]) / zc
+            elif what == _DRAIN:
+                gone = leaving[index, i] * behind
+                q[-1] += gone
+                f[-1] += 0.5 * zc * gone
+                b[-1] -= 0.5 * zc * gone
+            elif what == _SHUNT:
+                for m in range(states):
+                    q[m] += values[index, i] * p[m]
+            elif what == _SERIES:
+                for m in range(states):
+                    p[m] += values[index, i] * q[m]
+            else:
+                pressure[index, :, i], flow[index, :, i] = p, q
+        entry[:, 0, i], entry[:, 1, i] = p, q
+        # Back down from the pump, each place gets the decay between it and the pump.
+        decay = 1.0 + 0j
+        for n in range(len(plan) - 1, -1, -1):
+            what, index = int(plan[n, 0]), int(plan[n, 1])
+            if what == _WALK:
+                decay *= factors[n]
+            elif what == _RECORD:
+                for m in range(states):
+                    pressure[index, m, i] *= decay
+                    flow[index, m, i] *= decay
+        total[i] = decay
+    return pressure, flow, entry, total

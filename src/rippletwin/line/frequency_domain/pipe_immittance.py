@@ -1,0 +1,104 @@
+"""Series impedance and shunt admittance of a pipe segment, per metre.
+
+Laminar flow in a round pipe, long waves (wavelength much greater than the diameter):
+
+    -dp/dx = Z'(s) q,    -dq/dx = Y'(s) p
+
+Sources: Zielke (1968), J. Basic Eng. 90, 109, eq. 7 for the exact laminar friction;
+Stecki & Davis (1986), Proc. IMechE 200(A4), 215, for the comparison of the friction models.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from scipy.special import ive
+
+FRICTION_LAWS = ("none", "steady", "unsteady")
+
+
+def series_impedance(
+    s: np.ndarray, *, density: float, viscosity: float, diameter: float, friction: str = "unsteady"
+) -> np.ndarray:
+    """Series impedance Z'(s) of a full pipe in Pa s/m4.
+
+    `s` in 1/s (complex, s = 0 allowed), `density` in kg/m3, kinematic `viscosity` in m2/s,
+    `diameter` in m; all broadcast, so that diameters (n, 1) with s (F,) give (n, F).
+    `friction`:
+
+    * "none":     Z' = (rho/A) s
+    * "steady":   Z' = (rho/A) (s + 32 nu/D^2)           Hagen-Poiseuille at every frequency
+    * "unsteady": Z' = (rho/A) s I0(r)/I2(r), r = R sqrt(s/nu)   exact laminar (Zielke 1968, eq. 7)
+
+    Raises ValueError for another `friction`.
+    """
+    s = np.asarray(s, dtype=complex)
+    inertance = density / (0.25 * np.pi * diameter**2)
+    if friction == "none":
+        return inertance * s
+    if friction == "steady":
+        return inertance * (s + 32.0 * viscosity / diameter**2)
+    if friction == "unsteady":
+        rate = 4.0 * viscosity / diameter**2  # nu/R^2
+        return inertance * rate * scaled_friction(s / rate)
+    raise ValueError(f"friction must be one of {FRICTION_LAWS}, not {friction!r}")
+
+
+def shunt_admittance(
+    s: np.ndarray, *, density: float, wave_speed: float, diameter: float
+) -> np.ndarray:
+    """Shunt admittance Y'(s) = A s/(rho a^2) in m2/(Pa s); all arguments broadcast."""
+    area = 0.25 * np.pi * diameter**2
+    return np.asarray(s, dtype=complex) * (area / (density * wave_speed**2))
+
+
+def scaled_friction(sigma: np.ndarray) -> np.ndarray:
+    """sigma I0(r)/I2(r) with r = sqrt(sigma), the laminar friction in units of nu/R^2.
+
+    `sigma` = s R^2/nu, any shape, Re r >= 0. Finite to |r| = 1e4 and far beyond: Hankel's
+    asymptotic series (Abramowitz & Stegun 1964, 9.7.1) where it has reached rounding, scaled
+    Bessel functions elsewhere, and the power series near zero, where I2 vanishes as r^2/8.
+    """
+    sigma = np.asarray(sigma, dtype=complex)
+    r = np.sqrt(sigma)
+    large = r.real > _LARGE_RADIUS
+    asymptotic = _horner(1.0 / np.where(large, r, _LARGE_RADIUS).ravel()).reshape(r.shape)
+    if large.all():
+        return sigma * asymptotic
+    small = np.abs(r) < _SMALL_RADIUS
+    safe = np.where(small | large, 1.0, r)
+    bessel = ive(0, safe) / ive(2, safe)
+    # I0 = sum_k z^k/k!^2 and I2 = z sum_k z^k/(k! (k+2)!) with z = sigma/4
+    z = np.where(small, 0.25 * sigma, 0.0)
+    i0 = 1.0 + z * (1.0 + z * (1.0 / 4.0 + z / 36.0))
+    i2 = 0.5 + z * (1.0 / 6.0 + z * (1.0 / 48.0 + z / 720.0))
+    return np.where(small, 4.0 * i0 / i2, sigma * np.where(large, asymptotic, bessel))
+
+
+def _asymptotic_ratio(terms: int) -> np.ndarray:
+    """Coefficients c_k of I0(r)/I2(r) = sum_k c_k r^-k, from Hankel's series of each."""
+    top, bottom = ([1.0], [1.0])
+    for order, series in ((0, top), (2, bottom)):
+        for k in range(1, terms):
+            series.append(series[-1] * -(4 * order**2 - (2 * k - 1) ** 2) / (8 * k))
+    ratio = []
+    for k in range(terms):
+        ratio.append(top[k] - sum(ratio[i] * bottom[k - i] for i in range(k)))
+    return np.array(ratio)
+
+
+_SMALL_RADIUS = 0.05  # below this |r| the power series is exact to 1e-15
+_LARGE_RADIUS = 18.0  # above this Re r the asymptotic series is
+_ASYMPTOTIC = _asymptotic_ratio(18)
+
+
+@njit(cache=True)
+def _horner(x):
+    """sum_k c_k x^k of the asymptotic series, x (N,)."""
+    total = np.empty_like(x)
+    for i in range(len(x)):
+        value = 0j
+        for c in _ASYMPTOTIC[::-1]:
+            value = value * x[i] + c
+        total[i] = value
+    return total

@@ -1,0 +1,1 @@
+"""The line in the time domain: the method of characteristics."""

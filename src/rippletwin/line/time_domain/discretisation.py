@@ -1,0 +1,80 @@
+"""A line cut into pipes and junctions, and its elements into steps of time.
+
+Elements and branches cut the segments. What stands between two pipes is a junction: a ladder of
+rungs in order from pump to load. A piece that is too short for cells of its own (less than three)
+is a rung too, by its pi section: half of its capacitance, its inertance, the other half.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from rippletwin.line.time_domain.line_elements import Element, Line, Pipe, capacitance
+
+SHORTEST = 3  # cells
+TOUCH = 1e-9  # m: closer than this is the same place
+
+
+def bilinear(element: Element, dt: float) -> np.ndarray:
+    """(b0, b1, b2, a1, a2) of the element at steps of `dt` by the trapezoidal rule.
+
+    s = (2/dt)(z - 1)/(z + 1) keeps what is passive passive, hence stable (Dahlquist 1963).
+    """
+    degree = max(len(element.numerator), len(element.denominator)) - 1
+
+    def in_z(coefficients):
+        total = np.zeros(degree + 1)
+        for power, c in enumerate(coefficients[::-1]):
+            term = np.poly(np.r_[np.ones(power), -np.ones(degree - power)])
+            total += c * (2.0 / dt) ** power * term
+        return np.append(total, np.zeros(2 - degree))
+
+    b, a = in_z(element.numerator), in_z(element.denominator)
+    return np.array([*b / a[0], *a[1:] / a[0]])
+
+
+def cells_of(pipe: Pipe, dt: float) -> float:
+    """Length in cells; one that is whole but for rounding counts as whole."""
+    cells = pipe.length / (pipe.wave_speed * dt)
+    return round(cells) if abs(cells - round(cells)) < 1e-9 * max(cells, 1) else cells
+
+
+def discretise(line: Line, dt: float) -> tuple[list[Pipe], list[float], list[list]]:
+    """Segments cut where elements are: pipes, their starts, and the rungs before each and last."""
+    edges = np.concatenate([[0.0], np.cumsum([p.length for p in line.pipes])])
+    if any(not 0.0 <= i.position <= edges[-1] * (1 + 1e-12) for i in line.inserts):
+        raise ValueError(f"an element lies outside the line of {edges[-1]} m")
+    cuts = {i.position for i in line.inserts if np.min(np.abs(edges - i.position)) > TOUCH}
+    stops = np.array(sorted(set(edges) | cuts))
+    at = [int(np.argmin(np.abs(stops - i.position))) for i in line.inserts]
+    pipes, starts, joints = [], [], [list(line.source)]
+    for n, x in enumerate(stops):
+        if n > 0:
+            before = stops[n - 1]
+            parent = line.pipes[int(np.searchsorted(edges, before, side="right")) - 1]
+            whole = abs((x - before) - parent.length) < 1e-12 * parent.length
+            piece = parent if whole else replace(parent, length=float(x - before))
+            if whole or cells_of(piece, dt) >= SHORTEST:
+                pipes.append(piece)
+                starts.append(float(before))
+                joints.append([])
+            else:
+                joints[-1] += _pi_section(piece, line)
+        joints[-1] += [insert for insert, k in zip(line.inserts, at) if k == n]
+    joints[-1] += line.load
+    if not pipes:
+        raise ValueError("the line is cut into pieces shorter than three steps")
+    return pipes, starts, joints
+
+
+def _pi_section(piece: Pipe, line: Line) -> list[Element]:
+    """A piece much shorter than the wave, its wall elastic and yielding."""
+    piece, area = piece.linear(line.density), 0.25 * np.pi * piece.diameter**2
+    half = 0.5 * area * piece.length / (line.density * piece.wave_speed**2)
+    mass = line.density * piece.length / area
+    loss = 0.0 if line.friction == "none" else 32.0 * line.viscosity / piece.diameter**2
+    side = [capacitance(0.0, half)]
+    side += [Element(0.0, "shunt", (half * kappa, 0.0), (tau, 1.0)) for kappa, tau in piece.creep]
+    return [*side, Element(0.0, "series", (mass, mass * loss)), *side]

@@ -1,0 +1,254 @@
+"""A line cut into pipes, junctions and cells for the method of characteristics, and its state.
+
+Pipes and junctions are those of `rippletwin.line.time_domain.discretisation`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
+from rippletwin.line.time_domain import moc_kernel, weighting_functions
+from rippletwin.line.time_domain.discretisation import TOUCH, bilinear, cells_of, discretise
+from rippletwin.line.time_domain.line_elements import ENDS, Branch, Line
+
+
+class Grid:
+    """Pipes, junctions and their state as flat arrays. Raises ValueError as `moc.simulate`."""
+
+    def __init__(self, line: Line):
+        self.line, self.dt = line, line.period / len(line.flow)
+        self.mean = float(np.mean(line.flow))
+        self.pipes, self.starts, joints = discretise(line, self.dt)
+        self.main = len(self.pipes)
+        self.thicker = [1.0] * self.main  # than the line's oil
+        self._rungs(joints)
+        self._lay()
+        self._losses()
+        self._end()
+        self._start()
+
+    def _rungs(self, joints):
+        """Rungs of all junctions one after the other; a branch's pipe comes after the line's."""
+        self.rungs = np.cumsum([0] + [len(joint) for joint in joints])
+        self.ladder = [rung for joint in joints for rung in joint]
+        self.kinds = np.zeros((len(self.ladder), 2), dtype=np.int64)
+        self.filters = np.zeros((len(self.ladder) + 1, 5))  # the last is the load's valve
+        if self.line.end.valve is not None:
+            self.filters[-1] = bilinear(self.line.end.valve, self.dt)
+        for r, rung in enumerate(self.ladder):
+            if isinstance(rung, Branch):
+                self.kinds[r] = moc_kernel.BRANCH, len(self.pipes)
+                self.pipes.append(rung.pipe)
+                self.thicker.append(rung.viscosity_ratio)
+                self.starts.append(rung.position)
+            else:
+                self.kinds[r, 0] = {"shunt": moc_kernel.SHUNT, "series": moc_kernel.SERIES}[
+                    rung.kind
+                ]
+                self.filters[r] = bilinear(rung, self.dt)
+
+    def _lay(self):
+        """Nodes: first the left end, N cells on, then the right end theta cells further."""
+        offsets, thetas, x, total = [], [], [], 0
+        for k, (pipe, start) in enumerate(zip(self.pipes, self.starts)):
+            dx, cells = pipe.wave_speed * self.dt, cells_of(pipe, self.dt)
+            inner = int(np.floor(cells)) - 2
+            if inner < 1:
+                raise ValueError(
+                    f"a pipe of {pipe.length} m is shorter than three steps of {dx} m: "
+                    "take more steps a period"
+                )
+            offsets.append(total)
+            thetas.append(cells - inner)
+            along = np.append(np.arange(inner + 1) * dx, pipe.length)
+            x.append(start + (along if k < self.main else 0.0 * along))
+            total += inner + 2
+        self.offsets, self.thetas = np.array([*offsets, total]), np.array(thetas)
+        self.x, self.load_node = np.concatenate(x), int(self.offsets[self.main]) - 1
+        age = np.arange(1.0, 5.0)
+        self.taps = np.array(
+            [[np.prod([(t - j) / (i - j) for j in age if j != i]) for i in age] for t in thetas]
+        )
+
+    def _losses(self):
+        """Per pipe Zc, r/2, u/2 and sum_k share_k phi_k; the recursions of friction and wall.
+
+        share_k = kappa_k dt/(2 tau_k); over a step the wall's k-th state b follows the pressure
+        as b <- E b + phi (1 - E) p, E = exp(-dt/tau), phi = (1 - E) tau/dt.
+        """
+        line, rows, recursions = self.line, [], []
+        terms = max(len(pipe.creep) for pipe in self.pipes)
+        self.keep, self.follow, self.share = np.zeros((3, len(self.pipes), terms))
+        self.laws = np.zeros((len(self.pipes), max(1, *(len(pipe.law) for pipe in self.pipes))))
+        for k, pipe in enumerate(self.pipes):
+            area, radius = 0.25 * np.pi * pipe.diameter**2, 0.5 * pipe.diameter
+            inertance = line.density / area * pipe.wave_speed * self.dt
+            rate = self.thicker[k] * line.viscosity / radius**2
+            soft = 0.0
+            for m, (kappa, tau) in enumerate(pipe.creep):
+                x = self.dt / tau
+                phi = -np.expm1(-x) / x
+                self.keep[k, m] = np.exp(-x)
+                self.follow[k, m] = -phi * np.expm1(-x)
+                self.share[k, m] = 0.5 * x * kappa
+                soft += self.share[k, m] * phi
+            self.laws[k, : len(pipe.law)] = pipe.law
+            self.laws[k, 1:] *= line.density * pipe.wave_speed**2
+            rows.append(
+                (
+                    line.density * pipe.wave_speed / area,
+                    0.0 if line.friction == "none" else 0.5 * inertance * 8.0 * rate,
+                    0.5 * inertance * 4.0 * rate if line.friction == "unsteady" else 0.0,
+                    soft,
+                )
+            )
+            recursions.append(weighting_functions.recursion(rate * self.dt))
+        self.parameters = np.array(rows)
+        self.decays, self.gains, self.bends = np.array(recursions).transpose(1, 0, 2).copy()
+
+    def _end(self):
+        """(law, coefficient, pressure, constant flow, conductance) of the load for the kernel."""
+        end, laws = self.line.end, {"orifice": 2, "open": 1}
+        if end.kind not in ENDS:
+            raise ValueError(f"end must be one of {ENDS}, not {end.kind!r}")
+        if end.kind == "closed" and abs(self.mean) > 1e-9 * np.max(np.abs(self.line.flow)):
+            raise ValueError("a mean flow into a closed end")
+        linear = {
+            "anechoic": 1.0 / self.parameters[self.main - 1, 0],
+            "resistance": end.coefficient,
+        }
+        conductance = linear.get(end.kind, 0.0)
+        constant = self.mean - conductance * end.pressure if conductance else 0.0
+        law = laws.get(end.kind, 0)
+        self.load = (law, end.coefficient, end.pressure, constant, conductance)
+
+    def _steady(self, mean):
+        """Pressure at every node of the line, Pa, at a steady flow `mean`: it falls linearly."""
+        end, after = self.line.end, 0.0
+        exit_pressure = end.pressure
+        if end.kind == "orifice":
+            exit_pressure += (mean / end.coefficient) ** 2
+        pressure = np.empty(self.load_node + 1)
+        for k in range(self.main - 1, -1, -1):
+            pipe, part = self.pipes[k], slice(self.offsets[k], self.offsets[k + 1])
+            drop = 2.0 * self.parameters[k, 1] * mean / (pipe.wave_speed * self.dt)
+            rest = self.starts[k] + pipe.length - self.x[part]
+            pressure[part] = exit_pressure + after + drop * rest
+            after += drop * pipe.length
+        return pressure
+
+    def _start(self):
+        """Steady flow of the mean."""
+        reference = self.line.mean_flow if self.line.mean_flow is not None else self.mean
+        count = self.offsets[-1]
+        self.pressure, self.steady, self.flow = np.empty(count), np.empty(count), np.zeros(count)
+        self.pressure[: self.load_node + 1] = self._steady(self.mean)
+        self.flow[: self.load_node + 1] = self.mean
+        self.steady[: self.load_node + 1] = steady = self._steady(reference)
+        self.references, self.state = np.zeros(len(self.filters)), np.zeros((len(self.filters), 2))
+        for r, rung in enumerate(self.ladder):
+            joint = int(np.searchsorted(self.rungs, r, side="right")) - 1
+            node = self.load_node if joint == self.main else self.offsets[joint]
+            if self.kinds[r, 0] == moc_kernel.BRANCH:
+                k = self.kinds[r, 1]
+                self.pressure[self.offsets[k] : self.offsets[k + 1]] = self.pressure[node]
+                self.steady[self.offsets[k] : self.offsets[k + 1]] = steady[node]
+                continue
+            now = self.mean, reference
+            if rung.kind == "shunt":
+                now = self.pressure[node], steady[node]
+            self._rest(r, rung, *now)
+        if self.line.end.valve is not None:
+            self._rest(-1, self.line.end.valve, self.pressure[self.load_node], steady[-1])
+        # A wall at rest holds b = phi p = follow/(1 - keep) p.
+        held = self.follow / np.where(self.share > 0.0, 1.0 - self.keep, 1.0)
+        sizes = np.diff(self.offsets)
+        self.strain = np.repeat(held.T, sizes, axis=1) * self.pressure
+        self.held = np.zeros((3, count))
+        x = (self.pressure - self.steady) / np.repeat(np.maximum(self.laws[:, 0], 1.0), sizes)
+        for power, c in enumerate(self.laws[:, 1:].T):
+            self.held[0] += np.repeat(c, sizes) * x ** (power + 1)
+        self.memory = np.zeros((len(weighting_functions.FRICTION_RATES), count))
+        self.change, self.last_change = np.zeros(count), np.zeros(count)
+        zc = np.repeat(self.parameters[:, 0], sizes)
+        loss = np.repeat(self.parameters[:, 1], sizes) * self.flow
+        self.forward = self.pressure + zc * self.flow - loss
+        self.backward = self.pressure - zc * self.flow + loss
+        last, near = self.offsets[1:] - 1, self.offsets[1:] - 2
+        self.history = np.empty((len(self.pipes), 2, 4))
+        more = (self.thetas - 1.0)[:, None]
+        self.history[:, 0] = (self.forward[near] - more[:, 0] * loss[near])[:, None]
+        self.history[:, 1] = (self.backward[last] + more[:, 0] * loss[last])[:, None]
+
+    def _rest(self, r, element, now, reference):
+        """The state of a filter that has long seen `now`."""
+        self.references[r] = reference
+        u, (b0, _, b2, _, a2) = now - reference, self.filters[r]
+        y = u * element.immittance(0.0)
+        self.state[r] = y - b0 * u, b2 * u - a2 * y
+
+    def advance(self, nodes):
+        """One period: pressure and flow (len(nodes), M) at `nodes`, the state moved on."""
+        return moc_kernel.advance(
+            np.asarray(self.line.flow, dtype=float),
+            nodes,
+            self.main,
+            self.offsets,
+            self.thetas,
+            self.taps,
+            self.parameters,
+            self.decays,
+            self.gains,
+            self.bends,
+            self.keep,
+            self.follow,
+            self.share,
+            self.laws,
+            self.rungs,
+            self.kinds,
+            self.filters,
+            self.references,
+            self.load,
+            self.pressure,
+            self.flow,
+            self.forward,
+            self.backward,
+            self.strain,
+            self.steady,
+            self.held,
+            self.memory,
+            self.change,
+            self.last_change,
+            self.history,
+            self.state,
+        )
+
+    def locate(self, x):
+        """(pipe, nearest node, distance from it to x towards the load, m)."""
+        if not -1e-12 <= x <= self.line.length * (1 + 1e-12):
+            raise ValueError(f"position {x} m lies outside the line of {self.line.length} m")
+        starts = np.array(self.starts[: self.main])
+        ends = starts + [pipe.length for pipe in self.pipes[: self.main]]
+        # On an edge the pipe on the pump's side, whose flow has not passed the element there.
+        away = np.maximum(np.maximum(starts - x, x - ends), TOUCH)
+        k = int(np.argmin(away))
+        nodes = np.arange(self.offsets[k], self.offsets[k + 1])
+        node = int(nodes[np.argmin(np.abs(self.x[nodes] - x))])
+        offset = x - self.x[node]
+        return k, node, 0.0 if abs(offset) < TOUCH else float(offset)
+
+    def shift(self, k, offset, pressure, flow):
+        """Periodic pressure and flow (M,) a fraction of a cell further on, by the exact line."""
+        line, pipe = self.line, self.pipes[k].linear(self.line.density)
+        p, q = np.fft.rfft(pressure), np.fft.rfft(flow)
+        s = 2j * np.pi * np.arange(1, len(p)) / line.period
+        fluid = {"density": line.density, "diameter": pipe.diameter}
+        z = series_impedance(s, viscosity=line.viscosity, friction=line.friction, **fluid)
+        y = shunt_admittance(s, wave_speed=pipe.wave_speed, **fluid) * pipe.yielding(s)
+        gamma, zc = np.sqrt(z * y), np.sqrt(z / y)
+        c, d = np.cosh(gamma * offset), np.sinh(gamma * offset)
+        resistance = 2.0 * self.parameters[k, 1] / (pipe.wave_speed * self.dt)
+        p[0] -= resistance * offset * q[0]
+        p[1:], q[1:] = c * p[1:] - zc * d * q[1:], c * q[1:] - d / zc * p[1:]
+        return np.fft.irfft(p, len(pressure)), np.fft.irfft(q, len(flow))

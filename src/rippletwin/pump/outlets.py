@@ -1,0 +1,110 @@
+"""What the pump delivers into: a constant pressure, a given pressure, or a pipe with an orifice."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import resample
+
+from rippletwin.case.model import Segment
+
+DELAY_TOLERANCE = 1e-5  # relative, of the pipe's travel time as a whole number of steps
+
+
+@dataclass(frozen=True)
+class ConstantPressure:
+    """An outlet held at `pressure` (Pa, absolute)."""
+
+    pressure: float
+
+
+@dataclass(frozen=True)
+class PressureWave:
+    """An outlet whose pressure (M,), Pa absolute, is given at M even angles of a revolution."""
+
+    pressure: np.ndarray
+
+
+@dataclass(frozen=True)
+class Pipe:
+    """A uniform pipe with steady laminar friction and an orifice q = K_v sqrt(p) at its end.
+
+    Give either `load_pressure` (Pa), the pressure upstream of the orifice at the mean flow, from
+    which K_v follows, or K_v itself as `orifice` (m3/s/sqrt(Pa)): a faulty pump meets the orifice
+    that the healthy one left. Sensors at `sensor_positions` (m from the pump).
+    """
+
+    segment: Segment
+    sensor_positions: tuple[float, ...] = ()
+    load_pressure: float | None = None
+    orifice: float | None = None
+
+    def __post_init__(self):
+        if (self.load_pressure is None) == (self.orifice is None):
+            raise ValueError("give either load_pressure or orifice")
+        if not all(0.0 <= x <= self.segment.length for x in self.sensor_positions):
+            raise ValueError("a sensor lies outside the pipe")
+
+
+def choose_steps(pistons, period, outlet, least):
+    """Steps a revolution and cells of the pipe.
+
+    A multiple of the pistons, so that all of them see the same angles, and such that a wave needs
+    a whole number of steps for the pipe: the method of characteristics then needs neither
+    interpolation nor an altered wave speed.
+    """
+    first = -(-least // pistons) * pistons
+    if not isinstance(outlet, Pipe):
+        return first, 0
+    candidates = first + pistons * np.arange(max(first // pistons, 1))
+    cells = outlet.segment.delay * candidates / period
+    error = np.abs(cells - np.rint(cells)) / cells
+    good = np.flatnonzero((error < DELAY_TOLERANCE) & (cells > 3.5))
+    if not len(good):
+        raise ValueError(f"a pipe of {outlet.segment.length} m is too short for {least} steps")
+    return int(candidates[good[0]]), int(np.rint(cells[good[0]]))
+
+
+def pipe_state(fluid, outlet, step, cells, mean_flow):
+    """Constants of the line, its steady state at `mean_flow`, and the sensors' nodes and weights.
+
+    Sensors between nodes read a cubic through the four nearest ones.
+    """
+    if not cells:
+        empty = np.zeros(0)
+        return (0.0, 0.0, 0.0), empty, empty, np.zeros((0, 5))
+    segment = outlet.segment
+    zc = fluid.density * segment.wave_speed / segment.area
+    viscosity = fluid.density * fluid.kinematic_viscosity
+    friction = 128 * viscosity / (np.pi * segment.diameter**4)  # Hagen-Poiseuille, Pa s/m4
+    half = 0.5 * friction * segment.length / cells
+    k_v = outlet.orifice or mean_flow / np.sqrt(outlet.load_pressure)
+    drop = friction * segment.length * mean_flow
+    line_p = (mean_flow / k_v) ** 2 + drop * np.linspace(1.0, 0.0, cells + 1)
+    line_q = np.full(cells + 1, mean_flow)
+
+    sensors = np.zeros((len(outlet.sensor_positions), 5))
+    for row, x in zip(sensors, outlet.sensor_positions):
+        node = x / segment.length * cells
+        row[0] = np.clip(np.floor(node) - 1, 0, cells - 3)
+        u = node - row[0]
+        for m in range(4):
+            others = np.delete(np.arange(4), m)
+            row[1 + m] = np.prod((u - others) / (m - others))
+    return (zc, half, k_v), line_p, line_q, sensors
+
+
+def pressure_at_steps(pressure, steps):
+    """The outlet's pressure at the end of each step, (steps,)."""
+    if np.ndim(pressure) == 0:
+        return np.full(steps, float(pressure))
+    return np.roll(resample(np.asarray(pressure, float), steps), -1)
+
+
+def resample_periodic(values, samples):
+    """Values (K, ...) over a period to `samples` <= K, keeping the harmonics both can hold."""
+    spectrum = np.fft.rfft(values, axis=0)[: samples // 2 + 1]
+    if samples % 2 == 0 and samples < len(values):
+        spectrum[-1] = 0.0
+    return np.fft.irfft(spectrum, samples, axis=0) * (samples / len(values))

@@ -1,0 +1,1 @@
+"""From recordings to complex spectra with a covariance."""

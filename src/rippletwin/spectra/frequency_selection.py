@@ -1,0 +1,67 @@
+"""Which frequencies of an observation are used: below a limit, piston orders, every n-th bin."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+
+def select_fitted_frequencies(observations: Sequence, rig, highest_hz: float | None = None) -> list:
+    """The observations as they are fitted.
+
+    Of a periodic recording the piston orders, the only ones a healthy nominal pump makes; of a
+    dense spectrum twelve frequencies a resonance of the line: a model's error has the bandwidth of
+    the line's own resonances, so that closer points are no further evidence.
+    """
+    spacing = 1.0 / (24.0 * rig.delay)
+    prepared = []
+    for o in observations:
+        o = select_below(o, highest_hz)
+        if o.orders is not None:
+            keep = np.asarray(o.orders) % rig.pump["pistons"] == 0
+        else:
+            keep = np.zeros(len(o.frequency_hz), bool)
+            keep[
+                np.unique(
+                    np.searchsorted(
+                        o.frequency_hz, np.arange(o.frequency_hz[0], o.frequency_hz[-1], spacing)
+                    )
+                )
+            ] = True
+        prepared.append(select_frequencies(o, keep))
+    return prepared
+
+
+def select_frequencies(observation, keep: np.ndarray):
+    """The observation at the frequencies of a mask."""
+    return replace(
+        observation,
+        frequency_hz=observation.frequency_hz[keep],
+        orders=None if observation.orders is None else observation.orders[keep],
+        values=observation.values[:, keep],
+        covariance=observation.covariance[keep],
+    )
+
+
+def select_below(observation, max_frequency_hz: float | None = None, pistons: int = 1):
+    """The observation at and below a frequency, and at multiples of `pistons` shaft orders.
+
+    At least its lowest frequency is kept.
+    """
+    keep = np.ones(len(observation.frequency_hz), dtype=bool)
+    if observation.orders is not None:
+        keep &= np.asarray(observation.orders) % pistons == 0
+    if max_frequency_hz is not None:
+        lowest = np.min(observation.frequency_hz[keep])
+        keep &= observation.frequency_hz <= max(max_frequency_hz, lowest)
+    if np.all(keep):
+        return observation
+    return replace(
+        observation,
+        frequency_hz=observation.frequency_hz[keep],
+        orders=None if observation.orders is None else observation.orders[keep],
+        values=observation.values[:, keep],
+        covariance=observation.covariance[keep],
+    )

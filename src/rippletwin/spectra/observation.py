@@ -1,0 +1,193 @@
+"""From recordings to observations: complex values with a covariance, whatever the kind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from rippletwin.case.model import FlowRipple, Recording, Rig, Sensor
+from rippletwin.spectra.angular_resampling import Revolutions, cut_revolutions
+from rippletwin.spectra.noise import noise_cycle_scatter, noise_mad
+from rippletwin.spectra.speed_regression import harmonics_at_mean_speed, mean_speed
+from rippletwin.spectra.transfer_function import reference_spectra
+
+__all__ = [
+    "Observation",
+    "Revolutions",
+    "cut_revolutions",
+    "noise_cycle_scatter",
+    "noise_mad",
+    "observe",
+    "revolutions_of",
+]
+
+HIGHEST_HZ = 5000.0
+DEFAULT_RELATIVE_ERROR = 0.02
+SMOOTHED = 51
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What every later stage sees of a recording.
+
+    values (S, F) complex: peak amplitudes in Pa (periodic, random, spectrum), or the impedance
+    (S = 1; Pa s/m3, or in units of the first segment's characteristic impedance if `normalised`).
+    covariance (F, S, S) = E[e e^H] of the complex errors e of values, taken as circular: the real
+    and the imaginary part each have half the variance. orders (F,) are shaft orders, None where the
+    source is not the shaft. mean (S,) is the mean pressure. `source` says what is known of it:
+    "known" (impedance), "nominal" (a flow ripple or a pump model exists) or "free".
+    """
+
+    kind: str
+    label: str
+    frequency_hz: np.ndarray
+    orders: np.ndarray | None
+    values: np.ndarray
+    covariance: np.ndarray
+    mean: np.ndarray
+    speed_hz: float | None
+    load_pressure: float | None
+    source: str
+    flow_ripple: FlowRipple | None
+    sensors: tuple[Sensor, ...]
+    normalised: bool = False
+
+
+def observe(
+    recording: Recording,
+    rig: Rig,
+    max_frequency_hz: float | None = None,
+    piston_harmonics_only: bool = False,
+    revolutions: Revolutions | None = None,
+) -> Observation:
+    """The observation in a recording.
+
+    max_frequency_hz : highest frequency kept; None is 5 kHz, or 0.4 times the sampling rate where
+        that is lower, or all of a spectrum.
+    piston_harmonics_only : keep only the orders that are multiples of the number of pistons.
+    revolutions : of a periodic recording, where they have been cut already (`revolutions_of`).
+    """
+    if recording.kind == "periodic":
+        revolutions = revolutions or revolutions_of(recording, rig)
+        return _observe_periodic(
+            recording, rig, revolutions, max_frequency_hz, piston_harmonics_only
+        )
+    if recording.kind == "random":
+        return _observe_random(recording, rig, max_frequency_hz)
+    return _observe_spectra(recording, rig, max_frequency_hz)
+
+
+def revolutions_of(
+    recording: Recording, rig: Rig, samples_per_revolution: int | None = None
+) -> Revolutions:
+    """The whole revolutions of a periodic recording."""
+    return cut_revolutions(
+        recording.pressure,
+        recording.sampling_rate_hz,
+        rig.pump["pistons"],
+        recording.speed_rpm,
+        samples_per_revolution,
+    )
+
+
+def _observe_periodic(
+    recording, rig, revolutions, max_frequency_hz, piston_harmonics_only
+) -> Observation:
+    speed_hz = mean_speed(revolutions.speed_hz)
+    highest = _highest(max_frequency_hz, recording.sampling_rate_hz)
+    orders = np.arange(1, int(highest / speed_hz) + 1)
+    spectra = 2 * np.fft.rfft(revolutions.windows, axis=2)[:, :, orders]
+    spectra /= revolutions.windows.shape[2]
+    values, covariance = harmonics_at_mean_speed(spectra, revolutions.speed_hz, orders)
+    if piston_harmonics_only:
+        kept = orders % rig.pump["pistons"] == 0
+        orders, values, covariance = orders[kept], values[:, kept], covariance[kept]
+    nominal = recording.flow_ripple is not None or len(rig.pump) > 1
+    return Observation(
+        kind=recording.kind,
+        label=recording.label,
+        frequency_hz=orders * speed_hz,
+        orders=orders,
+        values=values,
+        covariance=covariance,
+        mean=revolutions.windows.mean(axis=(0, 2)),
+        speed_hz=speed_hz,
+        load_pressure=recording.load_pressure,
+        source="nominal" if nominal else "free",
+        flow_ripple=recording.flow_ripple,
+        sensors=rig.sensors,
+    )
+
+
+def _observe_random(recording, rig, max_frequency_hz) -> Observation:
+    values, covariance, frequency_hz = reference_spectra(
+        recording.pressure, recording.sampling_rate_hz, rig
+    )
+    keep = frequency_hz <= _highest(max_frequency_hz, recording.sampling_rate_hz)
+    return Observation(
+        kind=recording.kind,
+        label=recording.label,
+        frequency_hz=frequency_hz[keep],
+        orders=None,
+        values=values[:, keep],
+        covariance=covariance[keep],
+        mean=recording.pressure.mean(axis=1),
+        speed_hz=None,
+        load_pressure=recording.load_pressure,
+        source="free",
+        flow_ripple=None,
+        sensors=rig.sensors,
+    )
+
+
+def _observe_spectra(recording, rig, max_frequency_hz) -> Observation:
+    keep = slice(None)
+    if max_frequency_hz is not None:
+        keep = recording.frequency_hz <= max_frequency_hz
+    frequency_hz, repeats = recording.frequency_hz[keep], recording.spectra[:, :, keep]
+    values = repeats.mean(axis=0)
+    impedance = recording.kind == "input_impedance"
+    if impedance:
+        first = rig.line[0]
+        unit = 1.0 if recording.normalised else rig.fluid.density * first.wave_speed / first.area
+        # errors are even in the reflection coefficient (Z - Zc)/(Z + Zc); dZ = (Z + Zc)^2/(2 Zc) dR
+        size = np.abs(values + unit) ** 2 / (2 * unit)
+    else:
+        size = np.sqrt(np.mean(np.abs(values) ** 2, axis=0, keepdims=True)) * np.ones_like(values)
+    relative = recording.relative_error or DEFAULT_RELATIVE_ERROR
+    if len(repeats) > 1:
+        relative = _relative_scatter(repeats - values, np.abs(size))
+    variance = (relative * np.abs(size)) ** 2
+    return Observation(
+        kind=recording.kind,
+        label=recording.label,
+        frequency_hz=frequency_hz,
+        orders=None,
+        values=values,
+        covariance=np.einsum("sf,st->fst", variance, np.eye(len(values))).astype(complex),
+        mean=np.full(len(values), recording.load_pressure or 0.0),
+        speed_hz=None,
+        load_pressure=recording.load_pressure,
+        source="known" if impedance else "free",
+        flow_ripple=None,
+        sensors=() if impedance else rig.sensors,
+        normalised=recording.normalised,
+    )
+
+
+def _relative_scatter(residual: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Relative standard deviation (S, F) of the mean of repeats from `residual` (R, S, F).
+
+    Two or three repeats say little at one frequency, so the scatter is smoothed over SMOOTHED of
+    them.
+    """
+    count = len(residual)
+    variance = np.sum(np.abs(residual / size) ** 2, axis=0) / (count - 1) / count
+    return np.sqrt(uniform_filter1d(variance, SMOOTHED, axis=-1, mode="nearest"))
+
+
+def _highest(max_frequency_hz: float | None, sampling_rate_hz: float) -> float:
+    limit = HIGHEST_HZ if max_frequency_hz is None else max_frequency_hz
+    return min(limit, 0.4 * sampling_rate_hz)

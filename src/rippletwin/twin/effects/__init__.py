@@ -1,0 +1,1 @@
+"""Effects: physics that a twin may lack, one module each."""

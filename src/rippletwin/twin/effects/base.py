@@ -1,0 +1,216 @@
+"""What an effect is: a piece of physics that a twin may lack, at a place it can be.
+
+An effect is one file in this folder that defines `EFFECT`, an instance of `Effect`. The registry
+finds it there; nothing else changes. It says the same thing twice: `apply` mutates a network of
+the frequency domain (`rippletwin.line.frequency_domain.line_network.Network`), `in_time` a line of the time domain
+(`rippletwin.line.time_domain.line_elements.Line`): its pipes, elements, flow or sensors.
+
+For `apply`, values may be floats or arrays of shape (B, 1) for B parameter sets at once:
+everything there is elementwise, so that a network with leading batch dimension is mutated by the
+same lines. `in_time` gets floats and a `LineState` of one operating point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtri
+
+from rippletwin.twin.priors import Prior, uniform
+
+ATMOSPHERE = 1.01325e5  # Pa; pressures of a case are above it
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of an effect: name, unit (SI), proper prior.
+
+    `scan` holds the prior's coordinates that a fit should set out from, each of them, because the
+    likelihood has several valleys along this parameter.
+    """
+
+    name: str
+    unit: str
+    prior: Prior
+    scan: tuple[float, ...] = (0.0,)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an effect acts.
+
+    element  as in a verdict: "line", "segment 2" (counted from 1), "position", "load", "source",
+             "sensor p1"
+    index    of the segment or sensor, from 0; None elsewhere
+    form     the variant where an effect has several equations, else None
+    """
+
+    element: str
+    index: int | None = None
+    form: str | None = None
+
+    def __str__(self) -> str:
+        return self.element if self.form is None else f"{self.element} ({self.form})"
+
+
+@dataclass
+class LineState:
+    """The numbers of the line at which an effect acts; each may carry a batch dimension (B, 1).
+
+    density          kg/m3
+    viscosity        kinematic, m2/s
+    friction         law of the line with all its effects, as in `segment.series_impedance`
+    diameters, lengths   (n,) of m, wave_speeds (n,) of m/s: one entry a segment, pump first
+    mean_pressure    Pa absolute at the load, (F,) or scalar: of the operating point each frequency
+                     belongs to
+    load_resistance  static dp/dq of the load in Pa s/m3, (F,) or scalar; None where it has none
+    heat_capacity_ratio, prandtl   of a gas, else None
+    orders, recording, mean_flow   shaft order, recording's number and mean flow (m3/s) of each
+                     frequency, (F,); None where there is no shaft
+    load_passes_flow whether the load's coefficient rests on that mean flow: what leaves the line
+                     before the load has not passed it
+    """
+
+    density: float
+    viscosity: float
+    diameters: np.ndarray
+    wave_speeds: np.ndarray
+    lengths: np.ndarray
+    mean_pressure: np.ndarray | float = ATMOSPHERE
+    load_resistance: np.ndarray | float | None = None
+    heat_capacity_ratio: float | None = None
+    prandtl: float | None = None
+    orders: np.ndarray | None = None
+    recording: np.ndarray | None = None
+    mean_flow: np.ndarray | None = None
+    load_passes_flow: bool = False
+    friction: str = "steady"
+
+    def area(self, k: int):
+        """Cross section of segment k, m2."""
+        return 0.25 * np.pi * self.diameters[k] ** 2
+
+    def pressure_in(self, k: int):
+        """Mean pressure in the middle of segment k, Pa absolute.
+
+        Steady laminar friction of the mean flow lifts it above that at the load (Hagen-Poiseuille).
+        """
+        if self.mean_flow is None or self.friction == "none":
+            return self.mean_pressure
+        behind = sum(self._fall(j) for j in range(k + 1, len(self.lengths)))
+        rise = (0.5 * self._fall(k) + behind) * np.nan_to_num(self.mean_flow)
+        return self.mean_pressure + rise
+
+    def _fall(self, k: int):
+        """Pressure that a flow loses in segment k, over the flow, Pa s/m3."""
+        dynamic = self.density * self.viscosity
+        return 32.0 * dynamic * self.lengths[k] / (self.area(k) * self.diameters[k] ** 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Effect:
+    """A piece of missing physics.
+
+    name        as in a verdict
+    element     kind of element it acts on: line, segment, position, load, source or sensor
+    medium      "liquid", "gas" or "any"
+    equation    in plain text
+    source      author, year and equation or section
+    parameters  (rig, place) -> tuple of Parameter
+    places      rig -> tuple of Place
+    apply       (network, line: LineState, values: name -> value, place) mutates the network
+    in_time     (line: parts.Line, state: LineState, values, place) mutates the line
+    named       False for a passive network that stands in for physics without a name
+    certain     no real line is without it: where something is missing at all, it is taken in
+                unless the data speak against it
+    friction    law that it puts in place of the line's, as in `segment.series_impedance`
+    """
+
+    name: str
+    element: str
+    medium: str
+    equation: str
+    source: str
+    parameters: Callable[[object, Place], tuple[Parameter, ...]]
+    places: Callable[[object], tuple[Place, ...]]
+    apply: Callable[[object, LineState, Mapping[str, object], Place], None]
+    in_time: Callable[[object, LineState, Mapping[str, float], Place], None]
+    certain: bool = False
+    named: bool = True
+    friction: str | None = None
+
+    def __reduce__(self):
+        """Pickled by name, for the registry has it in every process."""
+        return _by_name, (self.name,)
+
+    def suits(self, rig) -> bool:
+        """Whether the effect exists in the rig's medium."""
+        gas = rig.fluid.heat_capacity_ratio is not None
+        return self.medium == "any" or (self.medium == "gas") == gas
+
+
+def _by_name(name: str) -> Effect:
+    from rippletwin.twin.effects.library import EFFECTS
+
+    return EFFECTS[name]
+
+
+def line_place(rig) -> tuple[Place, ...]:
+    """The whole line."""
+    return (Place("line"),)
+
+
+def segment_places(rig) -> tuple[Place, ...]:
+    """Each segment."""
+    return tuple(Place(f"segment {k + 1}", k) for k in range(len(rig.line)))
+
+
+def position_place(rig) -> tuple[Place, ...]:
+    """Anywhere along the line: `position` is a parameter then."""
+    return (Place("position"),)
+
+
+def load_place(rig) -> tuple[Place, ...]:
+    """The load."""
+    return (Place("load"),)
+
+
+def source_place(rig) -> tuple[Place, ...]:
+    """The pump."""
+    return (Place("source"),)
+
+
+def sensor_places(rig) -> tuple[Place, ...]:
+    """Each sensor."""
+    return tuple(Place(f"sensor {sensor.name}", k) for k, sensor in enumerate(rig.sensors))
+
+
+def position_parameter(rig) -> Parameter:
+    """Distance from the pump outlet, uniform over the line; set out from twelve places."""
+    prior = uniform(0.0, sum(s.length for s in rig.line))
+    return Parameter("position", "m", prior, tuple(ndtri((np.arange(12) + 0.5) / 12)))
+
+
+def segment_at(lengths: np.ndarray, position) -> int:
+    """Index of the segment that holds `position` (the first set's, where there is a batch)."""
+    ends = np.cumsum([np.ravel(length)[0] for length in lengths])
+    return int(min(np.searchsorted(ends, np.ravel(position)[0]), len(ends) - 1))
+
+
+def on_line(network, position):
+    """`position` (m), held on the line, which a fit may have made a little shorter.
+
+    `network` is a `Network` or a `Line`.
+    """
+    return np.clip(position, 0.0, network.length)
+
+
+def scale_sensor(network, index: int, factor) -> None:
+    """Multiply what sensor `index` reads by `factor` (..., F)."""
+    count = len(network.sensor_positions)
+    shape = np.broadcast_shapes(np.shape(network.sensor_factor), (count, *np.shape(factor)))
+    factors = np.array(np.broadcast_to(network.sensor_factor, shape), dtype=complex)
+    factors[index] = factors[index] * factor
+    network.sensor_factor = factors

@@ -1,0 +1,63 @@
+"""Free air in the oil: a compressibility that falls with the pressure.
+
+To a small ripple it is a slower wave at one mean pressure and gives itself away at two. A ripple of
+a tenth of the mean feels it stiffen in its crests: what it holds beyond proportion to the pressure
+couples the harmonics all along the line.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import binom
+
+from rippletwin.line.frequency_domain.nonlinear_compliance import Storage
+from rippletwin.twin.effects.base import ATMOSPHERE, Effect, Parameter, line_place
+from rippletwin.twin.priors import lognormal, normal
+
+TERMS = 6  # of the series in x = p/mean: the next is 1e-3 of the second at x = 0.3
+
+
+def gas_series(gas_fraction, exponent, mean_pressure):
+    """[c_1, c_2 ...] of the share sum_k c_k x^k of the volume by which free air gives way to x
+    times the mean pressure p, of -alpha (p_atm/p)^(1/n) ((1 + x)^(-1/n) - 1).
+
+    `gas_fraction` alpha is by volume at the atmosphere's pressure, `exponent` n the polytropic one,
+    `mean_pressure` in Pa absolute.
+    """
+    share = gas_fraction * (ATMOSPHERE / mean_pressure) ** (1.0 / exponent)
+    return [-share * binom(-1.0 / exponent, k) for k in range(1, TERMS + 1)]
+
+
+def _apply(network, line, values, place):
+    for k in range(len(line.diameters)):
+        mean = np.broadcast_to(line.pressure_in(k), np.shape(network.shunt[k]))
+        first, *beyond = gas_series(values["gas_fraction"], values["polytropic_exponent"], mean)
+        network.shunt[k] = network.shunt[k] + line.area(k) * network.s * first / mean
+        network.storage.append(Storage(k, line.area(k), mean, np.array(beyond)))
+
+
+def _in_time(line, state, values, place):
+    for k, pipe in enumerate(line.pipes):
+        mean = float(state.pressure_in(k))
+        series = gas_series(values["gas_fraction"], values["polytropic_exponent"], mean)
+        line.pipes[k] = replace(pipe, law=(mean, *series))
+
+
+EFFECT = Effect(
+    name="entrained_air",
+    element="line",
+    medium="liquid",
+    equation="dV/V = alpha ((p_atm/p)^(1/n) - (p_atm/(p + p'))^(1/n)) beside p'/(rho a^2); to a "
+    "small ripple Y' = A s (1/(rho a^2) + alpha (p_atm/p)^(1/n)/(n p))",
+    source="Wylie & Streeter 1993, Fluid Transients in Systems, sec. 1.4; "
+    "Merritt 1967, Hydraulic Control Systems, eq. 2-11",
+    parameters=lambda rig, place: (
+        Parameter("gas_fraction", "1", lognormal(5e-3, 1.2)),
+        Parameter("polytropic_exponent", "1", normal(1.2, 0.12)),
+    ),
+    places=line_place,
+    apply=_apply,
+    in_time=_in_time,
+)

@@ -1,0 +1,98 @@
+"""A leak from the line to atmosphere or tank."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from rippletwin.line.frequency_domain.line_network import Insert
+from rippletwin.line.time_domain.line_elements import Element
+from rippletwin.twin.effects.base import (
+    ATMOSPHERE,
+    Effect,
+    Parameter,
+    on_line,
+    position_parameter,
+    position_place,
+)
+from rippletwin.twin.priors import lognormal, uniform
+
+MOST_DRAWN = 0.5  # of the mean flow: more is no leak
+REFERENCE_PRESSURE = 1e7  # Pa, at which the conductance is stated
+
+
+def leak_conductance(conductance, pressure_exponent, pressure):
+    """dq/dp, m3/(Pa s), of a leak across `pressure` (Pa) whose `conductance` is that at 10 MPa."""
+    # Spectra may come without a mean pressure: then as at one atmosphere.
+    relative = np.maximum(pressure, ATMOSPHERE) / REFERENCE_PRESSURE
+    return conductance * relative ** (-pressure_exponent)
+
+
+def _across(state):
+    """Mean pressure from the line to the atmosphere, Pa; the load's, wherever the leak is."""
+    return state.mean_pressure - ATMOSPHERE
+
+
+def drawn_share(values, state):
+    """Share of the nominal mean flow that the leak draws and an orifice behind it never sees.
+
+    q = integral of G dp = G p/(1 - m). An orifice's coefficient is taken from the mean flow and the
+    load pressure, and its slope dq/dp = q/(2 p) is as much too large as the flow. Zero where the
+    load's coefficient is known otherwise.
+    """
+    if not state.load_passes_flow:
+        return 0.0
+    exponent, pressure = values["pressure_exponent"], _across(state)
+    slope = leak_conductance(values["conductance"], exponent, pressure)
+    return np.minimum(slope * pressure / (1.0 - exponent) / state.mean_flow, MOST_DRAWN)
+
+
+def _apply(network, line, values, place):
+    conductance = leak_conductance(
+        values["conductance"], values["pressure_exponent"], _across(line)
+    )
+    network.inserts.append(
+        Insert(on_line(network, values["position"]), "shunt", conductance + 0.0 * network.s)
+    )
+    kind, value = network.load
+    if kind == "admittance":
+        network.load = kind, value * (1.0 - drawn_share(values, line))
+
+
+def _parameters(rig, place):
+    segment = rig.line[0]
+    characteristic = (
+        0.25 * np.pi * segment.diameter**2 / (rig.fluid.density * segment.wave_speed)
+    )  # 1/Zc: a leak well below it cannot be seen
+    return (
+        position_parameter(rig),
+        Parameter("conductance", "m3/(Pa s)", lognormal(0.1 * characteristic, 1.2)),
+        Parameter("pressure_exponent", "1", uniform(0.0, 0.5)),
+    )
+
+
+def _in_time(line, state, values, place):
+    conductance = leak_conductance(
+        values["conductance"], values["pressure_exponent"], _across(state)
+    )
+    line.inserts.append(Element(on_line(line, values["position"]), "shunt", (conductance,)))
+    # An element answers to what differs from the steady state, so the draw leaves by the source.
+    share = float(drawn_share(values, state))
+    line.end = replace(line.end, coefficient=line.end.coefficient * (1.0 - share))
+    line.flow = line.flow - share * line.mean_flow
+    line.mean_flow *= 1.0 - share
+
+
+EFFECT = Effect(
+    name="leak",
+    element="position",
+    medium="any",
+    equation="q1 - q2 = G p, G = dq/dp = G_10MPa (p/10 MPa)^-m; "
+    "m = 0 for a laminar gap, 1/2 for an orifice",
+    source="Covas, Ramos & de Almeida 2005, J. Hydraul. Eng. 131:1106, eq. 7 (orifice leak)",
+    parameters=_parameters,
+    places=position_place,
+    apply=_apply,
+    in_time=_in_time,
+)

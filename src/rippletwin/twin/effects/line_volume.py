@@ -1,0 +1,48 @@
+"""A lumped volume on the line: a block, a filter, a short dead end."""
+
+from __future__ import annotations
+
+from rippletwin.line.frequency_domain.line_network import Insert
+from rippletwin.line.time_domain.line_elements import capacitance
+from rippletwin.twin.effects.base import (
+    Effect,
+    Parameter,
+    on_line,
+    position_parameter,
+    position_place,
+    segment_at,
+)
+from rippletwin.twin.priors import lognormal
+
+
+def volume_admittance(s, volume, density, wave_speed):
+    """s V/(rho a^2), m3/(Pa s)."""
+    return s * volume / (density * wave_speed**2)
+
+
+def _apply(network, line, values, place):
+    k = segment_at(network.lengths, values["position"])
+    admittance = volume_admittance(network.s, values["volume"], line.density, line.wave_speeds[k])
+    network.inserts.append(Insert(on_line(network, values["position"]), "shunt", admittance))
+
+
+def _in_time(line, state, values, place):
+    k = segment_at([pipe.length for pipe in line.pipes], values["position"])
+    compliance = volume_admittance(1.0, values["volume"], state.density, state.wave_speeds[k])
+    line.inserts.append(capacitance(on_line(line, values["position"]), compliance))
+
+
+EFFECT = Effect(
+    name="line_volume",
+    element="position",
+    medium="any",
+    equation="q1 - q2 = s V/(rho a^2) p",
+    source="Wylie & Streeter 1993, sec. 12.5 (lumped capacitance)",
+    parameters=lambda rig, place: (
+        position_parameter(rig),
+        Parameter("volume", "m3", lognormal(5e-5 * (rig.line[0].diameter / 0.02) ** 3, 1.2)),
+    ),
+    places=position_place,
+    apply=_apply,
+    in_time=_in_time,
+)

@@ -1,0 +1,38 @@
+"""A sensor with a resonance: its own, or that of the cavity and passage before it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rippletwin.twin.effects.base import Effect, Parameter, scale_sensor, sensor_places
+from rippletwin.twin.priors import lognormal
+
+
+def resonance(s, natural_frequency, damping_ratio):
+    """w0^2/(s^2 + 2 zeta w0 s + w0^2), `natural_frequency` in Hz."""
+    w = 2.0 * np.pi * natural_frequency
+    return w**2 / (s**2 + 2.0 * damping_ratio * w * s + w**2)
+
+
+def _apply(network, line, values, place):
+    scale_sensor(network, place.index, resonance(network.s, **values))
+
+
+def _in_time(line, state, values, place):
+    line.sensors.append((place.index, lambda s: resonance(s, **values)))
+
+
+EFFECT = Effect(
+    name="sensor_dynamics",
+    element="sensor",
+    medium="any",
+    equation="reading = w0^2/(s^2 + 2 zeta w0 s + w0^2) p",
+    source="Holman 2011, Experimental Methods for Engineers, sec. 2.7 and 6.5",
+    parameters=lambda rig, place: (
+        Parameter("natural_frequency", "Hz", lognormal(5000.0, 0.7), (-1.0, 0.5)),
+        Parameter("damping_ratio", "1", lognormal(0.2, 0.9)),
+    ),
+    places=sensor_places,
+    apply=_apply,
+    in_time=_in_time,
+)

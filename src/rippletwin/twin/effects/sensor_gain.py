@@ -1,0 +1,27 @@
+"""A sensor with a wrong calibration factor. Only ratios of gains are seen without the source."""
+
+from __future__ import annotations
+
+from rippletwin.twin.effects.base import Effect, Parameter, scale_sensor, sensor_places
+from rippletwin.twin.priors import normal
+
+
+def _apply(network, line, values, place):
+    scale_sensor(network, place.index, 1.0 + values["gain_error"] + 0.0 * network.s)
+
+
+def _in_time(line, state, values, place):
+    line.sensors.append((place.index, lambda s: 1.0 + values["gain_error"] + 0.0 * s))
+
+
+EFFECT = Effect(
+    name="sensor_gain",
+    element="sensor",
+    medium="any",
+    equation="reading = (1 + g) p",
+    source="JCGM 106:2012, sec. 5 (sensitivity error)",
+    parameters=lambda rig, place: (Parameter("gain_error", "1", normal(0.0, 0.15)),),
+    places=sensor_places,
+    apply=_apply,
+    in_time=_in_time,
+)

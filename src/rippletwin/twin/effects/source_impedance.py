@@ -1,0 +1,63 @@
+"""The pump is no ideal flow source: outlet volume and leakage are parallel to its flow."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rippletwin.line.frequency_domain.line_network import Insert
+from rippletwin.line.time_domain.line_elements import Element, inertance
+from rippletwin.twin.effects.base import Effect, Parameter, Place
+from rippletwin.twin.effects.line_volume import volume_admittance
+from rippletwin.twin.priors import lognormal
+
+
+def _places(rig):
+    return (Place("source", form="volume"), Place("source", form="volume and passage"))
+
+
+def _apply(network, line, values, place):
+    admittance = volume_admittance(network.s, values["volume"], line.density, line.wave_speeds[0])
+    admittance = admittance + values["conductance"]
+    network.source_admittance = network.source_admittance + admittance
+    if place.form == "volume and passage":
+        impedance = network.s * values["inertance"]
+        # First of the list at x = 0: nearest to the pump.
+        network.inserts.insert(0, Insert(0.0 * network.length, "series", impedance))
+
+
+def _parameters(rig, place):
+    first = rig.line[0]
+    area = 0.25 * np.pi * first.diameter**2
+    parameters = (
+        Parameter("volume", "m3", lognormal(1e-4 * (first.diameter / 0.02) ** 3, 1.2)),
+        Parameter(
+            "conductance",
+            "m3/(Pa s)",
+            lognormal(0.01 * area / (rig.fluid.density * first.wave_speed), 1.5),
+        ),
+    )
+    if place.form == "volume and passage":
+        passage = Parameter("inertance", "Pa s2/m3", lognormal(0.1 * rig.fluid.density / area, 1.0))
+        return (*parameters, passage)
+    return parameters
+
+
+def _in_time(line, state, values, place):
+    compliance = volume_admittance(1.0, values["volume"], state.density, state.wave_speeds[0])
+    line.source.append(Element(0.0, "shunt", (compliance, values["conductance"])))
+    if place.form == "volume and passage":
+        line.inserts.insert(0, inertance(0.0, values["inertance"]))
+
+
+EFFECT = Effect(
+    name="source_impedance",
+    element="source",
+    medium="any",
+    equation="q(0) = Q - (s V/(rho a^2) + G) p_pump, p_pump = p(0) + s I q(0)",
+    source="Edge & Johnston 1990, Proc. IMechE 204(I):33 (source impedance of pumps, "
+    "lumped volume and passage)",
+    parameters=_parameters,
+    places=_places,
+    apply=_apply,
+    in_time=_in_time,
+)

@@ -1,0 +1,42 @@
+"""The shaft does not turn evenly: sidebands a shaft order beside every piston order."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rippletwin.harmonics import peak_amplitudes, phase_modulate
+from rippletwin.twin.effects.base import Effect, Parameter, source_place
+from rippletwin.twin.priors import normal
+
+
+def _apply(network, line, values, place):
+    b = complex(values["cosine"], values["sine"])
+    flow = np.array(np.broadcast_to(network.source_flow, np.shape(network.s)), dtype=complex)
+    for r in np.unique(line.recording):
+        own = line.recording == r
+        orders = np.asarray(line.orders[own], int)
+        spectrum = np.zeros(orders.max() + 1, complex)
+        spectrum[0], spectrum[orders] = line.mean_flow[own][0], flow[own]
+        flow[own] = peak_amplitudes(phase_modulate(spectrum, b, 4 * len(spectrum)))[orders]
+    network.source_flow = flow
+
+
+def _in_time(line, state, values, place):
+    spectrum = peak_amplitudes(line.flow)
+    line.flow = phase_modulate(spectrum, complex(values["cosine"], values["sine"]), len(line.flow))
+
+
+EFFECT = Effect(
+    name="speed_fluctuation",
+    element="source",
+    medium="any",
+    equation="q(angle) d angle/dt, angle = t + Re(b e^(j t))",
+    source="Randall 2011, Vibration-based Condition Monitoring, sec. 3.3 (phase modulation)",
+    parameters=lambda rig, place: (
+        Parameter("cosine", "rad", normal(0.0, 5e-3)),
+        Parameter("sine", "rad", normal(0.0, 5e-3)),
+    ),
+    places=source_place,
+    apply=_apply,
+    in_time=_in_time,
+)

@@ -1,0 +1,47 @@
+"""Unsteady (frequency-dependent) laminar friction in place of the steady Hagen-Poiseuille loss."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rippletwin.line.frequency_domain.pipe_immittance import scaled_friction
+from rippletwin.twin.effects.base import Effect, line_place
+
+
+def friction_excess(s, viscosity, diameter, density):
+    """Z'_unsteady - Z'_steady, Pa s/m4, broadcast over a batch of viscosities and diameters.
+
+    Bessel functions are the cost: they are evaluated once for each distinct nu/R^2 of the batch.
+    """
+    rate = np.atleast_1d(4.0 * viscosity / diameter**2)
+    distinct, inverse = np.unique(rate, return_inverse=True)
+    excess = np.stack([nu * (scaled_friction(s / nu) - 8.0) - s for nu in distinct])
+    excess = excess[np.ravel(inverse)]
+    area = 0.25 * np.pi * diameter**2
+    return (excess if np.ndim(diameter) or np.ndim(viscosity) else excess[0]) * density / area
+
+
+def _apply(network, line, values, place):
+    for k, diameter in enumerate(line.diameters):
+        network.series[k] = network.series[k] + friction_excess(
+            network.s, line.viscosity, diameter, line.density
+        )
+
+
+def _in_time(line, state, values, place):
+    line.friction = "unsteady"  # Zielke's weights as a sum of exponentials
+
+
+EFFECT = Effect(
+    name="unsteady_friction",
+    element="line",
+    medium="any",
+    equation="Z' = (rho/A) s I0(r)/I2(r), r = R sqrt(s/nu), instead of (rho/A)(s + 8 nu/R^2); "
+    "no parameter beyond the fluid's viscosity",
+    source="Zielke 1968, J. Basic Eng. 90:109, eq. 7; for a gas Kirchhoff 1868",
+    parameters=lambda rig, place: (),
+    places=line_place,
+    apply=_apply,
+    in_time=_in_time,
+    friction="unsteady",
+)

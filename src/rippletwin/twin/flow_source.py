@@ -1,0 +1,73 @@
+"""The pump as a source of flow: harmonics, what its parameters change, the shaft's angle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rippletwin.case.model import FlowRipple
+from rippletwin.harmonics import flow_harmonics, peak_amplitudes, phase_modulate
+
+
+class FlowSource:
+    """The sources of recordings whose harmonics stand side by side in `slices`.
+
+    flow        (F,) as given, m3/s; 1 where there is no ripple: a free source
+    admittance  (F,) of the pump's chambers beside it, m3/(Pa s)
+    changes     (index, slope and curvature (2, F) of the flow, slope (F,) of the admittance) of
+                each of the pump's parameters, by its coordinate
+    angles      indices of the recordings' shaft angles in theta, None for those without
+    """
+
+    def __init__(self, twin, observations: Sequence, points: Sequence, slices: Sequence[slice]):
+        self._parameters, self._slices = twin.parameters, slices
+        self._orders = [o.orders for o in observations]
+        count = slices[-1].stop if slices else 0
+        self.flow, self.admittance = np.ones(count, complex), np.zeros(count, complex)
+        self.angles = [twin.index.get(f"angle[{o.label}]") for o in observations]
+        changes = {}
+        for o, point, part in zip(observations, points, slices):
+            if point.ripple is None:
+                continue
+            s = 2j * np.pi * o.frequency_hz
+            self.flow[part] = flow_harmonics(point.ripple, o.orders)
+            self.admittance[part] = point.ripple.source_admittance(s)
+            mean = flow_harmonics(point.ripple, np.zeros(1))[0].real
+            for k, change in twin.pump_changes(o.speed_hz, point.load_pressure):
+                flow, own = changes.setdefault(
+                    k, (np.zeros((2, count), complex), np.zeros(count, complex))
+                )
+                flow[:, part] = _delivered(change, point.ripple, o.orders, mean)
+                if np.any(self.admittance[part]):  # a ripple given is an ideal source
+                    own[part] = change.source_admittance(s)
+        self.changes = [(k, *each) for k, each in changes.items()]
+
+    def at(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Flow and admittance (F,) at `theta`, shaft angles being 0."""
+        flow, admittance = self.flow.copy(), self.admittance.copy()
+        for k, (slope, curvature), own in self.changes:
+            flow += theta[k] * (slope + theta[k] * curvature)
+            admittance += theta[k] * own
+        return flow, admittance
+
+    def turn(self, theta: np.ndarray) -> np.ndarray:
+        """What the shaft angles at the first samples make of the harmonics, (F,)."""
+        turn = np.ones(len(self.flow), complex)
+        for part, orders, index in zip(self._slices, self._orders, self.angles):
+            if index is not None:
+                turn[part] = np.exp(1j * self._parameters[index].value(theta[index]) * orders)
+        return turn
+
+
+def _delivered(change, ripple: FlowRipple, orders: np.ndarray, mean_flow: float) -> np.ndarray:
+    """Slope and curvature (2, F) of a `RippleChange` by the shaft that delivers `ripple`."""
+    if not ripple.swing:
+        return change.harmonics(orders, mean_flow)
+    orders = np.asarray(orders, int)
+    even = np.zeros((2, 2 * np.max(orders)), complex)
+    even[:, 1:] = change.harmonics(np.arange(1, even.shape[1]), mean_flow)
+    even[np.abs(even) < 1e-9 * np.max(np.abs(even))] = 0.0  # orders that equal pistons do not make
+    return np.array(
+        [peak_amplitudes(phase_modulate(x, ripple.swing, 4 * len(x)))[orders] for x in even]
+    )

@@ -1,0 +1,279 @@
+"""The twin's forward model: all recordings' frequencies side by side in one network.
+
+Made once for a set of observations and called very often, so everything that does not depend on
+the parameters is worked out beforehand, and the costly friction functions are kept while their
+own parameters stand still (as they do in most columns of a finite-difference Jacobian).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from rippletwin.line.frequency_domain.line_network import Network
+from rippletwin.line.frequency_domain.nonlinear_compliance import NonlinearComplianceSolver
+from rippletwin.line.frequency_domain.orifice_load import OrificeLoad
+from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
+from rippletwin.twin.effects.base import ATMOSPHERE, LineState
+from rippletwin.twin.flow_source import FlowSource
+
+ROUGH = 1e-4  # of the pressure at an orifice, while the line's storage is known to less
+ABOVE = 3.0  # times the highest harmonic observed: those that reach it by way of the line
+NEXT = 3  # harmonics above the highest observed: those that reach it by way of the orifice
+
+
+class ForwardModel:
+    """Predictions for fixed observations: `forward(theta) -> list of (S, F) complex`.
+
+    theta is in the coordinates of `twin.parameters`. Pressures are in Pa (peak); a free source
+    has unit flow, its amplitude being the likelihood's business; an observation of the input
+    impedance is predicted as the reflection coefficient (1, F), see `reflection`.
+    """
+
+    def __init__(self, twin, observations: Sequence):
+        self.twin = twin
+        self.observations = list(observations)
+        rig = twin.rig
+        sizes = [len(o.frequency_hz) for o in self.observations]
+        edges = np.concatenate([[0], np.cumsum(sizes)])
+        self.slices = [slice(a, b) for a, b in pairwise(edges)]
+        self.frequency_hz = np.concatenate([o.frequency_hz for o in self.observations])
+        self.s = 2j * np.pi * self.frequency_hz
+        names = [sensor.name for sensor in rig.sensors]
+        self.rows = [_rows(o, names) for o in self.observations]
+
+        def column(values):
+            return np.repeat(np.asarray(values, dtype=float), sizes)
+
+        self.recording = np.repeat(np.arange(len(sizes)), sizes)
+        self.order = np.concatenate(
+            [np.zeros(n) if o.orders is None else o.orders for o, n in zip(observations, sizes)]
+        )
+        points = [twin.operating_point(o) for o in self.observations]
+        self.speed_hz = column([np.nan if o.speed_hz is None else o.speed_hz for o in observations])
+        self.load_pressure = column([p.load_pressure for p in points])
+        self.mean_flow = column([p.mean_flow for p in points])
+        self.coefficient = column([p.coefficient for p in points])
+        self.source = FlowSource(twin, self.observations, points, self.slices)
+        self.back_pressure = rig.load.back_pressure
+        self.load_impedance = None
+        if rig.load.kind == "impedance":
+            self.load_impedance = _interpolate(
+                self.frequency_hz, rig.load.frequency_hz, rig.load.impedance
+            )
+        self._friction = {}
+        self._orifice = None
+        self._ripples = [point.ripple for point in points]
+        self._periodic = [r for r, ripple in enumerate(self._ripples) if ripple is not None]
+        self.solved = True
+        self._full = NonlinearComplianceSolver([self.slices[r] for r in self._periodic], self.order)
+        if rig.load.kind == "orifice" and self._periodic:
+            self._orifice = OrificeLoad(
+                [self.slices[r] for r in self._periodic],
+                self.order,
+                np.array([points[r].load_pressure for r in self._periodic]) - self.back_pressure,
+                np.array([points[r].coefficient for r in self._periodic]),
+                rig.load.passes_flow,
+            )
+
+    def __call__(self, theta: np.ndarray) -> list[np.ndarray]:
+        network = self.network(theta)
+        pressure = network.readings() if len(network.sensor_positions) else None
+        impedance = None
+        predicted = []
+        for o, part, rows in zip(self.observations, self.slices, self.rows):
+            if o.kind == "input_impedance":
+                impedance = network.input_impedance() if impedance is None else impedance
+                scale = self.twin.reference_impedance(theta, o)
+                predicted.append(reflection(impedance[None, part] / scale))
+            else:
+                predicted.append(pressure[rows, part])
+        return predicted
+
+    @cached_property
+    def stores(self) -> bool:
+        """Whether the line stores something beyond proportion to the pressure."""
+        return bool(self._periodic and self._linear(self.twin.theta).storage)
+
+    def network(self, theta: np.ndarray) -> Network:
+        """The line with source, effects and load at `theta`; an orifice's ripple is solved."""
+        network = self._linear(theta)
+        if self._orifice is not None or (network.storage and self._periodic):
+            self._balance(network, theta)
+        return network
+
+    def _linear(self, theta: np.ndarray) -> Network:
+        """The same with a load for small ripple."""
+        twin, rig = self.twin, self.twin.rig
+        v = twin.arrays(theta)
+        series = np.array(
+            [self._series(k, d, v.viscosity) for k, d in enumerate(v.diameters)], dtype=complex
+        )
+        shunt = np.array(
+            [
+                shunt_admittance(self.s, density=rig.fluid.density, wave_speed=a, diameter=d)
+                for a, d in zip(v.wave_speeds, v.diameters)
+            ]
+        )
+        source, source_admittance = self.source.at(theta)
+        network = Network(
+            s=self.s,
+            lengths=v.lengths,
+            series=series,
+            shunt=shunt,
+            source_flow=source * self.source.turn(theta),
+            source_admittance=source_admittance,
+            load=self._load(v.load),
+            sensor_positions=v.positions,
+        )
+        if twin.effects:
+            line = self._line_state(v)
+            for effect, place, values in twin.effect_values(theta):
+                effect.apply(network, line, values, place)
+        return network
+
+    def _line_state(self, v) -> LineState:
+        fluid = self.twin.rig.fluid
+        resistance = None
+        if self.twin.rig.load.kind == "orifice":
+            resistance = 1.0 / self._orifice_admittance(v.load)
+        return LineState(
+            density=fluid.density,
+            viscosity=v.viscosity,
+            diameters=v.diameters,
+            wave_speeds=v.wave_speeds,
+            lengths=v.lengths,
+            mean_pressure=np.nan_to_num(self.load_pressure) + ATMOSPHERE,
+            load_resistance=resistance,
+            heat_capacity_ratio=fluid.heat_capacity_ratio,
+            prandtl=fluid.prandtl,
+            orders=self.order,
+            recording=self.recording,
+            mean_flow=self.mean_flow,
+            load_passes_flow=self.twin.rig.load.passes_flow and not self.twin.guessed_load,
+            friction=self.twin.friction_law,
+        )
+
+    def _orifice_admittance(self, factor: float) -> np.ndarray:
+        """dq/dp of the orifice at the mean pressures, (F,) m3/(Pa s)."""
+        return factor * self.coefficient / (2 * np.sqrt(self.load_pressure - self.back_pressure))
+
+    def _series(self, segment: int, diameter: float, viscosity: float) -> np.ndarray:
+        last, value = self._friction.get(segment, (None, None))
+        if last != (diameter, viscosity):
+            value = series_impedance(
+                self.s,
+                density=self.twin.rig.fluid.density,
+                viscosity=viscosity,
+                diameter=diameter,
+                friction=self.twin.friction,
+            )
+            self._friction[segment] = (diameter, viscosity), value
+        return value
+
+    def _load(self, factor: float) -> tuple:
+        kind = self.twin.rig.load.kind
+        if kind == "orifice":
+            return "admittance", self._orifice_admittance(factor)
+        if kind == "impedance":
+            return "impedance", factor * self.load_impedance
+        return kind, None
+
+    def _balance(self, network: Network, theta: np.ndarray) -> None:
+        """Give `network` the full-amplitude state at its load, and what its line stores beyond."""
+        if network.storage:
+            wide, seen, whole = self._widened(network, theta, self._far)
+            law = wide._law(whole, theta, tolerance=min(ROUGH, wide._full.tolerance))
+            state = [x[seen] for x in wide._full.drain(whole, law)]
+            self.solved = wide._full.solved
+            positions, leaving = whole.drains
+            network.drains = positions, leaving[:, seen]
+            if self._orifice is not None:
+                network.load = "state", tuple(state)
+        elif self._orifice is not None:
+            wide, seen, whole = self._widened(network, theta, self._near)
+            state = wide._law(whole, theta)(*whole.load_relation())
+            network.load = "state", tuple(x[seen] for x in state)
+
+    def _balance_load(self, network: Network, theta: np.ndarray) -> None:
+        """Give `network` the full-amplitude state at its load, its drains as they are."""
+        if self._orifice is not None:
+            state = self._law(network, theta)(*network.load_relation())
+            network.load = "state", tuple(state)
+
+    def _law(self, network: Network, theta: np.ndarray, **accuracy: float):
+        """The load of `network`, (a, b, c) -> (p, q) where a p + b q = c; an orifice is not linear.
+
+        Where an effect changed the load, its linear part is the changed one.
+        """
+        p, q = network.load_state()
+        factor = self.twin.load_factor(theta)
+
+        def law(a, b, c):
+            if self._orifice is not None:
+                return self._orifice.solve(a, b, c, q / p, factor, network.opening, **accuracy)
+            scale = c / (a * p + b * q)
+            return scale * p, scale * q
+
+        return law
+
+    @staticmethod
+    def _widened(network: Network, theta: np.ndarray, with_above: tuple) -> tuple:
+        """The forward model with harmonics above, where those of `network` are among its columns,
+        and its network at `theta`."""
+        wide, seen = with_above
+        whole = wide._linear(theta)
+        whole.source_flow[seen] = network.source_flow
+        return wide, seen, whole
+
+    @cached_property
+    def _far(self) -> tuple[ForwardModel, np.ndarray]:
+        return self._with_above(lambda top, step: ABOVE * top)
+
+    @cached_property
+    def _near(self) -> tuple[ForwardModel, np.ndarray]:
+        return self._with_above(lambda top, step: top + (NEXT + 0.5) * step)
+
+    def _with_above(self, highest) -> tuple[ForwardModel, np.ndarray]:
+        """The same with the harmonics up to `highest` (top order, step) of every recording besides,
+        and where those observed are among its columns."""
+        wide = list(self.observations)
+        for r in self._periodic:
+            o = wide[r]
+            step, top = np.gcd.reduce(np.asarray(o.orders, int)), np.max(o.orders)
+            most = min(highest(top, step), 0.5 * len(self._ripples[r].angle_deg))
+            orders = np.append(o.orders, np.arange(top + step, most, step))
+            wide[r] = replace(o, orders=orders, frequency_hz=orders * o.speed_hz)
+        forward = ForwardModel(self.twin, wide)
+        own = [np.r_[b][: a.stop - a.start] for a, b in zip(self.slices, forward.slices)]
+        return forward, np.concatenate(own)
+
+
+def characteristic_impedance(fluid, segment) -> float:
+    """rho a/A of a segment without loss, Pa s/m3."""
+    return fluid.density * segment.wave_speed / segment.area
+
+
+def reflection(impedance: np.ndarray) -> np.ndarray:
+    """R = (z - 1)/(z + 1) of an impedance z over its reference, same shape.
+
+    |R| <= 1 for anything passive. An impedance runs over orders of magnitude between resonance
+    and antiresonance, and its error with it; that of R is about the same at all frequencies,
+    because R is what a wave brings back: the quantity the line itself is linear in.
+    """
+    return (impedance - 1.0) / (impedance + 1.0)
+
+
+def _rows(observation, names: list[str]) -> list[int]:
+    """Which of the rig's sensors an observation has."""
+    if observation.kind == "input_impedance" or observation.sensors is None:
+        return list(range(len(names)))
+    return [names.index(getattr(s, "name", s)) for s in observation.sensors]
+
+
+def _interpolate(at, frequency_hz, values):
+    return np.interp(at, frequency_hz, values.real) + 1j * np.interp(at, frequency_hz, values.imag)

@@ -1,0 +1,140 @@
+"""A physical parameter with its prior, and the coordinates in which every prior is N(0, 1).
+
+Fits work in coordinates u. Then u = 0 is the data sheet, |u| is the pull on the prior in standard
+deviations, and minus the logarithm of the prior density is u^2/2 for every parameter. A parameter
+without a prior (`flat`) has a scale in its place and no pull.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rippletwin.case.model import Rig
+from rippletwin.twin.priors import Prior, lognormal, normal
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One unknown of a twin.
+
+    name   unique, e.g. "wave_speed[2]" (segments count from 1)
+    unit   SI
+    prior  u -> value
+    place  what it belongs to: "segment 2", "sensor p1", "load", "recording 1", an effect's label
+    flat   no prior: `prior` is only the fit's coordinate
+    """
+
+    name: str
+    unit: str
+    prior: Prior
+    place: str = ""
+    flat: bool = False
+
+    @property
+    def nominal(self) -> float:
+        """Value at u = 0."""
+        return float(self.prior.value(0.0))
+
+    def value(self, u: float) -> float:
+        """Value in `unit` at coordinate u."""
+        return self.prior.value(u)
+
+    def value_sd(self, u: float, u_sd: float) -> float:
+        """Standard deviation in `unit` of a coordinate known as u +- u_sd (first order)."""
+        h = 1e-4
+        return abs(float(self.value(u + h) - self.value(u - h))) / (2 * h) * u_sd
+
+
+def values(parameters: Sequence[Parameter], u: np.ndarray) -> dict[str, float]:
+    """Values by name at coordinates u (P,)."""
+    return {p.name: float(p.value(x)) for p, x in zip(parameters, u, strict=True)}
+
+
+def coordinates(parameters: Sequence[Parameter], by_name: Mapping[str, float]) -> np.ndarray:
+    """Coordinates (P,) of values by name; a parameter that is not named stays at u = 0."""
+    return np.array(
+        [
+            float(p.prior.coordinate(by_name[p.name])) if p.name in by_name else 0.0
+            for p in parameters
+        ]
+    )
+
+
+GUESSED_SD = 1.0
+"""Relative uncertainty of the load where its mean flow is but a guess (`operating_point`)."""
+
+
+BULK_MODULUS_SD = 0.1  # relative, of what the chambers hold: air and heat lower it
+
+
+PORT_TIMING_SD = 1.0  # deg, of the port plate's angle to the swash plate
+"""Standard deviations of the pump's numbers, where they are parameters (`pump.uncertain`)."""
+
+
+ANGLE_SCALE = 0.01  # rad, of the fit's coordinate: a few degrees of phase at the 9th harmonic
+
+
+def line_parameters(rig: Rig, guessed_load: bool) -> list[Parameter]:
+    """Wave speeds, diameters, lengths, sensors' positions, viscosity, and the load's factor."""
+    sheet = rig.uncertainty
+    relative = (
+        ("wave_speed", sheet.wave_speed, "m/s"),
+        ("diameter", sheet.diameter, "m"),
+        ("length", sheet.length, "m"),
+    )
+    out = [
+        Parameter(f"{name}[{k}]", unit, lognormal(getattr(segment, name), sd), f"segment {k}")
+        for name, sd, unit in relative
+        for k, segment in enumerate(rig.line, 1)
+    ]
+    out += [
+        Parameter(
+            f"position[{s.name}]",
+            "m",
+            normal(s.position, sheet.sensor_position),
+            f"sensor {s.name}",
+        )
+        for s in rig.sensors
+    ]
+    viscosity = lognormal(rig.fluid.kinematic_viscosity, sheet.viscosity)
+    out.append(Parameter("viscosity", "m2/s", viscosity, "fluid"))
+    if rig.load.kind in ("orifice", "impedance"):
+        sd = GUESSED_SD if guessed_load else sheet.load
+        out.append(Parameter("load", "", lognormal(1.0, sd), "load"))
+    return out
+
+
+def pump_parameters(rig: Rig) -> list[Parameter]:
+    """Bulk modulus and port timing of a pump whose geometry is known."""
+    from rippletwin.pump.geometry import Geometry
+
+    geometry = Geometry.from_dict(rig.pump)
+    modulus = lognormal(geometry.bulk_modulus, BULK_MODULUS_SD)
+    timing = normal(geometry.port_timing_deg, PORT_TIMING_SD)
+    return [
+        Parameter("bulk_modulus", "Pa", modulus, "pump"),
+        Parameter("port_timing", "deg", timing, "pump"),
+    ]
+
+
+def angle_parameter(label: str) -> Parameter:
+    """Shaft angle at the first sample of the recording `label`; the data alone say it."""
+    return Parameter(f"angle[{label}]", "rad", normal(0.0, ANGLE_SCALE), f"recording {label}", True)
+
+
+def effect_parameters(effects: Sequence, own: Sequence[Sequence]) -> list[Parameter]:
+    """Parameters `own` of each of the (effect, place) pairs, named after both.
+
+    Raises ValueError where an effect is twice at a place.
+    """
+    labels = [f"{effect.name}@{place}" for effect, place in effects]
+    if len(set(labels)) < len(labels):
+        raise ValueError(f"an effect can be at a place once, not {labels}")
+    return [
+        Parameter(f"{label}.{p.name}", p.unit, p.prior, label)
+        for label, parameters in zip(labels, own)
+        for p in parameters
+    ]

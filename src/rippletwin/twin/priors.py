@@ -1,0 +1,55 @@
+"""Prior distributions, each a map from a standard normal coordinate to the parameter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+
+@dataclass(frozen=True)
+class Prior:
+    """A proper prior, written as a map from a standard normal coordinate u to the parameter.
+
+    kind "normal":    x = centre + scale u
+    kind "lognormal": x = centre exp(scale u), for positive parameters
+    kind "uniform":   x = centre + scale Phi(u), on [centre, centre + scale]
+
+    In u every prior is N(0, 1): pulls are read off directly and Laplace's integral is over u.
+    """
+
+    kind: str
+    centre: float
+    scale: float
+
+    def value(self, u):
+        """Parameter at coordinate u, any shape."""
+        if self.kind == "normal":
+            return self.centre + self.scale * u
+        if self.kind == "lognormal":
+            return self.centre * np.exp(self.scale * u)
+        return self.centre + self.scale * ndtr(u)
+
+    def coordinate(self, x):
+        """Inverse of `value`; a uniform's ends are held off infinity."""
+        if self.kind == "normal":
+            return (x - self.centre) / self.scale
+        if self.kind == "lognormal":
+            return np.log(x / self.centre) / self.scale
+        return ndtri(np.clip((x - self.centre) / self.scale, 1e-3, 1 - 1e-3))
+
+
+def normal(mean: float, deviation: float) -> Prior:
+    """Normal prior with mean and standard deviation in the parameter's unit."""
+    return Prior("normal", mean, deviation)
+
+
+def lognormal(median: float, log_deviation: float) -> Prior:
+    """Lognormal prior: median in the parameter's unit, standard deviation of its logarithm."""
+    return Prior("lognormal", median, log_deviation)
+
+
+def uniform(low: float, high: float) -> Prior:
+    """Uniform prior on [low, high]."""
+    return Prior("uniform", low, high - low)

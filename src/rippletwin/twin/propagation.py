@@ -1,0 +1,116 @@
+"""From the flow of a pump to what the sensors read, through a twin's line in time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import resample
+
+from rippletwin.errors import InputError
+from rippletwin.line.time_domain import method_of_characteristics
+from rippletwin.line.time_domain.line_elements import End, Line, Pipe, capacitance
+from rippletwin.twin.effects.base import ATMOSPHERE, LineState
+
+PERIODS = 200  # at most, until the line repeats itself
+
+
+def propagate(
+    twin,
+    flow: np.ndarray,
+    healthy_flow: np.ndarray,
+    speed_hz: float,
+    load_pressure: float,
+    source_capacitance: float = 0.0,
+    steps: int = 12288,
+    tolerance: float = 1e-6,
+) -> method_of_characteristics.Transient:
+    """One periodic revolution at the twin's sensors by the method of characteristics.
+
+    Parameters
+    ----------
+    twin : calibrated, with the effects it was corrected by.
+    flow, healthy_flow : (M,) m3/s at the pump outlet over one revolution, of the pump to simulate
+        and of the healthy one, whose mean settles the orifice that a faulty pump also meets; both
+        as the data sheet has them, what the twin knows better is added (`pump_change`).
+    speed_hz, load_pressure : rev/s, and Pa upstream of the load when the pump is healthy.
+    source_capacitance : m3/Pa of the chambers beside an ideal source, see `pump.source`.
+    steps : at least so many a revolution.
+
+    Returns the `Transient` with M samples a revolution. The load factor of the twin scales orifice
+    and mean flow alike, so that the load pressure stays that of the recording, as in the frequency
+    domain. Raises InputError for a load given as a measured impedance.
+    """
+    line = line_in_time(twin, flow, healthy_flow, speed_hz, load_pressure, source_capacitance)
+    count = method_of_characteristics.steps_a_period(line.pipes, line.period, steps)
+    line.flow = resample(line.flow, count)
+    transient = method_of_characteristics.simulate(line, periods=PERIODS, tolerance=tolerance)
+    return replace(
+        transient,
+        pressure=resample(transient.pressure, len(flow), axis=1),
+        flow=resample(transient.flow, len(flow), axis=1),
+    )
+
+
+def line_in_time(twin, flow, healthy_flow, speed_hz, load_pressure, source_capacitance=0.0) -> Line:
+    """The twin as a `Line`, every effect in it; arguments as `propagate`'s."""
+    rig = twin.calibrated_rig()
+    if rig.load.kind == "impedance":
+        raise InputError(
+            "rig.yaml", "load.kind", "a measured impedance has no time domain", "Give an orifice"
+        )
+    change, more = pump_change(twin, healthy_flow, speed_hz, load_pressure)
+    if source_capacitance:  # a ripple that was given is an ideal source
+        source_capacitance += more
+    factor = twin.values().get("load", 1.0)
+    mean = nominal = float(np.mean(healthy_flow))
+    coefficient, resistance = 0.0, None
+    if rig.load.kind == "orifice":
+        root = np.sqrt(load_pressure - rig.load.back_pressure)
+        coefficient = rig.load.coefficient or factor * mean / root
+        mean, resistance = coefficient * root, 2.0 * root / coefficient
+        nominal = mean / factor
+    pressure = rig.load.back_pressure if rig.load.kind == "orifice" else load_pressure
+    line = Line(
+        pipes=[Pipe(s.length, s.diameter, s.wave_speed) for s in rig.line],
+        flow=np.asarray(flow, dtype=float) + change - np.mean(healthy_flow) + mean,
+        period=1.0 / speed_hz,
+        end=End(rig.load.kind, pressure, coefficient),
+        density=rig.fluid.density,
+        viscosity=rig.fluid.kinematic_viscosity,
+        friction=twin.friction,
+        positions=[sensor.position for sensor in rig.sensors],
+        mean_flow=mean,
+        source=[capacitance(0.0, source_capacitance)] if source_capacitance else [],
+    )
+    state = LineState(
+        density=line.density,
+        viscosity=line.viscosity,
+        diameters=np.array([s.diameter for s in rig.line]),
+        wave_speeds=np.array([s.wave_speed for s in rig.line]),
+        lengths=np.array([s.length for s in rig.line]),
+        mean_pressure=load_pressure + ATMOSPHERE,
+        load_resistance=resistance,
+        heat_capacity_ratio=rig.fluid.heat_capacity_ratio,
+        prandtl=rig.fluid.prandtl,
+        mean_flow=nominal,
+        load_passes_flow=rig.load.passes_flow,
+    )
+    for effect, place, values in twin.effect_values(twin.theta):
+        effect.in_time(line, state, values, place)
+    return line
+
+
+def pump_change(twin, healthy_flow, speed_hz: float, load_pressure: float):
+    """Flow (M,), m3/s, and capacitance, m3/Pa, by which the source of a twin that knows its pump
+    better than the data sheet differs from the sheet's, healthy or not."""
+    count, mean = len(healthy_flow), float(np.mean(healthy_flow))
+    flow, capacity = np.zeros(count), 0.0
+    pumping = np.array([2j * np.pi * speed_hz * twin.rig.pump.get("pistons", 1)])
+    orders = np.arange(1, (count - 1) // 2 + 1)
+    for k, change in twin.pump_changes(speed_hz, load_pressure):
+        u = twin.theta[k]
+        spectrum = np.array([u, u**2]) @ change.harmonics(orders, mean)
+        flow += np.fft.irfft(np.append(0.0, spectrum) * count / 2, count)
+        capacity += u * float(change.source_admittance(pumping)[0].imag / pumping[0].imag)
+    return flow, capacity

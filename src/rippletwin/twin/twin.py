@@ -1,0 +1,283 @@
+"""The twin: a rig whose numbers are uncertain, that predicts what its sensors read.
+
+The parameter vector theta is in the coordinates of `rippletwin.twin.parameters`: 0 is the data sheet
+and every prior is N(0, 1). Its entries, in this order (segments and recordings count from 1):
+
+    wave_speed[i], diameter[i], length[i]   of each segment, with the priors of `uncertainty`
+    position[NAME]                          of each sensor
+    viscosity                               kinematic
+    load                                    factor on the orifice's coefficient or on the measured
+                                            load impedance; not there for other loads
+    bulk_modulus, port_timing               of the pump, where `uncertain_pump` says so
+    angle[LABEL]                            shaft angle at a recording's first sample, rad: no prior
+    LABEL.NAME                              parameters of the effects, with priors of their own
+
+An effect at its place is a pair (effect, place) of `rippletwin.twin.effects`; its LABEL is
+"name@place", as in "viscoelastic_wall@segment 2".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from rippletwin.case.model import FlowRipple, Rig, Segment, Sensor
+from rippletwin.line.frequency_domain.pipe_immittance import FRICTION_LAWS
+from rippletwin.twin import parameters as coordinates
+from rippletwin.twin.forward_model import ForwardModel, characteristic_impedance
+from rippletwin.twin.operating_point import OperatingPoint, operating_point
+from rippletwin.twin.parameters import (
+    angle_parameter,
+    effect_parameters,
+    line_parameters,
+    pump_parameters,
+)
+
+SOURCE_SD = 0.05
+"""Largest relative error of a nominal flow ripple's harmonic that is put down to the ripple."""
+
+
+class Arrays(NamedTuple):
+    """The line at one theta: segments (n,), sensors (S,), viscosity and load factor scalars."""
+
+    wave_speeds: np.ndarray
+    diameters: np.ndarray
+    lengths: np.ndarray
+    positions: np.ndarray
+    viscosity: float
+    load: float
+
+
+class Twin:
+    """Nominal rig, friction law, effects and the recordings' shaft angles.
+
+    Parameters
+    ----------
+    rig : the data sheet.
+    observations : those whose shaft angle is unknown get an angle parameter; None for none.
+    friction : "none", "steady" (the paper) or "unsteady".
+    effects : physics beyond that, applied in order.
+    source_sd : largest relative standard deviation of a nominal ripple's harmonics.
+    theta : where the twin stands, (P,); nominal by default.
+    guessed_load : whether the orifice's coefficient is but a guess; by default it is where an
+        observation has neither a flow ripple nor a coefficient to tell the mean flow.
+    uncertain_pump : whether the pump's bulk modulus and port timing are parameters. They are only
+        where recordings have a nominal source and the data sheet gives the pump's geometry, from
+        which the lumped model tells what they change in the ripple.
+
+    Raises ValueError for an unknown friction or a theta of the wrong length.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        observations: Sequence = (),
+        friction: str = "steady",
+        effects: Sequence = (),
+        source_sd: float = SOURCE_SD,
+        theta: np.ndarray | None = None,
+        guessed_load: bool | None = None,
+        uncertain_pump: bool = False,
+    ):
+        if friction not in FRICTION_LAWS:
+            raise ValueError(f"friction must be one of {FRICTION_LAWS}, not {friction!r}")
+        self.rig, self.friction, self.effects = rig, friction, tuple(effects)
+        self.source_sd = source_sd
+        self.labels = tuple(
+            o.label for o in observations if o.kind == "periodic" and o.source != "free"
+        )
+        if len(set(self.labels)) < len(self.labels):
+            raise ValueError(f"recordings need labels of their own, not {self.labels}")
+        if guessed_load is None:
+            guessed_load = rig.load.passes_flow and any(
+                o.source == "free" and o.flow_ripple is None for o in observations
+            )
+        self.guessed_load = bool(guessed_load)
+        self.uncertain_pump = bool(uncertain_pump and self.labels and len(rig.pump) > 1)
+        self._effect_parameters = [effect.parameters(rig, place) for effect, place in self.effects]
+        self.parameters = (
+            *line_parameters(rig, self.guessed_load),
+            *(pump_parameters(rig) if self.uncertain_pump else ()),
+            *(angle_parameter(label) for label in self.labels),
+            *effect_parameters(self.effects, self._effect_parameters),
+        )
+        self.index = {p.name: k for k, p in enumerate(self.parameters)}
+        self.theta = np.zeros(len(self.parameters)) if theta is None else np.asarray(theta, float)
+        if self.theta.shape != (len(self.parameters),):
+            raise ValueError(f"theta must have {len(self.parameters)} entries")
+        self._ripples = {}
+
+    # what the parameters mean
+
+    def values(self, theta: np.ndarray | None = None) -> dict[str, float]:
+        """Physical values by name, at `theta` (default: where the twin stands)."""
+        return coordinates.values(self.parameters, self.theta if theta is None else theta)
+
+    def arrays(self, theta: np.ndarray) -> Arrays:
+        """The line's numbers at `theta` as arrays."""
+        n = len(self.rig.line)
+        k = 3 * n + len(self.rig.sensors)
+        u = np.array([p.value(x) for p, x in zip(self.parameters[: k + 1], theta)])
+        a, d, lengths = u[: 3 * n].reshape(3, n)
+        # A sensor stays on the line however the fit stretches it.
+        x = np.clip(u[3 * n : k], 0.0, np.sum(lengths))
+        return Arrays(a, d, lengths, x, u[k], self.load_factor(theta))
+
+    def load_factor(self, theta: np.ndarray) -> float:
+        """What the load's coefficient is multiplied by at `theta`; 1 where it is no parameter."""
+        k = self.index.get("load")
+        return 1.0 if k is None else self.parameters[k].value(theta[k])
+
+    def effect_values(self, theta: np.ndarray) -> list[tuple]:
+        """(effect, place, values by name) of each effect at `theta`."""
+        out, k = [], len(self.parameters) - sum(len(e) for e in self._effect_parameters)
+        for (effect, place), own in zip(self.effects, self._effect_parameters):
+            values = {p.name: p.prior.value(u) for p, u in zip(own, theta[k:])}
+            out.append((effect, place, values))
+            k += len(own)
+        return out
+
+    @property
+    def friction_law(self) -> str:
+        """Of the line, with what the effects make of it."""
+        return next((e.friction for e, _ in self.effects if e.friction), self.friction)
+
+    # predictions
+
+    def predict(self, observations: Sequence, theta: np.ndarray | None = None) -> list[np.ndarray]:
+        """What the sensors read in each observation: list of (S, F) complex, see `Forward`.
+
+        For many calls with the same observations make one `Forward` and keep it.
+        """
+        return ForwardModel(self, observations)(self.theta if theta is None else np.asarray(theta))
+
+    def operating_point(self, observation) -> OperatingPoint:
+        """Mean pressure and flow, orifice coefficient and source of an observation, see
+        `rippletwin.twin.operating_point`."""
+        ripple = None
+        if observation.kind == "periodic" and observation.source != "free":
+            ripple = observation.flow_ripple or self._pump_ripple(observation)
+        return operating_point(self.rig, observation, ripple)
+
+    def respond(
+        self,
+        ripple: FlowRipple,
+        speed_hz: float,
+        load_pressure: float,
+        orders: np.ndarray,
+        friction: str | None = None,
+    ) -> np.ndarray:
+        """Sensors' pressure harmonics (S, F) at shaft `orders` (F,) for any flow ripple, angle 0.
+
+        This is how faults are propagated: the ripple of a faulty pump through the twin as it
+        stands. The orifice keeps the coefficient that the healthy mean flow of `ripple` gives
+        where the data sheet has none.
+        """
+        twin = self if friction is None else self.with_(friction=friction)
+        point = Point(
+            label="",
+            frequency_hz=np.asarray(orders) * speed_hz,
+            orders=np.asarray(orders),
+            speed_hz=speed_hz,
+            load_pressure=load_pressure,
+            flow_ripple=ripple,
+        )
+        return twin.predict([point])[0]
+
+    def reference_impedance(self, theta: np.ndarray, observation) -> float:
+        """What an input impedance is divided by, Pa s/m3: rho a/A of the first segment.
+
+        A measurement given as a ratio is a ratio whatever the bore really is, so the model's own
+        is taken for it; one given in Pa s/m3 is divided by the data sheet's, as the data are.
+        """
+        first = self.rig.line[0]
+        if observation.normalised:
+            v = self.arrays(theta)
+            first = Segment(first.length, v.diameters[0], v.wave_speeds[0])
+        return characteristic_impedance(self.rig.fluid, first)
+
+    # copies
+
+    def with_(self, **changes) -> Twin:
+        """A copy with other friction, effects, source_sd or theta (nominal if effects change)."""
+        state = {
+            "friction": self.friction,
+            "effects": self.effects,
+            "source_sd": self.source_sd,
+            "guessed_load": self.guessed_load,
+            "uncertain_pump": self.uncertain_pump,
+            "theta": None if "effects" in changes else self.theta,
+        }
+        labels = [Point(label=label) for label in self.labels]
+        twin = Twin(self.rig, labels, **{**state, **changes})
+        twin._ripples = self._ripples
+        return twin
+
+    def calibrated_rig(self) -> Rig:
+        """The rig with the values of where the twin stands: for the method of characteristics.
+
+        The load factor goes into the orifice's coefficient where the data sheet gives one.
+        """
+        v = self.arrays(self.theta)
+        line = tuple(
+            replace(s, length=float(length), diameter=float(d), wave_speed=float(a))
+            for s, length, d, a in zip(self.rig.line, v.lengths, v.diameters, v.wave_speeds)
+        )
+        sensors = tuple(Sensor(s.name, float(x)) for s, x in zip(self.rig.sensors, v.positions))
+        load = self.rig.load
+        if load.coefficient is not None:
+            load = replace(load, coefficient=load.coefficient * v.load)
+        fluid = replace(self.rig.fluid, kinematic_viscosity=v.viscosity)
+        return replace(self.rig, line=line, sensors=sensors, load=load, fluid=fluid)
+
+    def pump_changes(self, speed_hz: float, load_pressure: float) -> list[tuple]:
+        """(index, `RippleChange`) of each parameter of the pump, at rev/s into Pa; none where there
+        are no such parameters."""
+        if not self.uncertain_pump or not np.isfinite(load_pressure):
+            return []
+        from rippletwin.pump.ripple_sensitivity import ripple_change
+
+        rig, found = self.rig, []
+        for k in (self.index["bulk_modulus"], self.index["port_timing"]):
+            p = self.parameters[k]
+            ends = p.value(1.0), p.value(-1.0)
+            change = ripple_change(
+                rig.pump, rig.fluid, 60.0 * speed_hz, load_pressure, p.name, ends
+            )
+            found.append((k, change))
+        return found
+
+    def _pump_ripple(self, observation) -> FlowRipple:
+        """The lumped pump model's ripple where the user gave none."""
+        key = observation.speed_hz, observation.load_pressure
+        if key not in self._ripples:
+            from rippletwin.pump.outlets import ConstantPressure
+            from rippletwin.pump.simulation import simulate
+
+            self._ripples[key] = simulate(
+                self.rig.pump,
+                self.rig.fluid,
+                60.0 * observation.speed_hz,
+                ConstantPressure(observation.load_pressure),
+            )
+        return self._ripples[key]
+
+
+@dataclass(frozen=True)
+class Point:
+    """An operating point to predict, with the fields of an observation but no data."""
+
+    label: str
+    frequency_hz: np.ndarray = ()
+    orders: np.ndarray = ()
+    speed_hz: float | None = None
+    load_pressure: float | None = None
+    flow_ripple: FlowRipple | None = None
+    kind: str = "periodic"
+    source: str = "nominal"
+    mean: np.ndarray | None = None
+    sensors: tuple | None = None
+    normalised: bool = False

@@ -1,0 +1,82 @@
+"""A twin as plain lists, numbers and text, for a JSON file, and back."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor, Uncertainty
+from rippletwin.twin.effects.base import Place
+from rippletwin.twin.effects.library import EFFECTS
+from rippletwin.twin.twin import Point, Twin
+
+
+def to_dict(twin: Twin) -> dict:
+    """Plain data of a twin; `values` is for readers, all else is what `from_dict` reads."""
+    rig = asdict(twin.rig)
+    for key in ("frequency_hz", "impedance"):
+        rig["load"][key] = _plain(rig["load"][key])
+    return {
+        "rig": rig,
+        "recordings": list(twin.labels),
+        "friction": twin.friction,
+        "source_sd": twin.source_sd,
+        "guessed_load": twin.guessed_load,
+        "uncertain_pump": twin.uncertain_pump,
+        "effects": [{"name": e.name, "place": asdict(place)} for e, place in twin.effects],
+        "theta": twin.theta.tolist(),
+        "values": twin.values(),
+    }
+
+
+def from_dict(data: dict) -> Twin:
+    """The twin that `to_dict` wrote."""
+    return Twin(
+        _rig(data["rig"]),
+        [Point(label=label) for label in data["recordings"]],
+        friction=data["friction"],
+        effects=[(EFFECTS[e["name"]], Place(**e["place"])) for e in data["effects"]],
+        source_sd=data["source_sd"],
+        guessed_load=data["guessed_load"],
+        uncertain_pump=data.get("uncertain_pump", False),
+        theta=np.array(data["theta"]),
+    )
+
+
+def _rig(data: dict) -> Rig:
+    load = dict(data["load"])
+    for key in ("frequency_hz", "impedance"):
+        load[key] = _array(load[key])
+    return Rig(
+        fluid=Fluid(**data["fluid"]),
+        pump=data["pump"],
+        line=tuple(Segment(**s) for s in data["line"]),
+        sensors=tuple(Sensor(**s) for s in data["sensors"]),
+        load=Load(**load),
+        uncertainty=Uncertainty(**data["uncertainty"]),
+    )
+
+
+def _plain(values: np.ndarray | None):
+    if values is None or not np.iscomplexobj(values):
+        return None if values is None else values.tolist()
+    return {"re": values.real.tolist(), "im": values.imag.tolist()}
+
+
+def _array(values):
+    if isinstance(values, dict):
+        return np.array(values["re"]) + 1j * np.array(values["im"])
+    return None if values is None else np.array(values)
+
+
+def twin_of(data: dict) -> Twin:
+    """The twin in what `to_dict` made, or in what `to_dict` did."""
+    return from_dict(data.get("twin", data))
+
+
+def load_twin(path: str | Path) -> Twin:
+    """The twin of a twin.json, that of a calibration or the corrected one of `explain`."""
+    return twin_of(json.loads(Path(path).read_text()))

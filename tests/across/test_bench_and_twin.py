@@ -1,0 +1,126 @@
+"""Every effect on the virtual bench against the same effect in the twin, at full ripple.
+
+Nothing is fitted: the twin is told the true line, the true flow ripple and the effect's true
+values, as a seal tells them, and must read what the bench's sensors read. The two share no code and
+no method (spectral elements in time, matrices and harmonic balance in frequency), so that whatever
+is left is physics that one of them has and the other has not: independent verification.
+"""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from rippletwin.case.model import FlowRipple, Fluid, Load, Rig, Segment, Sensor
+from rippletwin.spectra.observation import Observation
+from rippletwin.twin.effects.library import candidates
+from rippletwin.twin.twin import Twin
+from virtualrig.draw import HIGHEST_HZ
+from virtualrig.draw_effects import LIBRARY, Bare
+from virtualrig.orbit import Bench
+from virtualrig.recorder import Point, sense
+from virtualrig.resolution import NUMERICS, REFINE, driving
+from virtualrig.rig import build
+
+NO_VALUES = {"piston_spread", "speed_fluctuation"}  # the bench's and the twin's differ
+LEFT = 0.002  # the mean pressure is known to no better than its weights allow
+QUICK = ("entrained_air", "viscoelastic_wall", "leak")
+SLOW = tuple(name for name in LIBRARY if name not in NO_VALUES and name not in QUICK)
+STRENGTH = 0.7  # from invisible to plain
+SPEED, PRESSURE = 1000.0, 6e6  # r/min, Pa
+SEGMENTS = (  # thin pipe: the mean pressure falls by 1.5 % along the line
+    {"length": 2.1, "diameter": 0.0125, "wave_speed": 1240.0},
+    {"length": 1.3, "diameter": 0.0152, "wave_speed": 1110.0},
+)
+POSITIONS = (0.35, 1.7, 2.9)
+FLUID = {"density": 865.0, "kinematic_viscosity": 6e-5}
+PUMP = {
+    "pistons": 9, "piston_diameter": 0.014, "pitch_radius": 0.030, "swash_angle_deg": 16.0,
+    "dead_volume": 3e-6, "bulk_modulus": 1.3e9, "port_area": 8e-5, "port_opening_deg": 12.0,
+    "port_overlap_deg": 2.0, "discharge_coefficient": 0.65, "case_leakage": 2e-13,
+    "suction_pressure": 2e5,
+}  # fmt: skip
+SHEET = {
+    "fluid": FLUID,
+    "pump": PUMP,
+    "line": {"segments": [dict(segment) for segment in SEGMENTS]},
+    "sensors": [{"name": f"p{k}", "position": x} for k, x in enumerate(POSITIONS, 1)],
+}
+
+
+def both(*names):
+    """Harmonics (S, F) that the bench's sensors read, and that the twin says they do."""
+    point = Point("here", SPEED, PRESSURE, 0.0, "healthy")
+    plain = driving(build(SHEET, {}), point)(SPEED)
+    bare = Bare(
+        np.random.default_rng(1),
+        [dict(segment) for segment in SEGMENTS],
+        len(POSITIONS),
+        FLUID["density"],
+        PUMP["bulk_modulus"],
+        float(plain.mean()),
+        PRESSURE,
+    )
+    effects = [LIBRARY[name](bare, STRENGTH) for name in names]
+    seal = {"effects": [e.entry for e in effects], "numerics": NUMERICS, "noise": 1e3}
+    rig = build(SHEET, seal)
+    orbit = Bench(rig, flow=driving(rig, point), refine=REFINE).settle(SPEED, PRESSURE, tolerance=5)
+    orders = 9 * np.arange(1, int(HIGHEST_HZ * 60 / SPEED / 9) + 1)
+    sensed = sense(orbit, rig.sensing)
+    read = 2 * np.fft.rfft(sensed, axis=1)[:, orders] / orbit.pressure.shape[1]
+
+    angle = 360 * np.arange(len(plain)) / len(plain)
+    true = Rig(
+        Fluid(FLUID["density"], FLUID["kinematic_viscosity"]),
+        {"pistons": 9},
+        tuple(Segment(**segment) for segment in SEGMENTS),
+        tuple(Sensor(s["name"], s["position"]) for s in SHEET["sensors"]),
+        Load("orifice"),
+    )
+    observation = Observation(
+        "periodic", "here", orders * SPEED / 60, orders, np.ones_like(read),
+        np.tile(np.eye(len(read), dtype=complex), (len(orders), 1, 1)),
+        sensed.mean(axis=1), SPEED / 60, PRESSURE, "nominal",
+        FlowRipple(angle, plain), true.sensors,
+    )  # fmt: skip
+    placed = [
+        next(c for c in candidates(true) if (c[0].name, c[1].element) == (e.name, e.element))
+        for e in effects
+    ]
+    twin = Twin(true, friction="steady", effects=placed)
+    values = {
+        f"{e.name}@{place}.{name}": value
+        for e, (_, place) in zip(effects, placed)
+        for name, value in e.parameters.items()
+    }
+    for e, (_, place) in zip(effects, placed):
+        if e.name == "leak":
+            values[f"leak@{place}.pressure_exponent"] = 0.4999 if "orifice" in e.arguments else 1e-4
+        if e.name == "source_impedance":
+            values[f"source_impedance@{place}.conductance"] = 1e-18
+    theta = np.zeros(len(twin.parameters))
+    for k, p in enumerate(twin.parameters):
+        if p.name in values:
+            theta[k] = p.prior.coordinate(values.pop(p.name))
+    assert not values
+    return read, twin.predict([observation], theta)[0]
+
+
+both_bare = cache(both)
+
+
+def misfit(read, said):
+    return np.linalg.norm(said - read) / np.linalg.norm(read)
+
+
+@pytest.mark.parametrize("name", [*QUICK, *(pytest.param(n, marks=pytest.mark.long) for n in SLOW)])
+def test_an_effect_on_the_bench_is_the_effect_in_the_twin(name):
+    """It changes the ripple by more than three per cent, and the twin reads it to LEFT."""
+    read, said = both(name)
+    print(f"{name}: left {misfit(read, said):.4f} of {misfit(read, both_bare()[1]):.2f}")
+    assert misfit(read, both_bare()[1]) > 0.03
+    assert misfit(read, said) < LEFT
+
+
+def test_the_bare_line_is_the_same():
+    assert misfit(*both_bare()) < LEFT

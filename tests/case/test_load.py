@@ -1,0 +1,242 @@
+"""Cases come in from every format, and what comes in is what was written."""
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+import yaml
+from nptdms import ChannelObject, TdmsWriter
+
+from case_folders import RATE, ripple, sheet, write_case, write_hdf5
+from paths import MEASURED, ROOT
+from rippletwin.case.load import load_case
+from rippletwin.case.rig_yaml import schema
+from rippletwin.cli import main
+from rippletwin.spectra.observation import observe
+
+CYLINDER = MEASURED / "cylinder"
+
+
+def write_csv(path, pressure):
+    time = np.arange(pressure.shape[1]) / RATE
+    np.savetxt(
+        path,
+        np.column_stack([time, *pressure]),
+        delimiter=",",
+        header="time_s,p1,p2",
+        comments="",
+        fmt="%.10g",
+    )
+
+
+def write_matlab5(path, pressure):
+    scipy.io.savemat(path, {"pressure": pressure, "sampling_rate_hz": RATE})
+
+
+def write_matlab73(path, pressure):
+    """MATLAB's v7.3 files are HDF5 behind a 512-byte header, arrays transposed."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file["pressure"] = pressure.T
+        file["sampling_rate_hz"] = [[RATE]]
+    with open(path, "r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+
+
+def write_tdms(path, pressure):
+    with TdmsWriter(path) as writer:
+        properties = {"wf_increment": 1 / RATE}
+        writer.write_segment(
+            [
+                ChannelObject("rig", name, row, properties)
+                for name, row in zip(("p2", "p1"), pressure[::-1])
+            ]
+        )
+
+
+@pytest.mark.parametrize(
+    ("name", "write"),
+    [
+        ("r.h5", write_hdf5),
+        ("r.csv", write_csv),
+        ("r.mat", write_matlab5),
+        ("v73.mat", write_matlab73),
+        ("r.tdms", write_tdms),
+    ],
+)
+def test_every_format_gives_the_same_recording(tmp_path, name, write):
+    """The arrays read are the arrays written, in the rig's sensor order, at the right rate."""
+    content = sheet()
+    content["recordings"][0]["file"] = name
+    write_case(tmp_path, content, pressure=None)
+    pressure = ripple()
+    write(tmp_path / name, pressure)
+    case = load_case(tmp_path)
+    np.testing.assert_allclose(case.recordings[0].pressure, pressure, rtol=1e-9)
+    assert case.recordings[0].sampling_rate_hz == pytest.approx(RATE, rel=1e-6)
+
+
+def test_the_sheet_arrives_in_the_dataclasses(tmp_path):
+    """Every key of a sheet is found under its own name, 9.5e6 as a number."""
+    content = sheet()
+    content["recordings"][0]["flow_ripple"] = "flow.csv"
+    content["line"]["segments"][0]["temperature"] = 313.0
+    content["uncertainty"] = {"length": 0.02}
+    write_case(tmp_path, content)
+    angle = np.arange(0, 360, 2.0)
+    flow = 5e-4 + 1e-5 * np.cos(np.radians(9 * angle))
+    np.savetxt(
+        tmp_path / "flow.csv",
+        np.column_stack([angle, flow]),
+        delimiter=",",
+        header="angle_deg,flow_m3_s",
+        comments="",
+    )
+    text = (tmp_path / "rig.yaml").read_text().replace("9500000.0", "9.5e6")
+    assert "9.5e6" in text
+    (tmp_path / "rig.yaml").write_text(text)
+    case = load_case(tmp_path)
+    assert case.rig.line[0].temperature == 313.0
+    assert case.rig.uncertainty.length == 0.02 and case.rig.uncertainty.diameter == 0.03
+    assert [sensor.position for sensor in case.rig.sensors] == [0.42, 2.59]
+    (recording,) = case.healthy
+    assert recording.load_pressure == 9.5e6 and recording.state_code == "H"
+    np.testing.assert_allclose(recording.flow_ripple.flow, flow)
+    assert observe(recording, case.rig).source == "nominal"
+
+
+def test_only_the_asked_states_are_read(tmp_path):
+    """A recording of a state not asked for is not opened: this one would not open."""
+    content = sheet()
+    content["recordings"].append(
+        {**content["recordings"][0], "file": "broken.h5", "state": "cylinder"}
+    )
+    write_case(tmp_path, content)
+    (tmp_path / "broken.h5").write_bytes(b"nothing")
+    assert len(load_case(tmp_path, states={"healthy"}).recordings) == 1
+    with pytest.raises(ValueError, match="unknown states"):
+        load_case(tmp_path, states={"H"})
+
+
+def test_load_impedance_and_spectrum(tmp_path):
+    """A measured load impedance and a two-sensor spectrum with a repeat keep their numbers."""
+    frequency = np.arange(100.0, 1000.0, 100.0)
+    rng = np.random.default_rng(1)
+    parts = rng.normal(size=(4, frequency.size))
+    for name, factor in (("s1.csv", 1.0), ("s2.csv", 1.1)):
+        np.savetxt(
+            tmp_path / name,
+            np.column_stack([frequency, *(factor * parts)]),
+            delimiter=",",
+            header="frequency_hz,p1_re,p1_im,p2_re,p2_im",
+            comments="",
+        )
+    np.savetxt(
+        tmp_path / "load.csv",
+        np.column_stack([frequency, *parts[:2]]),
+        delimiter=",",
+        header="frequency_hz,re,im",
+        comments="",
+    )
+    content = sheet()
+    content["load"] = {"impedance": "load.csv"}
+    content["recordings"] = [
+        {"file": "s1.csv", "kind": "spectrum", "state": "healthy", "repeats": ["s2.csv"]}
+    ]
+    write_case(tmp_path, content, pressure=None)
+    case = load_case(tmp_path)
+    np.testing.assert_allclose(case.rig.load.impedance, parts[0] + 1j * parts[1])
+    (recording,) = case.recordings
+    assert recording.spectra.shape == (2, 2, frequency.size)
+    np.testing.assert_allclose(recording.spectra[1, 1], 1.1 * (parts[2] + 1j * parts[3]))
+
+
+def test_every_key_of_the_schema_is_described():
+    """No property of rig.schema.yaml is without a description."""
+
+    def undescribed(node, path):
+        for name, child in node.get("properties", {}).items():
+            if not child.get("description"):
+                yield f"{path}.{name}"
+            yield from undescribed(child, f"{path}.{name}")
+        if "items" in node:
+            yield from undescribed(node["items"], f"{path}[]")
+
+    assert list(undescribed(schema(), "")) == []
+
+
+def test_the_example_of_the_documentation_is_valid():
+    """docs/cases.md's complete rig.yaml passes the schema and names every key but the exclusive."""
+    import jsonschema
+
+    from rippletwin.case.rig_yaml import _Loader
+
+    text = (ROOT / "docs" / "cases.md").read_text()
+    example = yaml.load(text.split("```yaml")[1].split("```")[0], Loader=_Loader)
+    jsonschema.Draft202012Validator(schema()).validate(example)
+    properties = schema()["properties"]
+    assert set(example) == set(properties)
+    assert set(example["pump"]) == set(properties["pump"]["properties"])
+    given = set().union(*example["recordings"])
+    assert given == set(properties["recordings"]["items"]["properties"])
+
+
+def test_check_reports_a_case(tmp_path, capsys):
+    """rippletwin check prints revolutions, speed, both noises and harmonics, and ends with 0.
+
+    Truth: the signal has 1 kPa of noise and five piston harmonics, and turns at 1000 r/min.
+    """
+    write_case(tmp_path, sheet())
+    assert main(["check", str(tmp_path)]) == 0
+    text = capsys.readouterr().out
+    assert "revolutions at 1000." in text and "cycle scatter" in text
+    assert "5 of 33 piston harmonics" in text
+
+
+def test_check_ends_with_2_on_bad_input(tmp_path, capsys):
+    """Bad input is told on standard error, with nothing on standard output."""
+    assert main(["check", str(tmp_path)]) == 2
+    told = capsys.readouterr()
+    assert "rig.yaml" in told.err and told.out == ""
+
+
+@pytest.mark.skipif(not CYLINDER.is_dir(), reason="the measured cylinder is not on this machine")
+def test_the_measured_cylinder_comes_in(tmp_path):
+    """Two runs of a real tube's input impedance, bare columns, at the frequencies both have.
+
+    Truth: its README: 1 Hz steps, runs that differ by 6.25 % in the reflection coefficient; so the
+    mean of two has a relative standard deviation of half of that.
+    """
+    for run in ("measured_1.txt", "measured_2.txt"):
+        (tmp_path / run).symlink_to(CYLINDER / run)
+    content = {
+        "fluid": {
+            "density": 1.204,
+            "kinematic_viscosity": 1.51e-5,
+            "heat_capacity_ratio": 1.4,
+            "prandtl": 0.71,
+        },
+        "line": {"segments": [{"length": 0.436, "diameter": 0.0039, "wave_speed": 343.2}]},
+        "load": {"kind": "open"},
+        "recordings": [
+            {
+                "file": "measured_1.txt",
+                "kind": "input_impedance",
+                "state": "healthy",
+                "normalised": True,
+                "repeats": ["measured_2.txt"],
+            }
+        ],
+    }
+    write_case(tmp_path, content, pressure=None)
+    case = load_case(tmp_path)
+    (recording,) = case.healthy
+    assert recording.spectra.shape == (2, 1, 2950)
+    assert recording.frequency_hz[[0, -1]] == pytest.approx([50, 2999])
+    seen = observe(recording, case.rig)
+    reflection = (recording.spectra - 1) / (recording.spectra + 1)
+    gap = np.linalg.norm(reflection[0] - reflection[1]) / np.linalg.norm(reflection[0])
+    assert gap == pytest.approx(0.0625, abs=0.001)
+    deviation = np.sqrt(seen.covariance[:, 0, 0].real) / (np.abs(seen.values[0] + 1) ** 2 / 2)
+    size = np.sqrt(np.mean(np.abs(reflection) ** 2))
+    assert np.sqrt(np.mean(deviation**2)) / size == pytest.approx(gap / 2, rel=0.15)
+    assert seen.source == "known" and seen.normalised and case.rig.fluid.is_gas

@@ -1,0 +1,141 @@
+"""Data made to contradict themselves are found out, and healthy data are not."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rippletwin.calibration.frequency_continuation import fit_hypothesis
+from rippletwin.explanation.checks import data_contradictions
+from rippletwin.explanation.checks.data_contradictions import find_contradictions
+from rippletwin.explanation.checks.sensor_wiring import find_swapped_sensors
+from rippletwin.explanation.search.stepwise_search import Search
+from rippletwin.twin.effects.base import Place
+from rippletwin.twin.effects.library import EFFECTS
+from rippletwin.twin.twin import Twin
+from synthetic_observations import make, rig
+
+POINTS = ((1000, 9.5e6), (1500, 5e6))
+
+
+@pytest.fixture(scope="module")
+def healthy():
+    """A bench and two observations of it without any contradiction."""
+    return make(np.random.default_rng(1), points=POINTS)[:2]
+
+
+def row(o, k, values):
+    changed = o.values.copy()
+    changed[k] = values
+    return replace(o, values=changed)
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("effect", [None, "sensor_gain", "leak"])
+def test_no_alarm_on_sound_data(seed, effect):
+    """Neither sound data nor those of a line with missing physics contradict themselves."""
+    place = {"sensor_gain": Place("sensor p2", 1), "leak": Place("position")}
+    hypothesis = () if effect is None else ((EFFECTS[effect], place[effect]),)
+    bench, observations, _ = make(np.random.default_rng(seed), hypothesis, points=POINTS)
+    again = make(np.random.default_rng(seed), hypothesis, points=POINTS, noise=2.5e3)[1]
+    assert find_contradictions(bench, (), observations, observations, again) == ""
+
+
+def test_dead_sensor(healthy):
+    """A sensor that reads noise alone is named."""
+    bench, (o, other) = healthy
+    noise = np.sqrt(o.covariance[:, 2, 2].real) * np.exp(1j * np.arange(o.values.shape[1]))
+    assert "p3 reads no ripple" in find_contradictions(bench, (), [row(o, 2, noise), other])
+
+
+def test_duplicated_sensor(healthy):
+    """Two sensors two metres apart with one signal, scaled, are found."""
+    bench, (o, other) = healthy
+    assert "p1 and p2 read the same" in find_contradictions(
+        bench, (), [row(o, 1, 1.03 * o.values[0]), other]
+    )
+
+
+def test_no_noise(healthy):
+    """A covariance of zeros is no measurement's."""
+    bench, (o, other) = healthy
+    assert "no noise" in find_contradictions(
+        bench, (), [replace(o, covariance=0 * o.covariance), other]
+    )
+
+
+def test_mean_pressure_grows_downstream(healthy):
+    """A mean that grows by more than any gain error is found; a gain error's 15 % is not, nor are
+    sensors that are coupled without their mean."""
+    bench, (o, other) = healthy
+    assert "grows downstream" in find_contradictions(
+        bench, (), [replace(o, mean=np.array([9.5e6, 9.4e6, 13e6])), other]
+    )
+    for mean in ([9.5e6, 10.9e6, 9.4e6], [10.0, -20.0, 3000.0]):
+        assert find_contradictions(bench, (), [replace(o, mean=np.array(mean)), other]) == ""
+
+
+def test_copied_recording(healthy):
+    """The same numbers under two names."""
+    bench, (o, _) = healthy
+    assert "a copy of" in find_contradictions(bench, (), [o, replace(o, label="other")])
+
+
+def test_halves_of_two_states(healthy):
+    """Halves that differ by a third of the ripple are two states; at another angle they are not."""
+    bench, (o, other) = healthy
+    turned = replace(o, values=o.values * np.exp(0.2j * o.orders))
+    assert find_contradictions(bench, (), [o, other], [o], [turned]) == ""
+    changed = replace(turned, values=turned.values * np.linspace(1.5, 0.7, o.values.shape[1]))
+    assert "between its halves" in find_contradictions(bench, (), [o, other], [o], [changed])
+
+
+def test_odd_one_of_an_operating_point(healthy):
+    """Of three recordings of one point the one with half the ripple is named; one of slightly
+    warmer oil is not."""
+    bench, (o, other) = healthy
+    delay = sum(segment.delay for segment in bench.line)
+    warmer = o.values * np.exp(-2j * np.pi * o.frequency_hz * delay * 0.004)
+    same = replace(o, label="second", values=warmer * 1.001)
+    odd = replace(o, label="third", values=0.5 * o.values)
+    assert find_contradictions(bench, (), [o, same, other]) == ""
+    assert find_contradictions(bench, (), [o, same, odd, other]).startswith(
+        "third is unlike every other"
+    )
+
+
+@pytest.mark.parametrize("clipped", [False, True])
+def test_limiter_with_noise_behind_it(clipped):
+    """A limiter whose output carries noise is found; the sinusoid before it is not."""
+    rng = np.random.default_rng(2)
+    wave = np.sin(0.01 * np.arange(20000)) + 1e-3 * rng.normal(size=20000)
+    if clipped:
+        wave = np.minimum(wave, 0.6) + 1e-3 * rng.normal(size=20000)
+    recording = SimpleNamespace(pressure=wave[None], label="r")
+    assert ("clipped at the top" in find_contradictions(rig(1), [recording])) == clipped
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("what", ["sound", "exchanged", "sign"])
+def test_wiring(what):
+    """Exchanged sensors and a turned sign are told from sound data by fits of the line alone."""
+    bench, observations, _ = make(np.random.default_rng(3), sensors=2, points=POINTS[:1])
+    if what == "exchanged":
+        observations = [replace(o, values=o.values[::-1]) for o in observations]
+    if what == "sign":
+        observations = [replace(o, values=o.values * [[1.0], [-1.0]]) for o in observations]
+    base = Twin(bench, observations)
+    fit = fit_hypothesis(base, (), observations)
+    words = find_swapped_sensors(base, observations, Search(fit, [], fit))
+    expected = {"sound": "", "exchanged": "p1 and p2 are exchanged", "sign": "sign turned"}[what]
+    assert (words == "") if not expected else (expected in words)
+
+
+def test_every_reason_is_told(healthy):
+    """Two contradictions come as two, each once."""
+    bench, (o, other) = healthy
+    bad = replace(row(o, 1, o.values[0]), covariance=0 * o.covariance)
+    words = find_contradictions(bench, (), [bad, other])
+    assert words.count(";") == 1 and "read the same" in words and "no noise" in words
+    assert data_contradictions.find_contradictions(bench) == ""

@@ -1,0 +1,103 @@
+"""Intervals of an explanation's parameters: profiles, and what a second valley does to them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rippletwin.calibration.frequency_continuation import refine
+from rippletwin.calibration.levenberg_marquardt import descend
+from rippletwin.calibration.posterior import Posterior
+from rippletwin.explanation.checks.profile_intervals import (
+    INTERVAL_RISE,
+    MAX_RISE,
+    PROFILE_DISTANCES,
+    ProfileTrace,
+    add_profile_intervals,
+    effect_intervals,
+    interpolate_crossing,
+    trace_profile,
+)
+from rippletwin.explanation.fit_jobs import Workers
+from rippletwin.twin.effects.base import Place
+from rippletwin.twin.effects.library import EFFECTS
+from rippletwin.twin.twin import Twin
+from synthetic_observations import make
+
+HOSE = ((EFFECTS["viscoelastic_wall"], Place("segment 2", 1)),)
+TRUTH = {
+    "viscoelastic_wall@segment 2.compliance_ratio": 0.2,
+    "viscoelastic_wall@segment 2.retardation_time": 3e-4,
+}
+AT = np.array((0.0, *PROFILE_DISTANCES))
+
+
+@pytest.fixture(scope="module")
+def hose():
+    """(pool in this process, fit from the truth)."""
+    bench, observations, truth = make(np.random.default_rng(4), HOSE, TRUTH)
+    fit = refine(Twin(bench, observations), HOSE, observations, [truth.theta])
+    return Workers(Twin(bench, observations), observations), fit
+
+
+def test_a_parabola_ends_where_a_normal_distribution_does():
+    """Of a normal posterior the profile's interval is 1.96 standard deviations."""
+    assert interpolate_crossing(AT, AT**2 / 2) == pytest.approx(1.96, abs=1e-3)
+
+
+def test_a_second_valley_belongs_to_the_interval():
+    """What is as likely beyond a ridge is inside; the interval ends where the posterior falls for
+    good, and at the last place asked where it does not."""
+    assert 4.0 < interpolate_crossing(AT, np.array([0.0, 1.1, 3.0, 0.5, 9.0])) < 6.0
+    assert interpolate_crossing(AT, np.array([0.0, 0.1, 0.2, 0.3, 0.4])) == PROFILE_DISTANCES[-1]
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_at_the_end_the_posterior_has_fallen_by_what_it_should(hose, side):
+    """Held at the interval's end, everything else fitted from the mode again, minus the log
+    posterior is RISE above the mode's: straight lines between a few places are good enough."""
+    pool, fit = hose
+    k = fit.twin.index["viscoelastic_wall@segment 2.compliance_ratio"]
+    end = trace_profile(pool.base, pool.observations, {"fit": fit, "held": k, "side": side}).end
+    theta = fit.twin.theta.copy()
+    theta[k] = end
+    posterior = Posterior(fit.twin, pool.observations)
+    value = descend(posterior, theta, 30, held=[k])[1]
+    assert value - fit.objective == pytest.approx(INTERVAL_RISE, abs=0.2 * INTERVAL_RISE)
+    assert side * (end - fit.twin.theta[k]) > 0
+
+
+def test_intervals_hold_the_truth_and_what_is_held_stays(hose):
+    """The interval of each parameter holds its true value, in the verdict's units; a descent does
+    not move what it is told to hold."""
+    pool, fit = hose
+    (entry,) = effect_intervals(add_profile_intervals(pool, fit))
+    for name, parameter in entry["parameters"].items():
+        low, high = parameter["ci95"]
+        assert low < parameter["value"] < high
+        assert low < TRUTH[f"viscoelastic_wall@segment 2.{name}"] < high
+    start = fit.twin.theta + 0.1
+    theta, _ = descend(Posterior(fit.twin, pool.observations), start, 3, held=[2])
+    assert theta[2] == start[2] and np.all(theta[:2] != start[:2])
+
+
+def test_a_better_mode_on_the_way_takes_over(hose):
+    """Where a walk comes to something likelier, the fit goes there and is asked again."""
+    _, fit = hose
+    better = replace(fit, objective=fit.objective - 10.0)
+    far = fit.twin.theta + 1.0
+
+    class Pool:
+        def map(self, function, jobs):
+            left = [job["fit"].objective for job in jobs]
+            new = left[0] == better.objective
+            value = better.objective if new else better.objective + MAX_RISE
+            return [ProfileTrace(job["side"] * (2.0 if new else 1.0), value, far) for job in jobs]
+
+        def fit(self, jobs):
+            assert np.array_equal(jobs[0]["theta"], far)
+            return [better]
+
+    found = add_profile_intervals(Pool(), fit)
+    assert found.objective == better.objective
+    assert set(found.ends.values()) == {(-2.0, 2.0)}

@@ -1,0 +1,80 @@
+"""Observations made with the twin's own forward model, for tests of explaining it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from rippletwin.case.model import FlowRipple, Fluid, Load, Rig, Segment, Sensor
+from rippletwin.spectra.observation import Observation
+from rippletwin.twin.forward_model import ForwardModel
+from rippletwin.twin.twin import Twin
+
+POINTS = ((1000, 9.5e6), (1200, 15e6), (1500, 5e6))  # r/min, Pa
+
+
+def rig(sensors=3):
+    """The paper's calibrated line with two or three sensors."""
+    line = (
+        Segment(5.953, 0.01971, 1022.9),
+        Segment(1.144, 0.02307, 982.7),
+        Segment(1.675, 0.01486, 1308.4),
+    )
+    places = (0.4167, 2.5895, 6.5)[:sensors]
+    named = tuple(Sensor(f"p{k + 1}", x) for k, x in enumerate(places))
+    return Rig(Fluid(870.0, 3.2e-5), {"pistons": 9}, line, named, Load("orifice"))
+
+
+def ripple(speed_hz, pressure, depth=1.0):
+    """Kinematic ripple of nine pistons with a backflow at the opening of each, 40 cc/rev, or
+    `depth` of that ripple."""
+    angle = 2 * np.pi * np.arange(3072) / 3072
+    flow = np.zeros_like(angle)
+    for k in range(9):
+        own = (angle + 2 * np.pi * k / 9) % (2 * np.pi)
+        flow += np.where(own < np.pi, np.sin(own), 0.0)
+        flow -= 0.5 * np.exp(-0.5 * ((own - 0.12) / 0.04) ** 2) * pressure / 1e7
+    flow = 1.0 + depth * (flow / flow.mean() - 1.0)
+    return FlowRipple(np.rad2deg(angle), flow * 40e-6 * speed_hz, pressure)
+
+
+def make(rng, effects=(), values=None, sensors=3, points=POINTS, source=0.03, noise=2e3, depth=1.0):
+    """(rig, observations, true twin): nominal values off by their uncertainty, a smooth relative
+    error `source` of the flow ripple, white sensor noise of `noise` Pa over 160 revolutions."""
+    values, bench, observations = values or {}, rig(sensors), []
+    for k, (speed, pressure) in enumerate(points):
+        shaft = speed / 60
+        orders = 9 * np.arange(1, int(4000 / (9 * shaft)) + 1)
+        covariance = np.tile(np.eye(sensors) * 4 * noise**2 / (3072 * 160), (len(orders), 1, 1))
+        observations.append(
+            Observation(
+                "periodic",
+                f"point {k + 1}",
+                orders * shaft,
+                orders,
+                np.ones((sensors, len(orders)), complex),
+                covariance.astype(complex),
+                np.zeros(sensors),
+                shaft,
+                pressure,
+                "nominal",
+                ripple(shaft, pressure, depth),
+                bench.sensors,
+            )
+        )
+    twin = Twin(bench, observations, effects=effects)
+    theta = rng.normal(size=len(twin.theta))
+    for k, p in enumerate(twin.parameters):
+        if p.flat:
+            theta[k] = rng.uniform(-np.pi / 9, np.pi / 9) / 0.01
+        if p.name in values:
+            theta[k] = p.prior.coordinate(values[p.name])
+    forward = ForwardModel(twin, observations)
+    for part, o in zip(forward.slices, observations):
+        c = rng.normal(size=(4, 2)) @ np.array([1, 1j])
+        waves = np.cos(np.pi * np.outer(np.arange(4), o.frequency_hz) / 4000)
+        forward.source.flow[part] *= 1 + 0.5 * source * (c @ waves)
+    recorded = []
+    for o, h in zip(observations, forward(theta)):
+        error = rng.normal(size=(*h.shape, 2)) @ np.array([1, 1j]) / np.sqrt(2)
+        recorded.append(replace(o, values=h + error * np.sqrt(o.covariance[0, 0, 0].real)))
+    return bench, recorded, twin.with_(theta=theta)

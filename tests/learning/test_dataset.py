@@ -1,0 +1,114 @@
+"""Augmentation and the split by time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rippletwin.learning.dataset import augment, remove_mean, split_by_time
+
+
+@pytest.fixture
+def seed():
+    rng = np.random.default_rng(1)
+    return rng.standard_normal((4, 2, 96)) + np.arange(8).reshape(4, 2, 1)
+
+
+def test_without_noise_a_sample_is_a_shifted_seed(seed):
+    """Undoing the shift (found by circular correlation) gives the class's seed less its mean."""
+    x, y = augment(seed, 5, np.zeros(2), np.random.default_rng(0))
+    assert x.shape == (20, 2, 96) and x.dtype == np.float32
+    assert (y == np.repeat(range(4), 5)).all()
+    clean = remove_mean(seed)
+    for sample, label in zip(x, y):
+        match = [np.abs(np.roll(sample, s, -1) - clean[label]).max() for s in range(96)]
+        assert min(match) < 1e-5
+
+
+def test_channels_shift_together(seed):
+    """Both sensors see the same crank angle: the shift that fits one channel fits the other."""
+    x, y = augment(seed, 8, np.zeros(2), np.random.default_rng(3))
+    clean = remove_mean(seed)
+    for sample, label in zip(x, y):
+        best = [
+            np.argmin([np.abs(np.roll(sample[c], s) - clean[label, c]).max() for s in range(96)])
+            for c in range(2)
+        ]
+        assert best[0] == best[1]
+
+
+def test_shifts_cover_the_revolution_evenly(seed):
+    """Against the uniform law: the mean of exp(j shift angle) of n samples is below 4/sqrt(n)."""
+    impulse = np.zeros((1, 1, 64))
+    impulse[0, 0, 0] = 1
+    x, _ = augment(impulse, 2000, np.zeros(1), np.random.default_rng(0))
+    angle = 2 * np.pi * x[:, 0].argmax(-1) / 64
+    assert abs(np.exp(1j * angle).mean()) < 4 / np.sqrt(2000)
+
+
+def test_noise_is_the_stated_fraction_of_each_sensor(seed):
+    """Against its definition: what is left after the silent twin of the same draw has the standard
+    deviation 0.15 times the sensor's, channel by channel, and is white."""
+    std = np.array([2.0, 10.0])
+    flat = np.zeros((4, 2, 1024))
+    x, _ = augment(flat, 100, std, np.random.default_rng(0))
+    np.testing.assert_allclose(x.std(axis=(0, 2)), 0.15 * std, rtol=0.01)
+    np.testing.assert_allclose((x[..., 1:] * x[..., :-1]).mean() / (x**2).mean(), 0, atol=0.01)
+
+
+def test_two_revolutions_repeat_the_signal_but_not_the_noise(seed):
+    """Without noise the halves are equal; with noise they differ by sqrt(2) of its deviation."""
+    x, _ = augment(seed, 3, np.zeros(2), np.random.default_rng(0), revolutions=2)
+    assert x.shape == (12, 2, 192)
+    np.testing.assert_allclose(x[..., :96], x[..., 96:], atol=1e-6)
+    x, _ = augment(seed, 200, np.ones(2), np.random.default_rng(0), revolutions=2)
+    difference = (x[..., :96] - x[..., 96:]).std()
+    np.testing.assert_allclose(difference, 0.15 * np.sqrt(2), rtol=0.02)
+
+
+def test_amplitude_survives(seed):
+    """Mean removal only: a seed of half the amplitude gives samples of half the amplitude."""
+    x, _ = augment(seed, 2, np.zeros(2), np.random.default_rng(5))
+    half, _ = augment(seed / 2, 2, np.zeros(2), np.random.default_rng(5))
+    np.testing.assert_allclose(half, x / 2, atol=1e-6)
+    np.testing.assert_allclose(x.mean(-1), 0, atol=1e-5)
+
+
+def test_same_generator_same_samples(seed):
+    """Reproducible from the generator, and different from another one."""
+    a, _ = augment(seed, 4, np.ones(2), np.random.default_rng(7))
+    b, _ = augment(seed, 4, np.ones(2), np.random.default_rng(7))
+    c, _ = augment(seed, 4, np.ones(2), np.random.default_rng(8))
+    assert (a == b).all() and not (a == c).all()
+
+
+def test_bad_seeds_are_refused(seed):
+    """A seed of the wrong rank or with a NaN never becomes training data."""
+    with pytest.raises(ValueError, match="shape"):
+        augment(seed[0], 4, np.ones(2), np.random.default_rng(0))
+    seed[1, 0, 3] = np.nan
+    with pytest.raises(ValueError, match="finite"):
+        augment(seed, 4, np.ones(2), np.random.default_rng(0))
+
+
+def test_split_by_time_has_no_neighbours_across_the_cut_but_one():
+    """All windows used once; in each recording every training window precedes every test window,
+    so only the cut itself has neighbours on both sides (a shuffled split would have hundreds)."""
+    counts = [160, 160, 100]
+    train, test = split_by_time(counts)
+    assert sorted([*train, *test]) == list(range(420))
+    start = 0
+    for n in counts:
+        mine = range(start, start + n)
+        early, late = [i for i in train if i in mine], [i for i in test if i in mine]
+        assert len(early) == round(0.8 * n) and max(early) < min(late)
+        start += n
+    across = sum(abs(np.subtract.outer(train, test)).ravel() == 1)
+    assert across == 2 * len(counts) - 1  # the cut, and the joint between stacked recordings
+
+
+def test_split_by_time_can_leave_a_gap():
+    """With a gap no test window touches a training window."""
+    train, test = split_by_time([50, 50], fraction=0.8, gap=1)
+    of_one = abs(np.subtract.outer(train[train < 50], test[test < 50]))
+    assert of_one.min() == 2 and len(train) + len(test) == 98

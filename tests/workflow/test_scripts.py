@@ -1,0 +1,244 @@
+"""Scripts of the workflow on tiny inputs: what rules and library alone do not show."""
+
+import json
+from dataclasses import asdict
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+import xarray as xr
+import yaml
+
+from rippletwin import store
+from rippletwin.case.model import Fluid
+from rippletwin.flow_sensor.estimate import band_limit
+from rippletwin.flow_sensor.line_response import network_of
+from rippletwin.learning.training import History
+from rippletwin.pump.faults import Cylinder, Slipper
+from rippletwin.pump.outlets import ConstantPressure
+from rippletwin.pump.simulation import simulate
+from rippletwin.twin import twin_file
+from rippletwin.twin.effects.library import EFFECTS
+from rippletwin.twin.twin import Twin
+from run_script import run_script
+from synthetic_recordings import flow_ripple, paper_rig
+from workflow_copy import RIG
+
+SPEED, PRESSURE, SAMPLES = 1000 / 60, 9.5e6, 1024
+TITLES = [f"<!-- {state} -->" for state in ("H", "S", "C1", "C2", "S+C1")]  # in an SVG
+
+
+@pytest.fixture(autouse=True)
+def one_thread():
+    before = torch.get_num_threads()
+    yield
+    torch.set_num_threads(before)
+
+
+def sheet(folder):
+    """rig.yaml of a case whose recordings nobody reads."""
+    folder = folder / "case"
+    folder.mkdir(exist_ok=True)
+    (folder / "rig.yaml").write_text(RIG)
+    for recording in yaml.safe_load(RIG)["recordings"]:
+        (folder / recording["file"]).write_text("time_s,p1\n")
+    return folder / "rig.yaml"
+
+
+def predictions(path, truth, said):
+    """A predictions file of two seeds; windows of one recording a state, in order of appearance."""
+    order = {state: k for k, state in enumerate(dict.fromkeys(truth))}
+    tables = [
+        pd.DataFrame(
+            {
+                "seed": seed,
+                "window": range(len(truth)),
+                "recording": [order[state] for state in truth],
+                "truth": truth,
+                "predicted": said,
+            }
+        )
+        for seed in (0, 1)
+    ]
+    pd.concat(tables).to_csv(path, index=False)
+
+
+def reported(folder, truth, said):
+    """(accuracy.csv, accuracy.md) of one network on one dataset."""
+    predictions(folder / "said.csv", truth, said)
+    history = asdict(History([1.0], [0.5], [0.9], 0, True, "target"))
+    (folder / "ended.json").write_text(json.dumps([history, history]))
+    names = {"source": ", ".join(f"{k}.csv" for k in range(len(set(truth))))}
+    store.save(xr.Dataset({"signal": ("window", [0.0])}, attrs=names), folder / "w.zarr")
+    paper = folder / "paper.csv"
+    pd.DataFrame(columns=["architecture", "dataset", "mean", "std"]).to_csv(paper, index=False)
+    table, page = folder / "accuracy.csv", folder / "accuracy.md"
+    run_script(
+        "report",
+        folder,
+        {"table": table, "page": page},
+        {},
+        {
+            "cells": [("CFD-Q+", "cnn1d_3_1")],
+            "severity": {"pressure": "C1", "flow": "C2"},
+            "recordings": "made up",
+        },
+        predictions=[folder / "said.csv"],
+        histories=[folder / "ended.json"],
+        recorded=folder / "w.zarr",
+        paper=paper,
+    )
+    return pd.read_csv(table), page.read_text()
+
+
+def test_report_scores_what_is_known_and_shows_what_is_said_of_the_rest(tmp_path):
+    """By hand: both healthy windows right, of four unknown ones three are called S and one C1."""
+    truth = ["H", "H", "?", "?", "?", "?"]
+    rows, page = reported(tmp_path, truth, ["H", "H", "S", "S", "C1", "S"])
+    assert rows.accuracy.tolist() == [100, 100] and rows.windows.tolist() == [2, 2]
+    (line,) = (line for line in page.splitlines() if "| 1.csv |" in line)
+    assert line.endswith("| 8 | 0 | 75 | 25 | 0 |")
+
+
+def test_report_of_unknown_recordings_alone(tmp_path):
+    """Nothing to score: no accuracy is made up, and the answers are there all the same."""
+    rows, page = reported(tmp_path, ["?"] * 3, ["C2"] * 3)
+    assert rows.accuracy.isna().all() and (rows.windows == 0).all()
+    assert "nan" not in page and "| 6 | 0 | 0 | 0 | 100 |" in page
+
+
+def test_page_on_the_cost_names_the_physics_taken_in(tmp_path):
+    """The corrected twin of `explain` is read as it writes it, and its effects are told."""
+    rig = paper_rig(2, 1)
+    place = EFFECTS["unsteady_friction"].places(rig)[0]
+    twin = Twin(rig, effects=[(EFFECTS["unsteady_friction"], place)])
+    (tmp_path / "twin.json").write_text(json.dumps(twin_file.to_dict(twin)))
+    fit = {"before": {"held_out": 0.45}, "after": {"held_out": 0.03}}
+    (tmp_path / "verdict.json").write_text(json.dumps({"verdict": "named", "fit": fit}))
+    cells = [("CFD-Q", 0, 40.0), ("CFD-Q+", 0, 90.0)]
+    columns = ["dataset", "seed", "accuracy"]
+    rows = pd.DataFrame(cells, columns=columns).assign(architecture="cnn1d_3_1")
+    rows.assign(accuracy_either=rows.accuracy).to_csv(tmp_path / "a.csv", index=False)
+    page = tmp_path / "cost.md"
+    run_script(
+        "report_cost",
+        tmp_path,
+        {"page": page},
+        {},
+        {},
+        table=tmp_path / "a.csv",
+        verdict=tmp_path / "verdict.json",
+        twin=tmp_path / "twin.json",
+    )
+    text = page.read_text()
+    assert "unsteady friction (line)" in text and "45.0% before,\n3.0% after" in text
+    assert "| 40.0 ± 0.0 | 90.0 ± 0.0 | +50.0 |" in text
+
+
+def test_flow_sensor_by_either_method_finds_the_flow(tmp_path):
+    """Pressure made by a twin from a known flow: the spectral sensor and the physics-informed one
+    give it back, with the twin in either of the two files that the workflow has."""
+    rig = paper_rig(3, 1)
+    twin, ripple = Twin(rig), flow_ripple()
+    orders = np.arange(1, SAMPLES // 2)
+    spectrum = np.zeros((3, SAMPLES // 2 + 1), complex)
+    network = network_of(twin, PRESSURE)(SPEED, orders)
+    flow = np.interp(np.arange(SAMPLES) * 360 / SAMPLES, ripple.angle_deg, ripple.flow)
+    spectrum[:, orders] = network.readings() * np.fft.rfft(flow)[orders]
+    pressure = np.fft.irfft(spectrum, SAMPLES)
+    noise = 50.0
+    windows = pressure + noise * np.random.default_rng(0).standard_normal((4, *pressure.shape))
+    store.save(
+        xr.Dataset(
+            {
+                "signal": (("window", "channel", "time"), windows),
+                "noise_std": ("channel", np.full(3, noise)),
+            },
+            coords={"state": ("window", ["H"] * 4), "recording": ("window", [0] * 4)},
+            attrs={"speed_hz": SPEED, "load_pressure": PRESSURE, "source": "made.csv"},
+        ),
+        tmp_path / "recorded.zarr",
+    )
+    files = {"": {"twin": twin_file.to_dict(twin)}, "+": twin_file.to_dict(twin)}
+    bandwidth = 400.0
+    truth = band_limit(flow, SPEED, bandwidth)
+    for (plus, file), method in zip(files.items(), ("spectral", "pinn"), strict=True):
+        (tmp_path / "twin.json").write_text(json.dumps(file))
+        run_script(
+            "flow_sensor",
+            tmp_path,
+            {"flow": tmp_path / f"flow{plus}.zarr"},
+            {"plus": plus},
+            {"bandwidth_hz": bandwidth, "method": method, "width": 16, "steps": 40},
+            recorded=tmp_path / "recorded.zarr",
+            twin=tmp_path / "twin.json",
+        )
+        found = store.load(tmp_path / f"flow{plus}.zarr")
+        assert method in found.source and found.signal.attrs["units"] == "m3/s"
+        wrong = found.signal.values[:, 0] - truth
+        assert np.sqrt(np.mean(wrong**2) / np.mean(truth**2)) < 0.03
+
+
+def test_a_compound_fault_is_both_faults_at_once(tmp_path):
+    """The state S+C1 against the pump model with both leaks given by hand; it is neither alone."""
+    rig = yaml.safe_load(RIG)
+    store.save(
+        xr.Dataset(
+            {"signal": ("time", np.zeros(SAMPLES))},
+            attrs={"speed_hz": SPEED, "load_pressure": PRESSURE},
+        ),
+        tmp_path / "recorded.zarr",
+    )
+
+    def by_hand(*faults):
+        outlet, fluid = ConstantPressure(PRESSURE), Fluid(**rig["fluid"])
+        return simulate(rig["pump"], fluid, 60 * SPEED, outlet, faults, SAMPLES).flow
+
+    run_script(
+        "fault",
+        tmp_path,
+        {"flow": tmp_path / "fault.zarr"},
+        {"state": "S+C1"},
+        {"leak_area": [2e-7, 3e-7], "pipe_length": 5.0},
+        rig=sheet(tmp_path),
+        recordings=tmp_path / "recorded.zarr",
+    )
+    flow = store.load(tmp_path / "fault.zarr").source_flow.values
+    np.testing.assert_allclose(flow, by_hand(Slipper(2e-7), Cylinder(3e-7)), rtol=1e-9)
+    ripple = np.std(flow)
+    for alone in (Slipper(2e-7), Cylinder(3e-7)):
+        assert np.std(flow - by_hand(alone)) > 0.02 * ripple
+
+
+def test_compound_ripples_stand_below_their_parts(tmp_path):
+    """The picture of S+C1 has three panels, the single faults first; that of a dataset's own
+    states has one each and no more."""
+    rng = np.random.default_rng(0)
+    for name, states in (("own", ["H", "S", "C1", "C2"]), ("compound", ["S+C1"])):
+        signal = rng.standard_normal((len(states), 1, SAMPLES))
+        store.save(
+            xr.Dataset(
+                {"signal": (("state", "channel", "time"), signal, {"units": "Pa"})},
+                coords={"state": states, "channel": ["p1"]},
+                attrs={"speed_hz": SPEED},
+            ),
+            tmp_path / f"{name}.zarr",
+        )
+    for name, titles in (("own", ["H", "S", "C1", "C2"]), ("compound", ["S", "C1", "S+C1"])):
+        names = "ripple", "ripple_svg", "sst", "sst_svg"
+        files = dict(zip(names, ("r.png", "r.svg", "s.png", "s.svg"), strict=True))
+        run_script(
+            "plot_seeds",
+            tmp_path,
+            {key: tmp_path / f"{name}_{file}" for key, file in files.items()},
+            {"dataset": f"{name}/CFD-P"},
+            {"min_frequency_hz": 12, "max_frequency_hz": 1500, "voices": 8, "k": 1.0},
+            rig=sheet(tmp_path),
+            seeds=tmp_path / f"{name}.zarr",
+            reference=tmp_path / "own.zarr",
+        )
+        svg = (tmp_path / f"{name}_r.svg").read_text()
+        assert [line.strip() for line in svg.splitlines() if line.strip() in TITLES] == [
+            f"<!-- {title} -->" for title in titles
+        ]
