@@ -50,7 +50,7 @@ def _atoms(base, effect, place, likelihood, residual):
     """Changes of the residual, one a combination of the effect's scanned parameters."""
     twin = base.twin.with_(effects=((effect, place),))
     other = Likelihood(twin, likelihood.observations)
-    other.floor, other.source_sd = likelihood.floor, likelihood.source_sd
+    other.model_error, other.source_sd = likelihood.model_error, likelihood.source_sd
     scans = [
         p.scan if len(p.scan) > 1 else (LITTLE[p.prior.kind],)
         for p in effect.parameters(base.twin.rig, place)

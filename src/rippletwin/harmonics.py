@@ -33,7 +33,18 @@ def flow_harmonics(ripple: FlowRipple, orders: np.ndarray) -> np.ndarray:
     """Peak complex amplitudes (F,), m3/s, at shaft `orders` (F,); that of order 0 is the mean.
 
     Angles need not be evenly spaced: the ripple is taken as piecewise linear over the revolution.
+    A ripple's harmonics at the same orders are calculated once, and read-only: fits ask for them
+    at every limit of frequency and for every hypothesis.
     """
+    key = np.asarray(orders, dtype=float).tobytes()
+    known = ripple.known_harmonics
+    if key not in known:
+        known[key] = _calculate_harmonics(ripple, orders)
+        known[key].flags.writeable = False
+    return known[key]
+
+
+def _calculate_harmonics(ripple: FlowRipple, orders: np.ndarray) -> np.ndarray:
     angle = np.deg2rad(np.asarray(ripple.angle_deg, dtype=float))
     count = max(4 * len(angle), 4 * int(np.max(orders, initial=0)))
     even = angle[0] + 2 * np.pi * np.arange(count) / count

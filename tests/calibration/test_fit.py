@@ -66,7 +66,7 @@ def test_followed_derivatives_know_what_the_line_stores():
     _, observations, truth = make(np.random.default_rng(1), AIR, values)
     posterior, theta = Posterior(truth, observations), truth.theta
     held = posterior.forward.derivatives(theta)
-    posterior.follow(theta)
+    posterior.use_full_jacobian(theta)
     columns = posterior.forward.derivatives(theta)
     forward = ForwardModel(truth, observations)
     for k, p in enumerate(truth.parameters):
@@ -156,7 +156,7 @@ def test_whitened_residual_of_the_truth_has_unit_variance():
     """At the true parameters, with noise alone, the residuals have mean square 1 (chi-square)."""
     _, observations, truth = make(np.random.default_rng(2), source=0.0, noise=4e5)
     posterior = Posterior(truth, observations)
-    posterior.floor, posterior.source_sd = 0.0, 0.0
+    posterior.model_error, posterior.source_sd = 0.0, 0.0
     r = posterior.whitened(posterior.predict(truth.theta))[0]
     assert abs(np.mean(np.abs(r) ** 2) - 1) < 5 / np.sqrt(r.size)
 
@@ -183,7 +183,7 @@ def test_continuation_finds_the_truth_from_nominal(hypothesis):
     base = Twin(bench, observations)
     found = fit_hypothesis(base, hypothesis, observations, scan_starts(bench, hypothesis))
     known = refine(base, hypothesis, observations, [truth.theta])
-    assert found.floor < 2 * MIN_MODEL_ERROR
+    assert found.model_error < 2 * MIN_MODEL_ERROR
     assert found.evidence > known.evidence - 1.0
     for p in truth.parameters:
         if "@" in p.name:
@@ -200,7 +200,7 @@ def test_search_takes_nothing_in_where_nothing_is_missing(monkeypatch):
     bench, observations, _ = make(np.random.default_rng(5))
     found = search_effects(Workers(Twin(bench, observations), observations))
     assert found.best.hypothesis == ()
-    assert found.base.floor < 2 * MIN_MODEL_ERROR
+    assert found.base.model_error < 2 * MIN_MODEL_ERROR
     assert found.gain(found.singles[0]) < ACCEPT
 
 
@@ -278,7 +278,7 @@ def test_log_likelihood_is_that_of_the_whole_covariance_matrix():
     rng = np.random.default_rng(12)
     _, observations, truth = make(rng, points=POINTS[:2])
     posterior = Posterior(truth, observations, 2000.0)
-    posterior.floor, posterior.source_sd, posterior.smooth_sd = 0.02, 0.03, 0.1
+    posterior.model_error, posterior.source_sd, posterior.smooth_sd = 0.02, 0.03, 0.1
     prediction = posterior.predict(truth.theta + 0.05 * rng.normal(size=len(truth.theta)))
     f, recording = posterior.forward.frequency_hz, posterior.forward.recording
     kernel = (1 + np.outer(f, f) / 1e6) * np.exp(-0.5 * np.subtract.outer(f, f) ** 2 / 1e6)

@@ -231,7 +231,7 @@ def test_what_removes_most_of_the_unseen_misfit_may_have_folds_that_disagree(
     """By definition: of 10 % on data left out 9 % left and folds that agree hold, folds 9 standard
     deviations apart do not, unless two thirds of the misfit are gone; more misfit never holds."""
     scores = [{"held_out": misfit.Score(x, 0.0)} for x in (0.10, after)]
-    assert cross_validation.Validation(*scores, (), disagreement).holds is holds
+    assert cross_validation.Validation(*scores, (), disagreement).passes is holds
 
 
 def test_what_is_not_finite_is_not_told():

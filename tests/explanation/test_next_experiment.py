@@ -108,7 +108,7 @@ def test_gains_of_two_sensors_are_one_class():
 
     best = fit("sensor_gain", "p1", 100.0)
     others = [fit("sensor_gain", "p2", 99.0), fit("sensor_delay", "p2", 10.0)]
-    search = SimpleNamespace(best=best, rivals=[best, *others], seats=[])
+    search = SimpleNamespace(best=best, rivals=[best, *others], other_positions=[])
     assert equivalent_places(search) == (("sensor_gain at sensor p1", "sensor_gain at sensor p2"),)
     assert rival_fits(search) == others[:1]
 

@@ -77,9 +77,11 @@ def test_what_has_no_position_has_no_seats():
     pool = SimpleNamespace(base=None, fit=lambda jobs: jobs, observations=())
     twin = SimpleNamespace(rig=SimpleNamespace(delay=0.01, length=9.0), values=dict)
     pool.observations = (SimpleNamespace(frequency_hz=np.array([4000.0])),)
-    wall = SimpleNamespace(hypothesis=(WALL,), twin=twin, stores=False)
+    wall = SimpleNamespace(hypothesis=(WALL,), twin=twin, has_nonlinear_compliance=False)
     assert fit_other_positions(pool, wall) == []
     assert (
-        move_to_best_position(pool, SimpleNamespace(hypothesis=LEAK, twin=twin, stores=True))[1]
+        move_to_best_position(
+            pool, SimpleNamespace(hypothesis=LEAK, twin=twin, has_nonlinear_compliance=True)
+        )[1]
         == []
     )

@@ -100,4 +100,4 @@ def test_a_better_mode_on_the_way_takes_over(hose):
 
     found = add_profile_intervals(Pool(), fit)
     assert found.objective == better.objective
-    assert set(found.ends.values()) == {(-2.0, 2.0)}
+    assert set(found.interval_ends.values()) == {(-2.0, 2.0)}

@@ -26,7 +26,7 @@ def driven(amplitude, curvature):
     line = network(S, [Pipe(LENGTH, DIAMETER, SPEED)], "none", source_flow=source)
     line.source_admittance = 1.0 / IMPEDANCE
     line.load = "anechoic", None
-    line.storage = [
+    line.nonlinear_compliances = [
         Storage(0, AREA, np.full(len(S), PRESSURE), np.full((1, len(S)), curvature, dtype=float))
     ]
     p, q = line.load_state()
@@ -66,7 +66,7 @@ def test_nothing_stored_changes_nothing():
     """Series of zeros: the linear line, to rounding."""
     line = driven(0.05 * PRESSURE, 0.0)
     drained = line.pressure_at([1.0])
-    line.drains = None
+    line.outflows = None
     np.testing.assert_allclose(drained, line.pressure_at([1.0]), atol=1e-9 * np.abs(drained).max())
 
 
@@ -86,7 +86,7 @@ def test_a_drain_is_the_branch_that_takes_as_much():
     places = np.array([1.3, 4.1])
     admittances = [2.0 / IMPEDANCE * (0.1 + 0.02j * ORDERS), S * 1e-13]
     branched.inserts = [(at, "shunt", y) for at, y in zip(places, admittances)]
-    drained.drains = places, branched.pressure_at(places) * admittances
+    drained.outflows = places, branched.pressure_at(places) * admittances
     np.testing.assert_allclose(drained.pressure_at(x), branched.pressure_at(x), rtol=1e-10)
     np.testing.assert_allclose(drained.flow_at(x), branched.flow_at(x), rtol=1e-10)
     a, b, c = drained.load_relation()
@@ -103,7 +103,7 @@ def test_variation_of_constants_is_the_sweep():
     p, q = line.load_state()
     scale = c / (a * p + b * q)
     pressure = basis.respond((scale * p, scale * q), leaving)
-    line.drains = x, leaving
+    line.outflows = x, leaving
     np.testing.assert_allclose(line.pressure_at(x), pressure, rtol=1e-10)
 
 

@@ -198,7 +198,7 @@ def test_whitened_residuals_are_the_gaussian_density(source):
     covariance = np.tile(1e7 * root @ root.conj().T, (len(points[0].orders), 1, 1))
     data = [replace(data[0], covariance=covariance)]
     likelihood = Likelihood(Twin(rig, data), data)
-    likelihood.floor, likelihood.source_sd = 0.03, 0.04
+    likelihood.model_error, likelihood.source_sd = 0.03, 0.04
     theta = 0.3 * np.ones(len(likelihood.twin.parameters))
     prediction = likelihood.forward(theta)[0]
     sigma = 0.04 if source == "nominal" else 0.0

@@ -1,6 +1,6 @@
 """Calibration: the twin's parameters from healthy recordings (inverse transient analysis).
 
-The fit maximises the posterior of `rippletwin.calibration.likelihood` by Levenberg-Marquardt steps. Five per
+The fit maximises the posterior of `likelihood` by Levenberg-Marquardt steps. Five per
 cent of wave speed is more than a full turn of phase at the upper harmonics, so a fit of everything
 from nominal values ends in a wrong valley. Hence
 
@@ -71,7 +71,7 @@ class Calibration:
     twin: Twin
     nominal: Twin
     covariance: np.ndarray
-    floor: float
+    model_error: float
     source_sd: float
     objective: float
     before: Misfit
@@ -133,7 +133,7 @@ def conclude(likelihood: Likelihood, theta: np.ndarray, lowest_hz: float) -> Cal
         twin=fitted,
         nominal=twin.with_(theta=nominal),
         covariance=covariance,
-        floor=likelihood.floor,
+        model_error=likelihood.model_error,
         source_sd=likelihood.source_sd,
         objective=likelihood.objective(theta, prediction),
         before=misfit(likelihood, nominal),
@@ -146,7 +146,7 @@ def fit(likelihood: Likelihood, theta: np.ndarray, max_steps: int = MAX_STEPS):
     """Posterior mode from a start: theta (P,) and minus the log posterior there.
 
     Levenberg-Marquardt on the whitened residuals; after each step the error floor is estimated
-    anew, so the objective falls by both. Sets `likelihood.floor` and `.source_sd`.
+    anew, so the objective falls by both. Sets `likelihood.model_error` and `.source_sd`.
     """
     prediction = likelihood.forward(theta)
     likelihood.estimate_errors(prediction)

@@ -23,7 +23,7 @@ def posterior_at_fit(fit: Fit, observations: Sequence, floor: float | None = Non
     posterior.estimate_errors(posterior.predict(fit.twin.theta), fit.twin.theta)
     posterior.source_sd = float(np.hypot(posterior.source_sd, posterior.smooth_sd))
     posterior.smooth_sd = 0.0
-    posterior.floor = fit.floor if floor is None else floor
+    posterior.model_error = fit.model_error if floor is None else floor
     return posterior
 
 
@@ -43,7 +43,7 @@ class Fit:
     source_free  which of the two likelihoods
     stores       whether the line stores something beyond proportion to the pressure
     ends         of parameters, by index: the ends of their 95 % intervals in theta's coordinates,
-                 where more is known of them than the covariance (`rippletwin.explanation.checks.profile_intervals`)
+                 where more is known of them than the covariance (`profile_intervals`)
     """
 
     hypothesis: Hypothesis
@@ -51,12 +51,12 @@ class Fit:
     objective: float
     evidence: float
     covariance: np.ndarray = field(repr=False)
-    floor: float
+    model_error: float
     source_sd: float
     smooth_sd: float
     source_free: bool = False
-    stores: bool = False
-    ends: Mapping[int, tuple[float, float]] = field(default_factory=dict, repr=False)
+    has_nonlinear_compliance: bool = False
+    interval_ends: Mapping[int, tuple[float, float]] = field(default_factory=dict, repr=False)
 
     @property
     def sd(self) -> np.ndarray:
@@ -66,7 +66,7 @@ class Fit:
     def interval(self, k: int) -> tuple[float, float]:
         """95 % interval of parameter k, in theta's coordinates."""
         reach = 1.96 * self.sd[k]
-        return self.ends.get(k, (self.twin.theta[k] - reach, self.twin.theta[k] + reach))
+        return self.interval_ends.get(k, (self.twin.theta[k] - reach, self.twin.theta[k] + reach))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -86,7 +86,7 @@ class Fit:
 def laplace_fit(posterior: Posterior, hypothesis: Hypothesis, theta: np.ndarray) -> Fit:
     """The fit at a mode: evidence and covariance."""
     prediction, twin = posterior.predict(theta), posterior.twin.with_(theta=theta)
-    if not posterior.holds(prediction):
+    if not posterior.is_valid(prediction):
         # No start leads anywhere: the hypothesis says nothing of these data.
         unknown = np.eye(len(theta))
         return Fit(hypothesis, twin, np.inf, -np.inf, unknown, np.inf, 0.0, 0.0)
@@ -100,9 +100,9 @@ def laplace_fit(posterior: Posterior, hypothesis: Hypothesis, theta: np.ndarray)
         objective,
         -objective - 0.5 * log_det,
         np.linalg.inv(second),
-        posterior.floor,
+        posterior.model_error,
         posterior.source_sd,
         posterior.smooth_sd,
         posterior.source_free,
-        posterior.forward.stores,
+        posterior.forward.has_nonlinear_compliance,
     )

@@ -82,7 +82,7 @@ def fit_hypothesis(
     for stage, limit in enumerate(stages):
         last = stage == len(stages) - 1
         posterior = _posterior_with_frozen_compliance(twin, observations, limit, source_free)
-        posterior.most = np.inf if last else MAX_MODEL_ERROR_BELOW_LIMIT
+        posterior.max_model_error = np.inf if last else MAX_MODEL_ERROR_BELOW_LIMIT
         steps, near = MAX_STEPS[min(stage, len(MAX_STEPS) - 1)], ROUGHLY_CONVERGED
         if last:
             steps, near = MAX_LAST_STEPS, CONVERGED
@@ -124,7 +124,7 @@ def refine(
         thetas = select_by_score_test(base, posterior, thetas)
     else:
         posterior.predict(thetas[0])
-        posterior.forward.hold_storage = True
+        posterior.forward.freeze_compliance = True
     fits = [descend(posterior, theta, MAX_LAST_STEPS) for theta in thetas]
     best = min(fits, key=lambda f: f[1])[0]
     rounds = JACOBIAN_ROUNDS if exact and len(fits) == 1 else 0
@@ -136,19 +136,19 @@ def _posterior_with_frozen_compliance(
 ) -> Posterior:
     """A posterior that knows nothing of what the line stores beyond proportion to the pressure."""
     posterior = Posterior(twin, observations, limit, source_free)
-    posterior.forward.hold_storage = True
+    posterior.forward.freeze_compliance = True
     return posterior
 
 
 def _freeze_compliance(posterior: Posterior, theta: np.ndarray) -> None:
     """Hold what the line stores at theta, if that fits better than leaving it out: higher harmonics
     that get much of their size by way of it would else be put down to the pump."""
-    if not posterior.forward.stores:
+    if not posterior.forward.has_nonlinear_compliance:
         return
-    posterior.forward.leave_out_storage()
+    posterior.forward.omit_compliance()
     without = posterior.objective(theta, posterior.predict(theta))
     if not _objective_with_compliance(posterior, theta) < without:
-        posterior.forward.leave_out_storage()
+        posterior.forward.omit_compliance()
 
 
 def _refreeze_compliance(
@@ -157,7 +157,7 @@ def _refreeze_compliance(
     """theta and minus the log posterior with what the line stores worked out, as long as holding it
     where theta is leads to a better place. Of a way there the longest of SHARES that fits better is
     gone: what is stored changes on it."""
-    if not posterior.forward.stores:
+    if not posterior.forward.has_nonlinear_compliance:
         return theta, value
     held, value = value, _objective_with_compliance(posterior, theta)
     if abs(value - held) < ROUGHLY_CONVERGED:
@@ -177,21 +177,21 @@ def _refreeze_compliance(
 
 def _objective_with_compliance(posterior: Posterior, theta: np.ndarray) -> float:
     """Minus the log posterior with what the line stores worked out, which is held from here on."""
-    posterior.forward.hold_storage = False
+    posterior.forward.freeze_compliance = False
     value = posterior.objective(theta, posterior.predict(theta))
-    posterior.forward.hold_storage = True
+    posterior.forward.freeze_compliance = True
     return value
 
 
 def _unfreeze_and_refit(posterior: Posterior, theta: np.ndarray, rounds: int = 0) -> np.ndarray:
     """The mode near theta, where that was held: now it is followed, and in so many `rounds` at most
     by derivatives too."""
-    posterior.forward.hold_storage = False
-    if not posterior.forward.stores:
+    posterior.forward.freeze_compliance = False
+    if not posterior.forward.has_nonlinear_compliance:
         return theta
     theta, value = descend(posterior, theta, MAX_LAST_STEPS)
     for _ in range(rounds if np.isfinite(value) else 0):
-        posterior.follow(theta)
+        posterior.use_full_jacobian(theta)
         last = value
         theta, value = descend(posterior, theta, MAX_LAST_STEPS)
         if last - value < ROUND_CONVERGED:

@@ -25,7 +25,7 @@ def descend(
     that gains less than `converged` is the last."""
     free = np.setdiff1d(np.arange(len(theta)), held)
     prediction = posterior.predict(theta)
-    if not posterior.holds(prediction):
+    if not posterior.is_valid(prediction):
         return theta, np.inf  # no way leads down from there
     if errors:
         posterior.estimate_errors(prediction, theta)

@@ -61,7 +61,7 @@ class Likelihood:
         pistons = twin.rig.pump.get("pistons", 1) if piston_orders else 1
         self.observations = [select_below(o, max_frequency_hz, pistons) for o in observations]
         self.forward = ForwardModel(twin, self.observations)
-        self.floor, self.source_sd = floor, 0.0
+        self.model_error, self.source_sd = floor, 0.0
         self.prior = np.array([not p.flat for p in twin.parameters])
         self._groups = [_Group(comparable(o, twin.rig), evenness) for o in self.observations]
         free = sum(g.values.shape[1] for g in self._groups if g.source == "free")
@@ -76,7 +76,7 @@ class Likelihood:
         prediction = self.forward(theta) if prediction is None else prediction
         parts = []
         for group, h in zip(self._groups, prediction):
-            r = group.whitened(h, self.floor, self._sigma(group))[0]
+            r = group.whitened(h, self.model_error, self._sigma(group))[0]
             parts += [r.real.ravel(), r.imag.ravel()]
         return np.concatenate([np.sqrt(2.0) * np.concatenate(parts), theta[self.prior]])
 
@@ -85,7 +85,7 @@ class Likelihood:
         prediction = self.forward(theta) if prediction is None else prediction
         total = 0.5 * float(np.sum(theta[self.prior] ** 2))
         for group, h in zip(self._groups, prediction):
-            r, log_determinant = group.whitened(h, self.floor, self._sigma(group))
+            r, log_determinant = group.whitened(h, self.model_error, self._sigma(group))
             total += float(np.sum(np.abs(r) ** 2)) + log_determinant
         return total
 
@@ -105,7 +105,7 @@ class Likelihood:
             best, kept = np.unravel_index(np.argmin(cost), cost.shape)
             # Once more, finely, about the best floor.
             near = floors[max(best - 1, 0)], floors[min(best + 1, len(floors) - 1)]
-            self.floor, self.source_sd = float(floors[best]), float(sigmas[kept])
+            self.model_error, self.source_sd = float(floors[best]), float(sigmas[kept])
             floors = np.geomspace(*near, 12)
 
     def _sigma(self, group: _Group) -> float:
@@ -177,7 +177,7 @@ class _Group:
 def comparable(observation, rig):
     """The observation in the quantity that `Forward` predicts.
 
-    An input impedance becomes a reflection coefficient (see `rippletwin.twin.forward_model.reflection`), its
+    An input impedance becomes a reflection coefficient (see `reflection`), its
     covariance with it: dR = 2 dz/(z + 1)^2 with z over the data sheet's rho a/A. The rest stays.
     """
     if observation.kind != "input_impedance":

@@ -89,7 +89,7 @@ def score_fit(fit: Fit, observations: Sequence, turn: bool = False) -> Score:
     """
     twin = fit.twin
     posterior = Posterior(twin, observations, None, fit.source_free)
-    posterior.floor, posterior.source_sd = fit.floor, fit.source_sd
+    posterior.model_error, posterior.source_sd = fit.model_error, fit.source_sd
     theta = twin.theta
     if turn:
         theta = _fit_shaft_angles(posterior, theta)

@@ -69,7 +69,7 @@ def draw_around_modes(
     for _, theta in states:
         prediction = posterior.predict(theta)
         posterior.estimate_errors(prediction, theta)
-        posterior.floor = (
+        posterior.model_error = (
             MAX_MODEL_ERROR_BELOW_LIMIT  # as far as a line may be off that is not yet the right one
         )
         root = np.linalg.inv(np.linalg.cholesky(hessian(posterior, theta, prediction))).T
@@ -125,7 +125,7 @@ def select_by_score_test(base: Twin, posterior: Posterior, thetas: list) -> list
     own = Posterior(without, posterior.observations, None, posterior.source_free)
     own.predict(theta)
     posterior.forward.hold_as(own.forward)
-    own.forward.hold_storage = True
+    own.forward.freeze_compliance = True
     prediction = own.predict(theta)
     own.estimate_errors(prediction, theta)
     ways = np.array([posterior.predict(start) for start in thetas]) - prediction

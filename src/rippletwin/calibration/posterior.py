@@ -1,4 +1,4 @@
-"""How likely the data are under a twin, with derivatives: `rippletwin.calibration.likelihood` for explaining.
+"""How likely the data are under a twin, with derivatives: `likelihood` for explaining.
 
 The model of the errors is noise with a covariance C, a relative model error delta common to all
 sensors, and the error of a nominal source, relative and along the prediction h, in two parts:
@@ -75,8 +75,8 @@ class Posterior:
         self.observations = [select_below(o, max_frequency_hz) for o in observations]
         self.forward = DifferentiableForward(twin, self.observations)
         self.source_free = source_free
-        self.floor, self.source_sd, self.smooth_sd = 0.1, float(SOURCE_SDS[1]), 0.0
-        self.most, self._products = np.inf, 0.0
+        self.model_error, self.source_sd, self.smooth_sd = 0.1, float(SOURCE_SDS[1]), 0.0
+        self.max_model_error, self._products = np.inf, 0.0
         self._size = SIZE_SD_OF_PUMP if twin.uncertain_pump else SIZE_SD
         self._known_for, self._known_determinant = None, 0.0
         self.prior = np.array([not p.flat for p in twin.parameters])
@@ -114,7 +114,7 @@ class Posterior:
         """Predictions of all observations side by side, (S, F)."""
         return np.concatenate(self.forward(theta), axis=1)
 
-    def holds(self, prediction: np.ndarray) -> bool:
+    def is_valid(self, prediction: np.ndarray) -> bool:
         """Whether the last prediction is one: of a line without loss at its resonance it is
         infinite, and where much is stored no steady state may be found."""
         return self.forward.solved and bool(np.all(np.isfinite(prediction)))
@@ -122,7 +122,7 @@ class Posterior:
     def objective(self, theta: np.ndarray, prediction: np.ndarray) -> float:
         """Minus the log posterior at the present errors, but for a constant, theta being what was
         predicted last; infinite where nothing `holds`."""
-        if not self.holds(prediction):
+        if not self.is_valid(prediction):
             return np.inf
         r, log_determinant = self.whitened(prediction)
         prior = 0.5 * float(np.sum(theta[self.prior] ** 2))
@@ -142,7 +142,7 @@ class Posterior:
         """Of the covariance that readings as large as the data have: a harmonic's error goes with
         the source's size as it was. Were it the prediction's, the determinant would reward one that
         is too small at all frequencies, of which the error of the size takes up the whole."""
-        errors = self.floor, self.source_sd, self.smooth_sd, np.sum(self._products)
+        errors = self.model_error, self.source_sd, self.smooth_sd, np.sum(self._products)
         if errors != self._known_for:
             self._known_for, self._known_determinant = (
                 errors,
@@ -158,7 +158,7 @@ class Posterior:
         """Whitening by the covariance that a prediction (S, F) implies."""
         return Whitening(
             self._rotate(prediction),
-            np.sqrt(self._variance(self.floor)),
+            np.sqrt(self._variance(self.model_error)),
             np.where(self._known, 0.0, np.where(self._free, np.inf, self.source_sd * self._scale)),
             self._nominal,
             self._sds(self.smooth_sd)[:, None] * self._basis,
@@ -183,7 +183,7 @@ class Posterior:
         source = 1.0 + relative * normal(h.shape[1])
         sds = self._sds(self.smooth_sd)
         source[self._nominal] += (sds * normal(len(sds))) @ self._basis
-        error = np.sqrt(self._variance(self.floor)) * normal(*h.shape)
+        error = np.sqrt(self._variance(self.model_error)) * normal(*h.shape)
         return source * h + np.einsum("fsk,kf->sf", np.conj(self._rotation), error)
 
     def estimate_errors(self, prediction: np.ndarray, theta: np.ndarray) -> None:
@@ -230,17 +230,17 @@ class Posterior:
                 cost -= scale * np.sum(solved**2, axis=(-2, -1))
                 cost += 2 * np.sum(np.log(np.diagonal(root, axis1=-2, axis2=-1)), axis=-1)
             smooth, source, best = np.unravel_index(np.argmin(cost), cost.shape)
-            self.floor = float(floors[best])
+            self.model_error = float(floors[best])
             self.source_sd, self.smooth_sd = float(sds[source]), float(taus[smooth])
             near = floors[max(best - 1, 0)], floors[min(best + 1, len(floors) - 1)]
             floors = np.geomspace(*near, 7)
             sds, taus = sds[source : source + 1], taus[smooth : smooth + 1]
-        self.floor = min(self.floor, self.most)
+        self.model_error = min(self.model_error, self.max_model_error)
 
-    def follow(self, theta: np.ndarray) -> None:
+    def use_full_jacobian(self, theta: np.ndarray) -> None:
         """From here on derivatives about theta know what the line stores beyond proportion."""
-        if self._pressures and self.forward.stores:
-            self.forward.follow(theta)
+        if self._pressures and self.forward.has_nonlinear_compliance:
+            self.forward.use_full_jacobian(theta)
 
     def linearise(self, theta: np.ndarray, prediction: np.ndarray, besides=None):
         """Residual r (N,) and its Jacobian J (N, P) at the present errors; the gradient of the
@@ -281,7 +281,7 @@ class Posterior:
         )
 
     def _amplitude(self, prediction: np.ndarray) -> np.ndarray:
-        weight = 1.0 / self._variance(self.floor)
+        weight = 1.0 / self._variance(self.model_error)
         h = self._rotate(prediction)
         return np.sum(weight * np.conj(h) * self._rotated, 0) / np.maximum(
             np.sum(weight * np.abs(h) ** 2, 0), 1e-300

@@ -67,7 +67,7 @@ def to_dict(calibration: Calibration) -> dict:
         "covariance": calibration.covariance.tolist(),
         "parameters": parameter_table(calibration),
         "segments": segment_table(calibration),
-        "error_floor": calibration.floor,
+        "error_floor": calibration.model_error,
         "source_sd": calibration.source_sd,
         "minus_log_posterior": calibration.objective,
         "fit": {"before": _misfit(calibration.before), "after": _misfit(calibration.after)},
@@ -125,7 +125,7 @@ def markdown(calibration: Calibration) -> str:
         )
     lines += [
         "",
-        f"Relative error floor of the model: {calibration.floor:.2%}; "
+        f"Relative error floor of the model: {calibration.model_error:.2%}; "
         f"relative error of the source: {calibration.source_sd:.2%}.",
     ]
     return "\n".join(lines) + "\n"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -104,6 +105,11 @@ class FlowRipple:
     flow: np.ndarray
     pressure_mean: float | None = None
     swing: complex = 0.0
+
+    @cached_property
+    def known_harmonics(self) -> dict[bytes, np.ndarray]:
+        """Harmonics calculated before, by their orders (`rippletwin.harmonics.flow_harmonics`)."""
+        return {}
 
     def source_admittance(self, s: np.ndarray) -> np.ndarray:
         """Admittance (F,), m3/s/Pa, beside this flow: none, a given ripple is an ideal source."""

@@ -125,16 +125,16 @@ def explain_observations(
             found.best = add_profile_intervals(
                 pool, prune_by_cross_validation(pool, found.best, held)
             )
-            found.others = _fit_passive_networks(pool, found)
+            found.passive_networks = _fit_passive_networks(pool, found)
             reason = sensor_wiring.find_swapped_sensors(base, data, found)
         single = _fit_each_observation(pool, found.base)
         rung = alarms.Alarms(
-            found.base.floor,
+            found.base.model_error,
             alarms.largest_pull(found.base),
             alarms.largest_disagreement(single),
             alarms.drift_p_value(early, late, rig.delay),
         )
-        explanation = found.others[0] if _prefers_other(found) else found.best
+        explanation = found.passive_networks[0] if _prefers_other(found) else found.best
         blind = source_free_fits.refit_source_free(pool, found)
         validation = cross_validate(pool, found.base, explanation, held)
         checked = validation if explanation.hypothesis else None
@@ -186,7 +186,7 @@ def _search_with_coupled_pump(
     been made to answer the line, and the search has gone on."""
     known = (
         couple_pump_to_line(found.best.twin, data)
-        if found.best.floor < MAX_MODEL_ERROR_FOR_COUPLING
+        if found.best.model_error < MAX_MODEL_ERROR_FOR_COUPLING
         else None
     )
     if known is None:
@@ -217,14 +217,18 @@ def _estimate_phase_modulation(rig, observations: Sequence) -> ShaftOrders | Non
 
 def _shaft(fit: Fit, observations: Sequence) -> ShaftOrders | None:
     """How the shaft turns by the line as it is explained, as far as it is."""
-    share = MODULATION_SHARE if fit.floor < MAX_MODEL_ERROR_FOR_COUPLING else ROUGH_MODULATION_SHARE
+    share = (
+        MODULATION_SHARE
+        if fit.model_error < MAX_MODEL_ERROR_FOR_COUPLING
+        else ROUGH_MODULATION_SHARE
+    )
     return analyse_shaft_orders(fit.twin, observations, HIGHEST_HZ, share)
 
 
 def _fit_passive_networks(pool: Workers, found: Search) -> list[Fit]:
     """Passive networks without a name, alone and beside the best, where there is room for them."""
     best = found.best
-    if best.floor <= GOOD:
+    if best.model_error <= GOOD:
         return []
     networks = [c for c in candidates(pool.base.rig, named=False)]
     jobs = [{"hypothesis": (network,)} for network in networks]
@@ -236,9 +240,9 @@ def _fit_passive_networks(pool: Workers, found: Search) -> list[Fit]:
 
 def _prefers_other(found: Search) -> bool:
     best = found.best
-    if not found.others:
+    if not found.passive_networks:
         return False
-    return found.others[0].evidence > best.evidence and best.floor > GOOD
+    return found.passive_networks[0].evidence > best.evidence and best.model_error > GOOD
 
 
 def _fit_each_observation(pool: Workers, base: Fit) -> list[Fit]:

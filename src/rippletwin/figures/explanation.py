@@ -141,8 +141,8 @@ def evidence(e) -> Figure | None:
     shown = {f.label: f for f in reversed(search.singles[:12])}
     if len(search.best.hypothesis) > 1:
         shown[search.best.label] = search.best
-    if search.others:
-        shown["no name: " + search.others[0].label] = search.others[0]
+    if search.passive_networks:
+        shown["no name: " + search.passive_networks[0].label] = search.passive_networks[0]
     gains = [search.gain(f) for f in shown.values()]
     # One effect a line of the label, and each bar as far from its neighbours as its label is high.
     lines = np.array([1 + name.count(" + ") for name in shown])

@@ -11,7 +11,7 @@ Positions of inserts are moved one by one. The orifice's nonlinear remainder is 
 orders below the linear part, and so is what segments store beyond proportion to the pressure. That
 is no small part next to a sharp resonance: columns are wrong by some per cent, and where wave
 speeds, air and a branch can stand in for each other a fit stops units of log likelihood too soon.
-`follow` makes up for it by difference quotients at one place. With `hold_storage` what is stored is
+`follow` makes up for it by difference quotients at one place. With `freeze_compliance` it is
 held in predictions too, which is all that makes them slow; else each begins where the last ended.
 """
 
@@ -47,21 +47,21 @@ class DifferentiableForward(ForwardModel):
         self._together = [k for k in range(len(names)) if k not in apart]
         self._remainder = self._drains = self._held_at = None
         self._hold = False
-        self.hold_storage = False
-        self.missed: np.ndarray | None = None
+        self.freeze_compliance = False
+        self.jacobian_correction: np.ndarray | None = None
 
     def hold_as(self, other: DifferentiableForward) -> None:
         """Hold in predictions what `other`, of the same recordings, has found to be stored."""
-        self.hold_storage, self._drains = True, other._drains
+        self.freeze_compliance, self._drains = True, other._drains
 
-    def leave_out_storage(self) -> None:
+    def omit_compliance(self) -> None:
         """Hold nothing in predictions: as if the line stored in proportion to the pressure."""
-        self.hold_storage, self._drains = True, None
+        self.freeze_compliance, self._drains = True, None
 
-    def follow(self, theta: np.ndarray) -> None:
+    def use_full_jacobian(self, theta: np.ndarray) -> None:
         """Find `missed` (P, S, F), what `derivatives` at theta lack because they hold what segments
         store; from here on they have it, there and, as long as it changes little, about there."""
-        self.missed, full = None, self._far[0]._full
+        self.jacobian_correction, full = None, self._extended_for_compliance[0]._full
         usual, full.tolerance = full.tolerance, FINELY
         readings = np.concatenate(self(theta), axis=1)
         held = self.derivatives(theta)
@@ -71,7 +71,7 @@ class DifferentiableForward(ForwardModel):
             moved[k] += FOLLOWED
             slope = (np.concatenate(self(moved), axis=1) - readings) / FOLLOWED
             missed[k] = slope - held[k]
-        self.missed, full.tolerance = missed, usual
+        self.jacobian_correction, full.tolerance = missed, usual
 
     def linear_load(self, theta: np.ndarray) -> np.ndarray | None:
         """Readings (S, F) with the orifice linear and what segments store beyond proportion as it
@@ -124,7 +124,11 @@ class DifferentiableForward(ForwardModel):
                 if share > 0.0 and per_metre > 1e-9:
                     out[k] -= rate * share / per_metre * out[n]
         self._hold = False
-        return out if self.missed is None or self.hold_storage else out + self.missed
+        return (
+            out
+            if self.jacobian_correction is None or self.freeze_compliance
+            else out + self.jacobian_correction
+        )
 
     def _predicted(self, theta):
         """What is held is that of theta from here on."""
@@ -139,22 +143,22 @@ class DifferentiableForward(ForwardModel):
                 self._balance_held(network, factor, self._remainder)
             return
         linear = network.load_state()
-        if self.hold_storage:
+        if self.freeze_compliance:
             self.solved = True
             self._drain_as_held(network)
             self._balance_load(network, theta)
         else:
             super()._balance(network, theta)
-        if network.drains is not None:
-            positions, leaving = network.drains
+        if network.outflows is not None:
+            positions, leaving = network.outflows
             self._drains = positions / network.length, leaving
         if self._orifice is not None:
             p, q = network.load[1]
             self._remainder = (q - linear[1] / linear[0] * p) / factor
 
     @cached_property
-    def _far(self):
-        wide, seen = super()._far
+    def _extended_for_compliance(self):
+        wide, seen = super()._extended_for_compliance
         wide._full.resumed = True
         return wide, seen
 
@@ -167,7 +171,7 @@ class DifferentiableForward(ForwardModel):
         """The flows held leave `network`, where they did in shares of its length."""
         if self._drains is not None:
             shares, leaving = self._drains
-            network.drains = shares * network.length, leaving
+            network.outflows = shares * network.length, leaving
 
     @staticmethod
     def _balance_held(network, factor, remainder):
@@ -242,9 +246,9 @@ class DifferentiableForward(ForwardModel):
         )
         p, q = network.load_state()
         side_by_side.load = "state", (flat(p), flat(q))
-        if base.drains is not None:
-            at, leaving = base.drains
-            side_by_side.drains = at, np.tile(leaving, count)
+        if base.outflows is not None:
+            at, leaving = base.outflows
+            side_by_side.outflows = at, np.tile(leaving, count)
         if self._orifice is not None:
             self._balance_held(side_by_side, flat(v.load), flat(self._remainder))
         readings = side_by_side.readings().reshape(-1, *shape)

@@ -95,14 +95,14 @@ class ForwardModel:
         return predicted
 
     @cached_property
-    def stores(self) -> bool:
+    def has_nonlinear_compliance(self) -> bool:
         """Whether the line stores something beyond proportion to the pressure."""
-        return bool(self._periodic and self._linear(self.twin.theta).storage)
+        return bool(self._periodic and self._linear(self.twin.theta).nonlinear_compliances)
 
     def network(self, theta: np.ndarray) -> Network:
         """The line with source, effects and load at `theta`; an orifice's ripple is solved."""
         network = self._linear(theta)
-        if self._orifice is not None or (network.storage and self._periodic):
+        if self._orifice is not None or (network.nonlinear_compliances and self._periodic):
             self._balance(network, theta)
         return network
 
@@ -185,17 +185,17 @@ class ForwardModel:
 
     def _balance(self, network: Network, theta: np.ndarray) -> None:
         """Give `network` the full-amplitude state at its load, and what its line stores beyond."""
-        if network.storage:
-            wide, seen, whole = self._widened(network, theta, self._far)
+        if network.nonlinear_compliances:
+            wide, seen, whole = self._widened(network, theta, self._extended_for_compliance)
             law = wide._law(whole, theta, tolerance=min(ROUGH, wide._full.tolerance))
             state = [x[seen] for x in wide._full.drain(whole, law)]
             self.solved = wide._full.solved
-            positions, leaving = whole.drains
-            network.drains = positions, leaving[:, seen]
+            positions, leaving = whole.outflows
+            network.outflows = positions, leaving[:, seen]
             if self._orifice is not None:
                 network.load = "state", tuple(state)
         elif self._orifice is not None:
-            wide, seen, whole = self._widened(network, theta, self._near)
+            wide, seen, whole = self._widened(network, theta, self._extended_for_orifice)
             state = wide._law(whole, theta)(*whole.load_relation())
             network.load = "state", tuple(x[seen] for x in state)
 
@@ -231,11 +231,11 @@ class ForwardModel:
         return wide, seen, whole
 
     @cached_property
-    def _far(self) -> tuple[ForwardModel, np.ndarray]:
+    def _extended_for_compliance(self) -> tuple[ForwardModel, np.ndarray]:
         return self._with_above(lambda top, step: ABOVE * top)
 
     @cached_property
-    def _near(self) -> tuple[ForwardModel, np.ndarray]:
+    def _extended_for_orifice(self) -> tuple[ForwardModel, np.ndarray]:
         return self._with_above(lambda top, step: top + (NEXT + 0.5) * step)
 
     def _with_above(self, highest) -> tuple[ForwardModel, np.ndarray]:

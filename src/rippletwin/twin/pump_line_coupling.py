@@ -1,7 +1,7 @@
 """The pump answers the ripple it makes.
 
 The lumped pump as a source is its flow into a constant pressure and the mean admittance of its
-chambers beside it (`rippletwin.pump.source_admittance`). But ports open and close as the shaft turns, and the
+chambers beside it (`source_admittance`). But ports open and close as the shaft turns, and the
 flow through one that is nearly shut goes with the root of the pressure drop: what the line's own
 ripple does to the flow is partly at other harmonics and no proportion of it. On the default pump in
 a 5 m pipe that is 5 % of the ripple (docs/pump.md). Once an explanation tells the pressure at the

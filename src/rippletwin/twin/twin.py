@@ -1,6 +1,6 @@
 """The twin: a rig whose numbers are uncertain, that predicts what its sensors read.
 
-The parameter vector theta is in the coordinates of `rippletwin.twin.parameters`: 0 is the data sheet
+The parameter vector theta is in the coordinates of `parameters`: 0 is the data sheet
 and every prior is N(0, 1). Its entries, in this order (segments and recordings count from 1):
 
     wave_speed[i], diameter[i], length[i]   of each segment, with the priors of `uncertainty`

@@ -38,7 +38,7 @@ class Validation:
     disagreement: float
 
     @property
-    def holds(self) -> bool:
+    def passes(self) -> bool:
         """Whether the held-out misfit improves, and the parameters agree or little is left of it.
 
         An absorber gains little on data it has not seen. What removes most of the misfit there is
@@ -110,7 +110,7 @@ def prune_by_cross_validation(pool: Workers, best: Fit, late: Sequence | None = 
         without = max(pool.fit(jobs), key=lambda fit: fit.evidence, default=None)
         if without is None or best.evidence - without.evidence > SURE:
             break
-        if cross_validate(pool, without, best, late).holds:
+        if cross_validate(pool, without, best, late).passes:
             break
         best = without
     return best

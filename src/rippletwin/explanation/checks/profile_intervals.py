@@ -47,7 +47,10 @@ class ProfileTrace(NamedTuple):
 def add_profile_intervals(pool: Workers, best: Fit, modes: int = MAX_MODE_CHANGES) -> Fit:
     """`best` with the ends of its effects' intervals, or of the better mode that a walk came to."""
     held = sorted({k for _, _, own in own_parameter_indices(best.twin) for k in own})
-    common = {"fit": best, "missed": _compliance_correction(pool, best) if best.stores else None}
+    common = {
+        "fit": best,
+        "missed": _compliance_correction(pool, best) if best.has_nonlinear_compliance else None,
+    }
     jobs = [{**common, "held": k, "side": side} for k in held for side in (-1, 1)]
     walks = pool.map(trace_profile, jobs)
     lowest = min(walks, key=lambda w: w.value, default=None)
@@ -55,21 +58,23 @@ def add_profile_intervals(pool: Workers, best: Fit, modes: int = MAX_MODE_CHANGE
         better = pool.fit([{"hypothesis": best.hypothesis, "theta": lowest.theta}])[0]
         return add_profile_intervals(pool, better, modes - 1)
     sides = zip(walks[::2], walks[1::2])
-    return replace(best, ends={k: (low.end, high.end) for k, (low, high) in zip(held, sides)})
+    return replace(
+        best, interval_ends={k: (low.end, high.end) for k, (low, high) in zip(held, sides)}
+    )
 
 
 def _compliance_correction(pool: Workers, fit: Fit) -> np.ndarray:
     """What derivatives at the mode must know of what the line stores; the same for all walks."""
     posterior = Posterior(fit.twin, pool.observations, None, fit.source_free)
-    posterior.follow(fit.twin.theta)
-    return posterior.forward.missed
+    posterior.use_full_jacobian(fit.twin.theta)
+    return posterior.forward.jacobian_correction
 
 
 def trace_profile(base: Twin, observations: Sequence, job: dict) -> ProfileTrace:
     """Hold the parameter with the index `held` of `fit` further and further to one `side`."""
     fit, k, side = job["fit"], job["held"], job["side"]
     posterior = Posterior(fit.twin, observations, None, fit.source_free)
-    posterior.forward.missed = job.get("missed")  # none where the line stores nothing
+    posterior.forward.jacobian_correction = job.get("missed")  # none where the line stores nothing
     posterior.estimate_errors(posterior.predict(fit.twin.theta), fit.twin.theta)
     sd = fit.sd[k]
     along = fit.covariance[:, k] / sd  # what all else does where this one moves by its deviation

@@ -27,7 +27,7 @@ def find_swapped_sensors(base_twin, observations: Sequence, search: Search) -> s
     """
     count = len(base_twin.rig.sensors)
     pressures = all(o.kind != "input_impedance" for o in observations)
-    if search.best.floor <= MAX_EXPLAINED_MODEL_ERROR or count < 2 or not pressures:
+    if search.best.model_error <= MAX_EXPLAINED_MODEL_ERROR or count < 2 or not pressures:
         return ""
     tried = {}
     names = [s.name for s in base_twin.rig.sensors]

@@ -13,7 +13,12 @@ SINGLES_COMPARED = 6  # single effects looked at without the source too
 
 def fits_to_compare(search) -> list[Fit]:
     """The fits worth a second look without the source: base, best and the best single effects."""
-    fits = [search.base, search.best, *search.singles[:SINGLES_COMPARED], *search.others[:1]]
+    fits = [
+        search.base,
+        search.best,
+        *search.singles[:SINGLES_COMPARED],
+        *search.passive_networks[:1],
+    ]
     return list({f.label: f for f in fits}.values())
 
 

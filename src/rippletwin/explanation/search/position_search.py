@@ -35,7 +35,7 @@ def fit_other_positions(pool: Workers, best: Fit) -> list[Fit]:
 
     None of a line that stores beyond proportion, where each would take long.
     """
-    if best.stores:
+    if best.has_nonlinear_compliance:
         return []
     waves = best.twin.rig.delay * max(o.frequency_hz[-1] for o in pool.observations)
     count, apart = (

@@ -25,7 +25,7 @@ def fit_single_effects(pool: Workers, found: Sequence, progress=None) -> tuple[F
     tell = progress_callback(progress, "single effects", len(found) + 1)
     fits = pool.fit([{"hypothesis": h} for h in [(), *((c,) for c in found)]], tell)
     base, singles = _refit_base(pool, fits[0], fits[1:]), fits[1:]
-    if base.floor <= GOOD or rank_by_evidence(singles)[0].floor > GOOD:
+    if base.model_error <= GOOD or rank_by_evidence(singles)[0].model_error > GOOD:
         # A line that fits without the effect has no other valley for it than a weak one nearby;
         # and where no effect fits, that line may be the right one all the same.
         tell = progress_callback(progress, "weak effects", len(found))
@@ -43,7 +43,7 @@ def _refit_base(pool: Workers, base: Fit, singles: Sequence[Fit]) -> Fit:
     """
     starts = rank_by_evidence(singles)[:BASE_RESTARTS]
     jobs = [{"hypothesis": (), "theta": transfer_theta(fit, (), pool.base)} for fit in starts]
-    if base.floor > GOOD and len(pool.observations) == 1:
+    if base.model_error > GOOD and len(pool.observations) == 1:
         # Of one operating point the lowest harmonics say least.
         jobs = [{"hypothesis": (), "draws": DRAWS_PER_MODE}, *jobs]
     return max([base, *pool.fit(jobs)], key=lambda fit: fit.evidence)
@@ -53,7 +53,7 @@ def refit_poor_fits(pool: Workers, fits: list[Fit], count: int = 3) -> list[Fit]
     """Fits again, from more starts, those of the best that may have stopped in a wrong valley; of
     one operating point, what acts along the whole line from draws too, as the base.
     """
-    again = [f for f in fits[:count] if f.floor > GOOD and f.hypothesis]
+    again = [f for f in fits[:count] if f.model_error > GOOD and f.hypothesis]
     jobs = [{"hypothesis": f.hypothesis, "starts": refined_starts(pool.base.rig, f)} for f in again]
     if len(pool.observations) == 1:
         for job in jobs:

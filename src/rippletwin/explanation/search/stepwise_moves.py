@@ -40,7 +40,7 @@ def fit_extensions(pool: Workers, best: Fit, found: Sequence, progress) -> list[
     ]
     tell = progress_callback(progress, f"{len(best.hypothesis) + 1} effects", len(jobs))
     fits = rank_by_evidence(pool.fit(jobs, tell))
-    if fits and best.floor > GOOD and fits[0].floor > GOOD:
+    if fits and best.model_error > GOOD and fits[0].model_error > GOOD:
         # What is there may be right as it is, though far from all.
         near = pool.fit([{"hypothesis": f.hypothesis, "fit": best} for f in fits])
         fits = rank_by_evidence([max(pair, key=lambda f: f.evidence) for pair in zip(fits, near)])
@@ -54,7 +54,7 @@ def extension_job(best: Fit, candidate, rig) -> dict:
     its effects where they were; where it is good the candidate starts from it.
     """
     hypothesis = (*best.hypothesis, candidate)
-    if best.floor > GOOD:
+    if best.model_error > GOOD:
         return restart_job(best, hypothesis, rig)
     return {"hypothesis": hypothesis, "fit": best}
 
@@ -75,7 +75,7 @@ def exchange_effects(pool: Workers, best: Fit, singles: Sequence[Fit], rounds: i
     be the wrong one. What stands in is the best few single effects.
     """
     for _ in range(rounds):
-        if len(best.hypothesis) < 2 or best.floor <= GOOD:
+        if len(best.hypothesis) < 2 or best.model_error <= GOOD:
             break
         stand_ins = [f.hypothesis[0] for f in singles[:SUBSTITUTES_TRIED]]
         jobs = []
@@ -162,17 +162,17 @@ def rank_at_exact_modes(pool: Workers, best: Fit, step: list[Fit]) -> list[Fit]:
     """A step's fits as they can be held against each other, best first: where the newest effect is
     the first that stores something, its mode is narrow, and a fit that stopped short of it may have
     lost all that the effect is worth. Far from the mode, where that takes long, nothing is lost."""
-    if best.stores:
+    if best.has_nonlinear_compliance:
         return step
-    near = [f for f in step if f.floor <= MAX_MODEL_ERROR_FOR_EXACT_MODE]
+    near = [f for f in step if f.model_error <= MAX_MODEL_ERROR_FOR_EXACT_MODE]
     return rank_by_evidence(
-        [*_exact(pool, near), *(f for f in step if f.floor > MAX_MODEL_ERROR_FOR_EXACT_MODE)]
+        [*_exact(pool, near), *(f for f in step if f.model_error > MAX_MODEL_ERROR_FOR_EXACT_MODE)]
     )
 
 
 def _exact(pool: Workers, fits: Sequence[Fit]) -> list[Fit]:
     """The fits, at their exact mode those of lines that store beyond proportion."""
-    storing = [f for f in fits if f.stores]
+    storing = [f for f in fits if f.has_nonlinear_compliance]
     again = pool.fit([{"hypothesis": f.hypothesis, "theta": f.twin.theta} for f in storing])
     better = {id(f): new for f, new in zip(storing, again)}
     return [better.get(id(f), f) for f in fits]

@@ -37,7 +37,7 @@ def applicable_candidates(
         if effect.name == "entrained_air" and "periodic" not in kinds:
             continue
         if effect.name in ("piston_spread", "speed_fluctuation"):
-            continue  # act at shaft orders that are not fitted, see `rippletwin.explanation.localise.shaft_orders`
+            continue  # act at shaft orders that are not fitted, see `shaft_orders`
         found.append((effect, place))
     return found
 
@@ -58,8 +58,8 @@ class Search:
     singles: list[Fit]
     best: Fit
     rivals: list[Fit] = field(default_factory=list)
-    others: list[Fit] = field(default_factory=list)
-    seats: list[Fit] = field(default_factory=list)
+    passive_networks: list[Fit] = field(default_factory=list)
+    other_positions: list[Fit] = field(default_factory=list)
 
     def gain(self, fit: Fit) -> float:
         """Log evidence over the base."""
@@ -125,7 +125,7 @@ def _stepwise(pool: Workers, begun: Search, found: Sequence, progress) -> Search
     close = fit_substitutes(pool, best, found)
     if close and close[0].evidence > best.evidence + MIN_GAIN:
         best, seats = move_to_best_position(pool, close[0])
-    return Search(base, singles, best, [*rivals, *close], seats=seats)
+    return Search(base, singles, best, [*rivals, *close], other_positions=seats)
 
 
 def _accepted_extension(best: Fit, step: Sequence[Fit]) -> Fit | None:

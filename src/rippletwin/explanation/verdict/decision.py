@@ -55,7 +55,7 @@ def decide(
     `contradiction` says why the data contradict themselves, if they do; `by_chance` what draws
     without an effect gave, where they were asked for.
     """
-    best, other = search.best, search.others[0] if search.others else None
+    best, other = search.best, search.passive_networks[0] if search.passive_networks else None
     if contradiction:
         return Judgement("bad_data", search.base, reason=contradiction)
     nameless = other is not None and other.evidence > best.evidence + evidence_needed_over(
@@ -67,7 +67,7 @@ def decide(
         return _nothing_missing(best, alarms)
     if by_chance is not None and search.gain(best) < by_chance.threshold:
         return _nothing_missing(search.base, alarms)
-    fails = validation is not None and not validation.holds
+    fails = validation is not None and not validation.passes
     if fails and "misfit" not in alarms.ringing:
         weak = search.gain(best) < SURE
         if not weak and not validation.gains:
@@ -76,7 +76,11 @@ def decide(
         if weak or not validation.transfers:
             # A line that fits without it, and data left out that speak against it: an absorber.
             return _nothing_missing(search.base, alarms)
-    if best.floor > MAX_MODEL_ERROR_TO_NAME or largest_effect_pull(best) > PULL_ALARM or fails:
+    if (
+        best.model_error > MAX_MODEL_ERROR_TO_NAME
+        or largest_effect_pull(best) > PULL_ALARM
+        or fails
+    ):
         # Without a name it is modelled all the same, by whatever describes the data best.
         stands_in = other is not None and other.evidence > best.evidence
         return Judgement("unexplained", other if stands_in else best)
@@ -112,7 +116,7 @@ def evidence_needed_over(best: Fit, search: Search) -> float:
     """
     if not best.hypothesis:
         return ACCEPT
-    return np.inf if best.floor <= GOOD else EQUIVALENT
+    return np.inf if best.model_error <= GOOD else EQUIVALENT
 
 
 def equivalent_effects(search: Search) -> tuple[tuple[str, ...], ...]:
@@ -142,7 +146,7 @@ def rival_fits(search: Search) -> list[Fit]:
 
 def _current_positions(search: Search) -> list[Fit]:
     """The search's seats that are still those of its best explanation."""
-    return [f for f in search.seats if set(f.hypothesis) == set(search.best.hypothesis)]
+    return [f for f in search.other_positions if set(f.hypothesis) == set(search.best.hypothesis)]
 
 
 def _substitutes(search: Search) -> list[tuple[tuple, list[tuple]]]:
@@ -169,7 +173,13 @@ def _substitutes(search: Search) -> list[tuple[tuple, list[tuple]]]:
 def probabilities(search: Search, accepted: Fit) -> dict[str, float]:
     """Posterior probability of each accepted effect, all hypotheses tried being equally likely
     beforehand but for the number of places of an effect."""
-    fits: list[Fit] = [search.base, *search.singles, *search.rivals, *search.others, accepted]
+    fits: list[Fit] = [
+        search.base,
+        *search.singles,
+        *search.rivals,
+        *search.passive_networks,
+        accepted,
+    ]
     unique = {tuple((e.name, str(p)) for e, p in f.hypothesis): f for f in fits}
     evidence = np.array([f.evidence for f in unique.values()])
     weight = np.exp(evidence - evidence.max())

@@ -29,7 +29,7 @@ class Explanation:
 
     observations are as fitted; single holds the base fitted to each of them alone, shaft what the
     shaft orders say that are no multiples of the pistons' number, blind the fits that know nothing
-    of the source (`rippletwin.explanation.localise.source_free_fits.fits_to_compare`), located where the base lacks something,
+    of the source (`fits_to_compare`), located where the base lacks something,
     without what a free data sheet would make of the data without each accepted effect, chance the
     draws without an effect where they were asked for.
     """

@@ -116,7 +116,7 @@ def expected_loss(accepted: Fit, rival: Fit, rig: Rig, observation: Observation)
         observation = replace(observation, normalised=True)
     twin = _onto(rival, rig, observation)
     posterior = Posterior(twin, [replace(observation, values=values, covariance=covariance)])
-    posterior.floor = max(accepted.floor, MIN_MODEL_ERROR)
+    posterior.model_error = max(accepted.model_error, MIN_MODEL_ERROR)
     posterior.source_sd = rival.source_sd
     posterior.smooth_sd = rival.smooth_sd
     r, jacobian = posterior.linearise(twin.theta, posterior.predict(twin.theta))

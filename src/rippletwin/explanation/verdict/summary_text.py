@@ -28,8 +28,8 @@ def summary_text(e: Explanation, result: dict, found: list[dict], base) -> str:
         words = ["At the pistons' harmonics the twin lacks nothing."]
     elif kind in ("named", "ambiguous"):
         words = [
-            f"The twin lacks {join_words(names)}: with it the misfit on data it has not seen goes from "
-            f"{before:.1%} to {after:.1%} of the measured ripple."
+            f"The twin lacks {join_words(names)}: with it the misfit on data it has not seen goes "
+            f"from {before:.1%} to {after:.1%} of the measured ripple."
         ]
         numbers = {}
         for f in found:
@@ -67,7 +67,7 @@ def summary_text(e: Explanation, result: dict, found: list[dict], base) -> str:
             )
         elif found:
             unaccounted = ""
-            if e.judgement.accepted.floor > MAX_MODEL_ERROR_TO_NAME:
+            if e.judgement.accepted.model_error > MAX_MODEL_ERROR_TO_NAME:
                 unaccounted = ", which the pump and the sensors do not account for"
             words.append(
                 f"Of what has a name {join_words(names)} comes nearest: misfit on unseen data "

@@ -171,8 +171,8 @@ def _fit(e: Explanation) -> dict:
         "before": scores(e.validation.before),
         "after": scores(e.validation.after),
         "model_error": {
-            "before": float(e.search.base.floor),
-            "after": float(e.judgement.accepted.floor),
+            "before": float(e.search.base.model_error),
+            "after": float(e.judgement.accepted.model_error),
         },
         "left_out": list(e.validation.left_out),
         "parameters_agree_within_sd": float(e.validation.disagreement),

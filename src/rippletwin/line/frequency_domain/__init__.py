@@ -1,1 +1,1 @@
-"""The line in the frequency domain: immittances, chained networks, nonlinear loads and compliances."""
+"""The line in the frequency domain: immittances, networks, nonlinear loads and compliances."""

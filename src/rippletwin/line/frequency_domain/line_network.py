@@ -65,8 +65,8 @@ class Network:
     sensor_positions: np.ndarray = ()
     sensor_factor: np.ndarray | complex = 1.0
     opening: np.ndarray | None = None
-    storage: list = field(default_factory=list)
-    drains: tuple | None = None
+    nonlinear_compliances: list = field(default_factory=list)
+    outflows: tuple | None = None
 
     @property
     def length(self) -> float:
@@ -164,8 +164,8 @@ class Network:
         make of a load at rest.
         """
         count = len(self.s)
-        at, leaving = self.drains or ((), np.empty((0, count), complex))
-        load = np.zeros((len(states) + (self.drains is not None), 2, count), complex)
+        at, leaving = self.outflows or ((), np.empty((0, count), complex))
+        load = np.zeros((len(states) + (self.outflows is not None), 2, count), complex)
         for given, (p, q) in zip(load, states):
             given[0], given[1] = p, q
         values = np.empty((len(self.inserts), count), complex)

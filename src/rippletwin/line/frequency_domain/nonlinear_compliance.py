@@ -2,8 +2,8 @@
 
 Where the compressibility depends on the pressure itself, a length dx stores g(p) dx beyond its
 linear part, the harmonics of one recording couple all along the line, and s g(p) dx leaves it as
-a flow of its own (`rippletwin.line.frequency_domain.prescribed_outflows`). Substitution, together with the load's law, mixed
-(`rippletwin.line.frequency_domain.anderson_acceleration`): g is a tenth or less of what the line stores in proportion, but at a
+a flow of its own (`prescribed_outflows`). Substitution, together with the load's law, mixed
+(`anderson_acceleration`): g is a tenth or less of what the line stores in proportion, but at a
 sharp resonance the flows of one pass move the pressure as much as the source does, and at several
 of them by more: what is mixed must know as many directions as there are of these. Recordings do
 not couple, and each has directions of its own.
@@ -70,7 +70,10 @@ class NonlinearComplianceSolver:
         basis = FundamentalSolutions(network, x)
         laws = []
         for part, _, _ in self.recordings:
-            own = [(s.pressure[part][0], *s.series[:, part][:, 0]) for s in network.storage]
+            own = [
+                (s.pressure[part][0], *s.series[:, part][:, 0])
+                for s in network.nonlinear_compliances
+            ]
             laws.append(np.array(own)[of])
 
         def stored(leaving):
@@ -82,7 +85,7 @@ class NonlinearComplianceSolver:
             return flow
 
         leaving = self._steady(stored, (len(x), len(network.s)))
-        network.drains = x, leaving
+        network.outflows = x, leaving
         return law(*basis.relation(leaving))
 
     def _steady(self, stored: Callable, shape: tuple) -> np.ndarray:
@@ -148,7 +151,7 @@ def _cells(network):
     """Middles (N,) and volumes of cells of the storing segments, and which storage each is of."""
     ends = np.cumsum(network.lengths)
     x, volume, of = [], [], []
-    for n, storage in enumerate(network.storage):
+    for n, storage in enumerate(network.nonlinear_compliances):
         k = storage.segment
         turn = np.abs(np.sqrt(network.series[k] * network.shunt[k]).imag).max()
         cells = int(np.ceil(network.lengths[k] * turn * A_WAVE / (2 * np.pi)))

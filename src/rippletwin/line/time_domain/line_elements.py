@@ -1,4 +1,4 @@
-"""What a line in the time domain is made of; `rippletwin.line.time_domain.method_of_characteristics` sets it in motion.
+"""What a line in the time domain is made of; `method_of_characteristics` sets it in motion.
 
 `Line` is the counterpart of `chain.Network`: a mutable description of source, pipes, elements and
 load that the effects of `rippletwin.twin.effects` change before it is simulated.

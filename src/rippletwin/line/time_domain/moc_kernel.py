@@ -1,4 +1,4 @@
-"""The inner loop of the method of characteristics; see `rippletwin.line.time_domain.method_of_characteristics` for the equations.
+"""The inner loop of the method of characteristics (see there for equations).
 
 Per node: `forward` = p + Zc q and `backward` = p - Zc q as they leave towards a cell of length
 one, half of the losses over that cell already taken off. All in one file, for Numba's cache of a

@@ -2,7 +2,7 @@
 
 An effect is one file in this folder that defines `EFFECT`, an instance of `Effect`. The registry
 finds it there; nothing else changes. It says the same thing twice: `apply` mutates a network of
-the frequency domain (`rippletwin.line.frequency_domain.line_network.Network`), `in_time` a line of the time domain
+the frequency domain (`Network`), `in_time` a line of the time domain
 (`rippletwin.line.time_domain.line_elements.Line`): its pipes, elements, flow or sensors.
 
 For `apply`, values may be floats or arrays of shape (B, 1) for B parameter sets at once:

@@ -35,7 +35,7 @@ def _apply(network, line, values, place):
         mean = np.broadcast_to(line.pressure_in(k), np.shape(network.shunt[k]))
         first, *beyond = gas_series(values["gas_fraction"], values["polytropic_exponent"], mean)
         network.shunt[k] = network.shunt[k] + line.area(k) * network.s * first / mean
-        network.storage.append(Storage(k, line.area(k), mean, np.array(beyond)))
+        network.nonlinear_compliances.append(Storage(k, line.area(k), mean, np.array(beyond)))
 
 
 def _in_time(line, state, values, place):
