@@ -74,7 +74,7 @@ def test_chance_gives_no_effect_what_an_effect_must_have(fitted, monkeypatch):
         for c in stepwise_search.applicable_candidates(fit.twin.rig, observations)
         if c[0].name in KEPT
     ]
-    monkeypatch.setattr(bootstrap, "library", lambda *_: few)
+    monkeypatch.setattr(bootstrap, "applicable_candidates", lambda *_: few)
     found = bootstrap_null(fit, observations, 12, processes=1)
     assert len(found.gains) == 12
     assert max(found.gains) < stepwise_search.ACCEPT

@@ -209,8 +209,8 @@ def test_effects_that_do_not_transfer_are_dropped_weakest_first(monkeypatch):
         tried.append(lost)
         return validation(0.03 if lost is gain else 0.01)
 
-    monkeypatch.setattr(cross_validation, "validate", validated)
-    monkeypatch.setattr(fit_jobs, "carry", lambda *_: None)
+    monkeypatch.setattr(cross_validation, "cross_validate", validated)
+    monkeypatch.setattr(fit_jobs, "transfer_theta", lambda *_: None)
     pool = SimpleNamespace(base=None, fit=answer)
     best = cross_validation.prune_by_cross_validation(pool, fit(0.0, HOSE, gain, friction))
     assert best.hypothesis == (HOSE, friction) and tried == [gain, HOSE]
