@@ -1,56 +1,66 @@
-"""Sealing the truth of a case until the verdicts are in.
+"""Seals: the truth of a case, encrypted until the verdicts are committed.
 
-A seal is a file that may be shown to anyone: the truth encrypted, and a commitment to it. Its key
-lies in another file, for the scoring alone. The cipher is a keystream from keyed BLAKE2b in counter
-mode, authenticated by keyed BLAKE2b over the ciphertext (encrypt, then authenticate). The
-commitment is SHA-256 of a random nonce and the truth; the nonce is part of what is encrypted, so
-that nobody can guess truths and compare.
+A seal can be shown to anyone. It holds the truth encrypted and a commitment to it; the key lies in
+another file, for the scoring alone. The cipher is AES-256-GCM (NIST SP 800-38D): it also detects
+every change of the seal, the commitment included. The commitment is SHA-256 of the plaintext, which
+begins with random bytes: without them a guessed truth could be compared with the commitment.
 """
 
 import hashlib
-import hmac
 import json
 import secrets
+from pathlib import Path
 
-_NONCE = 32
+from cryptography.exceptions import InvalidTag
+from cryptography.hazmat.primitives.ciphers.aead import AESGCM
+
+_KEY_BITS = 256
+_NONCE_BYTES = 12  # the length for which GCM uses the nonce as it is
+_BLINDING_BYTES = 32
+
+
+class SealError(ValueError):
+    """A seal that cannot be opened: wrong key, altered, malformed or not the truth committed to."""
 
 
 def new_key() -> bytes:
-    """A key for one seal, from the operating system's randomness."""
-    return secrets.token_bytes(32)
+    """A key for one seal, from the operating system's random numbers."""
+    return AESGCM.generate_key(_KEY_BITS)
 
 
 def seal(truth: dict, key: bytes) -> dict:
-    """Encrypt `truth` (plain data) with a key that is used once: `sealed`, `tag`, `commitment`."""
-    plain = secrets.token_bytes(_NONCE) + json.dumps(truth, sort_keys=True).encode()
-    sealed = _stream(plain, key)
+    """Encrypt `truth` (plain data): hexadecimal `nonce`, `sealed` and `commitment`.
+
+    Use a key for one seal only.
+    """
+    plain = secrets.token_bytes(_BLINDING_BYTES) + json.dumps(truth, sort_keys=True).encode()
+    commitment, nonce = hashlib.sha256(plain).digest(), secrets.token_bytes(_NONCE_BYTES)
     return {
-        "sealed": sealed.hex(),
-        "tag": _tag(sealed, key),
-        "commitment": hashlib.sha256(plain).hexdigest(),
+        "nonce": nonce.hex(),
+        "sealed": AESGCM(key).encrypt(nonce, plain, commitment).hex(),
+        "commitment": commitment.hex(),
     }
 
 
 def open_seal(sealed: dict, key: bytes) -> dict:
-    """The truth in a seal; raises ValueError for a wrong key or a seal that was changed."""
-    hidden = bytes.fromhex(sealed["sealed"])
-    if not hmac.compare_digest(_tag(hidden, key), sealed["tag"]):
-        raise ValueError("the key does not fit, or the seal was changed")
-    plain = _stream(hidden, key)
-    if hashlib.sha256(plain).hexdigest() != sealed["commitment"]:
-        raise ValueError("the truth is not the one committed to")
-    return json.loads(plain[_NONCE:])
+    """The truth in a seal; raises SealError where it cannot be opened."""
+    try:
+        nonce, hidden, commitment = (
+            bytes.fromhex(sealed[name]) for name in ("nonce", "sealed", "commitment")
+        )
+        plain = AESGCM(key).decrypt(nonce, hidden, commitment)
+    except InvalidTag:
+        raise SealError("the key does not fit, or the seal was altered") from None
+    except (KeyError, TypeError, ValueError) as error:
+        raise SealError(f"not a seal with its key: {error!r}") from None
+    if hashlib.sha256(plain).digest() != commitment:
+        raise SealError("the truth is not the one committed to")
+    return json.loads(plain[_BLINDING_BYTES:])
 
 
-def _stream(text: bytes, key: bytes) -> bytes:
-    """`text` xor the keystream; its own inverse."""
-    count = -(-len(text) // 64)
-    stream = b"".join(
-        hashlib.blake2b(k.to_bytes(8, "big"), key=key, person=b"stream").digest()
-        for k in range(count)
-    )
-    return bytes(a ^ b for a, b in zip(text, stream, strict=False))
-
-
-def _tag(hidden: bytes, key: bytes) -> str:
-    return hashlib.blake2b(hidden, key=key, person=b"tag").hexdigest()
+def open_seal_file(seal_file: str | Path, key_file: str | Path) -> dict:
+    """The truth in a seal's file; raises SealError naming both files."""
+    try:
+        return open_seal(json.loads(Path(seal_file).read_text()), Path(key_file).read_bytes())
+    except ValueError as error:
+        raise SealError(f"{seal_file} with key {key_file}: {error}") from None

@@ -28,7 +28,6 @@ from virtualrig.draw import MIX, UNCERTAINTY, draw, generator, kinds
 from virtualrig.draw_effects import Bare, load_dynamics
 from virtualrig.pump import Pump
 from virtualrig.rig import build
-from virtualrig.seal import new_key, open_seal, seal
 
 SOURCE = ROOT / "src"
 confined = pytest.mark.skipif(jail.version() < 1, reason="this kernel has no Landlock")
@@ -140,25 +139,6 @@ def test_flow_into_a_constant_pressure_is_displacement_less_losses():
     lost = (9.5e6 - 2e5) / pump.bulk_modulus * (2e-6 + stroke) * pump.pistons * 1000 / 60
     held = (9.5e6 - 2e5) / pump.bulk_modulus * 2e-6 * pump.pistons * 1000 / 60
     assert swept - leaked - lost - 0.01 * swept < flow.mean() < swept - leaked - 0.0 * held
-
-
-# ---- sealing --------------------------------------------------------------------------------
-
-
-def test_a_seal_opens_with_its_key_alone_and_shows_every_change():
-    """Round trip; a wrong key, a flipped bit and an exchanged commitment are refused."""
-    truth, key = {"kind": "none", "effects": [], "length": 7.3}, new_key()
-    sealed = seal(truth, key)
-    assert open_seal(sealed, key) == truth
-    assert "none" not in json.dumps(sealed)
-    with pytest.raises(ValueError, match="key"):
-        open_seal(sealed, new_key())
-    flipped = f"{int(sealed['sealed'][:2], 16) ^ 1:02x}" + sealed["sealed"][2:]
-    with pytest.raises(ValueError, match="changed"):
-        open_seal(sealed | {"sealed": flipped}, key)
-    with pytest.raises(ValueError, match="committed"):
-        open_seal(sealed | {"commitment": "0" * 64}, key)
-    assert seal(truth, key)["commitment"] != sealed["commitment"]  # the nonce
 
 
 def test_a_changed_verdict_changes_its_digest(tmp_path):

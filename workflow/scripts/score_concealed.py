@@ -6,7 +6,7 @@ from pathlib import Path
 from concealed.commitments import digests
 from concealed.score import score
 from job import start
-from virtualrig.seal import open_seal
+from virtualrig.seal import open_seal_file
 
 tell = start(snakemake)
 paths = snakemake.input
@@ -25,7 +25,7 @@ rows = []
 for case, (seal, key, *written) in enumerate(
     zip(paths.seals, paths.seal_keys, paths.verdicts, paths.baselines, paths.worths, strict=True)
 ):
-    truth = open_seal(read(seal), Path(key).read_bytes())
+    truth = open_seal_file(seal, key)
     verdict, baselines, oracle = map(read, written)
     rows.append({"case": case} | score(truth, verdict, baselines, oracle["worth"]))
 Path(snakemake.output.rows).write_text(json.dumps(rows, indent=1) + "\n")

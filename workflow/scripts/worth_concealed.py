@@ -5,11 +5,10 @@ from pathlib import Path
 
 from concealed.oracle import worth
 from job import start
-from virtualrig.seal import open_seal
+from virtualrig.seal import open_seal_file
 
 tell = start(snakemake)
-sealed = json.loads(Path(snakemake.input.seal).read_text())
-truth = open_seal(sealed, Path(snakemake.input.key).read_bytes())
+truth = open_seal_file(snakemake.input.seal, snakemake.input.key)
 found = worth(snakemake.input.case, truth)
 Path(snakemake.output[0]).write_text(json.dumps({"worth": found}) + "\n")
 tell(f"worth {found}")
