@@ -163,7 +163,9 @@ def test_the_larger_of_two_must_be_worth_its_physics(large, small, cost):
 def test_where_no_effect_fits_every_one_is_begun_about_what_is_there(monkeypatch, floor, asked):
     """Fits from nominal values that leave `floor`: only where that is much are effects begun about
     the line as it is without them, and beside the first about the fit with it."""
-    monkeypatch.setattr("rippletwin.explanation.search.single_effects.transfer_theta", lambda *_: None)
+    monkeypatch.setattr(
+        "rippletwin.explanation.search.single_effects.transfer_theta", lambda *_: None
+    )
     begun = []
 
     def answer(jobs, tell=None):
