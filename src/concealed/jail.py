@@ -1,8 +1,8 @@
-"""A command that may open only what it is given, by Landlock of the Linux kernel (5.13 and later).
+"""Confinement of a command to the files that it is given, by Landlock of the Linux kernel (5.13).
 
-The kernel enforces it for the process and all its children, whoever they run as, and nothing takes
-it back. `python -m concealed.jail --read A --write B -- COMMAND` runs COMMAND so.
-Source: Linux kernel documentation, userspace-api/landlock.
+`python -m concealed.jail --read A --write B -- COMMAND` runs COMMAND so. The kernel enforces the
+confinement for the process and all its children, whichever user runs them, and no process can
+leave it. Source: Linux kernel documentation, userspace-api/landlock.
 """
 
 import argparse
@@ -14,53 +14,53 @@ from collections.abc import Iterable
 from pathlib import Path
 
 _CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446  # system calls, same on all machines
-_VERSION, _PATH_BENEATH, _NO_NEW_PRIVILEGES = 1, 1, 38
-_EXECUTE, _WRITE_FILE, _READ_FILE, _READ_DIR = 1, 2, 4, 8
-# rights by version of the interface: 13 at first, then refer, truncate, (network), ioctl
-_RIGHTS = {1: (1 << 13) - 1, 2: (1 << 14) - 1, 3: (1 << 15) - 1}
-_OF_FILES = _EXECUTE | _WRITE_FILE | _READ_FILE | (1 << 14)
-READ = _EXECUTE | _READ_FILE | _READ_DIR
-LIST = _READ_DIR
+_ASK_VERSION, _PATH_BENEATH, _NO_NEW_PRIVILEGES = 1, 1, 38
+_EXECUTE, _WRITE_FILE, _READ_FILE, _READ_DIR, _TRUNCATE = 1, 2, 4, 8, 1 << 14
+_RIGHTS_BY_VERSION = {1: (1 << 13) - 1, 2: (1 << 14) - 1, 3: (1 << 15) - 1}
+_RIGHTS_OF_FILES = _EXECUTE | _WRITE_FILE | _READ_FILE | _TRUNCATE
+_READ = _EXECUTE | _READ_FILE | _READ_DIR
+_LIST = _READ_DIR
 
 
 class JailError(RuntimeError):
     """The kernel cannot confine a process."""
 
 
-def version() -> int:
-    """Version of the kernel's Landlock; 0 where there is none."""
+def landlock_version() -> int:
+    """Version of the kernel's Landlock interface; 0 where there is none."""
     if not sys.platform.startswith("linux"):
         return 0
-    return max(_libc().syscall(_CREATE_RULESET, None, 0, _VERSION), 0)
+    return max(_libc().syscall(_CREATE_RULESET, None, 0, _ASK_VERSION), 0)
 
 
 def confine(read: Iterable[str], write: Iterable[str], listed: Iterable[str] = ()) -> None:
-    """From now on this process reads below `read`, reads and writes below `write`, nothing else.
+    """Confine this process, for good, to the given files and folders with all that they contain.
 
-    Folders below `listed` can be listed and the files in them not opened. Paths that do not exist
-    are left out. Raises JailError where the kernel has no Landlock or refuses.
+    It can read and execute `read`, also write `write`, and list the names below `listed` without
+    opening the files. Paths that do not exist are ignored. Raises JailError where the kernel has no
+    Landlock or refuses.
     """
-    known = version()
-    if known < 1:
+    version = landlock_version()
+    if version < 1:
         raise JailError("this kernel has no Landlock (Linux 5.13 and later, switched on)")
-    handled = _RIGHTS[min(known, 3)]
+    handled = _RIGHTS_BY_VERSION[min(version, 3)]
     libc = _libc()
     ruleset = libc.syscall(_CREATE_RULESET, struct.pack("Q", handled), 8, 0)
     if ruleset < 0:
         raise JailError(f"Landlock refuses: {os.strerror(ctypes.get_errno())}")
-    for paths, rights in ((read, READ), (write, handled), (listed, LIST)):
+    for paths, rights in ((read, _READ), (write, handled), (listed, _LIST)):
         for path in paths:
-            _allow(libc, ruleset, path, rights & handled)
+            _add_rule(libc, ruleset, path, rights & handled)
     if libc.prctl(_NO_NEW_PRIVILEGES, 1, 0, 0, 0) or libc.syscall(_RESTRICT_SELF, ruleset, 0):
         raise JailError(f"Landlock refuses: {os.strerror(ctypes.get_errno())}")
     os.close(ruleset)
 
 
-def _allow(libc, ruleset: int, path: str, rights: int) -> None:
+def _add_rule(libc, ruleset: int, path: str, rights: int) -> None:
     if not os.path.exists(path):
         return
     if not os.path.isdir(path):
-        rights &= _OF_FILES
+        rights &= _RIGHTS_OF_FILES
     handle = os.open(path, os.O_PATH | os.O_CLOEXEC)
     rule = struct.pack("=Qi", rights, handle)
     if rights and libc.syscall(_ADD_RULE, ruleset, _PATH_BENEATH, rule, 0):
@@ -72,28 +72,30 @@ def _libc():
     return ctypes.CDLL(None, use_errno=True)
 
 
-def of_tool(source: Path) -> dict[str, list[str]]:
-    """What running `rippletwin` takes: Python, system libraries, its own source in `source`.
+def paths_of_tool(source: Path) -> dict[str, list[str]]:
+    """The paths that `rippletwin` needs, as arguments of `confine`; `source` holds its package.
 
-    `source` itself may be listed, which Python's import needs.
+    These are Python, the system's libraries, and of the devices the null device and the random
+    numbers. Without shared memory (/dev/shm) it runs in one process. Python's import lists `source`
+    itself.
     """
     python = {sys.prefix, sys.base_prefix, os.path.dirname(os.path.realpath(sys.executable))}
-    system = ["/usr", "/lib", "/lib64", "/bin", "/etc", "/proc", "/sys"]
+    system = ["/usr", "/lib", "/lib64", "/bin", "/etc", "/proc", "/sys", "/dev/urandom"]
     return {
         "read": [*python, *system, str(source / "rippletwin"), str(source / "concealed")],
-        "write": ["/dev"],
+        "write": ["/dev/null"],
         "listed": [str(source)],
     }
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Confine this process and become COMMAND."""
+    """Confine this process and replace it by COMMAND."""
     parser = argparse.ArgumentParser(prog="concealed.jail", description=__doc__.splitlines()[0])
     parser.add_argument("--read", action="append", default=[])
     parser.add_argument("--write", action="append", default=[])
     parser.add_argument("command", nargs="+")
     options = parser.parse_args(arguments)
-    tool = of_tool(Path(__file__).resolve().parent.parent)
+    tool = paths_of_tool(Path(__file__).resolve().parent.parent)
     confine(tool["read"] + options.read, tool["write"] + options.write, tool["listed"])
     os.execvp(options.command[0], options.command)
 
