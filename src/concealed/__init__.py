@@ -1,4 +1,4 @@
-"""concealed: tries `rippletwin explain` on recordings whose effect is concealed, and scores it.
+"""concealed: trials of `rippletwin explain` on recordings of rigs whose effect is concealed.
 
-It reads files of both sides; neither `rippletwin` nor `virtualrig` imports it.
+It reads files of the tool and of the virtual rig; neither of them imports it.
 """

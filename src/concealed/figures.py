@@ -1,4 +1,4 @@
-"""Pictures of the trial on concealed effects: power, stated probabilities, misfits, bias."""
+"""Figures of a trial: power, misfits, errors of the line, stated probabilities."""
 
 from __future__ import annotations
 
@@ -6,15 +6,18 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from scipy.stats import binomtest
 
+from concealed.summary import Rate, power_table, reliability_table
 from rippletwin.figures import style
 
-LEAST_CHANGE = 1e-4
-STATED = (0.5, 0.9, 0.99)  # between pooled probabilities; most names are stated as all but sure
+LEAST_CHANGE = 1e-4  # smaller changes are drawn here
+GREATEST_CHANGE = 2.0  # right end of the last bin
+PROBABILITY_EDGES = (0.0, 0.5, 0.9, 0.99, 1.0)
+KINDS = ("none", "off", "single", "indistinguishable", "pair", "outside")
+SHORT_NAMES = {"indistinguishable": "alike"}
 
 
-def draw(rows: list[dict], folder: str | Path, suffix: str = ".png") -> list[Path]:
+def draw_figures(rows: list[dict], folder: str | Path, suffix: str = ".png") -> list[Path]:
     """Write every figure of the scored cases into `folder`; returns their paths."""
     paths = []
     for name, make in FIGURES.items():
@@ -23,58 +26,57 @@ def draw(rows: list[dict], folder: str | Path, suffix: str = ".png") -> list[Pat
     return paths
 
 
-def power(rows: list[dict]) -> Figure:
-    """Share of single effects that raise the alarm and are named rightly, against their change.
+def draw_power(rows: list[dict]) -> Figure:
+    """Shares of single effects that raise the alarm and that are named, by their change.
 
-    A running mean over a factor of three of the change, below it every case.
+    Bars are exact 95 % intervals; ticks below and above are the single cases.
     """
-    singles = [r for r in rows if r["kind"] in ("single", "indistinguishable")]
     fig, axes = style.figure(1, 1, height=2.6)
     ax = axes[0, 0]
-    change = np.array([max(r["change"], LEAST_CHANGE) for r in singles])
-    grid = np.geomspace(LEAST_CHANGE, 2.0, 80)
-    looks = (
-        ("alarm", style.CALIBRATED, "-", np.array([r["alarm"] for r in singles], float)),
-        ("right effect", style.CORRECTED, "--", np.array([r["right"] for r in singles], float)),
-    )
-    for k, (label, colour, dash, values) in enumerate(looks):
-        if not len(values):
-            continue
-        weight = np.exp(-0.5 * (np.log(grid[:, None] / change) / np.log(np.sqrt(3))) ** 2)
-        known = weight.sum(axis=1) > 0.5
-        curve = np.where(known, weight @ values / np.maximum(weight.sum(axis=1), 1e-9), np.nan)
-        ax.plot(grid, curve, dash, color=colour, label=label)
-        place = values + (0.03 if k else -0.03) * (1 - 2 * values) - 0.06 * k * (values > 0.5)
-        ax.plot(change, place, "|", color=colour, ms=5)
+    bins = power_table(rows)
+    for k, (label, colour, marker, name) in enumerate(
+        (
+            ("alarm", style.CALIBRATED, "o", "alarm"),
+            ("effect or class named", style.CORRECTED, "s", "right"),
+        )
+    ):
+        for n, b in enumerate(bins):
+            low, high = max(b.low, LEAST_CHANGE), min(b.high, GREATEST_CHANGE)
+            x = np.sqrt(low * high) * 1.08 ** (2 * k - 1)
+            _error_bar(ax, x, getattr(b, name), colour, marker, label if n == 0 else None)
+        cases = [row for row in rows if row["kind"] in ("single", "indistinguishable")]
+        x = [max(row["change"], LEAST_CHANGE) for row in cases]
+        y = [(1.04 + 0.04 * k if row[name] else -0.04 - 0.04 * k) for row in cases]
+        ax.plot(x, y, "|", color=colour, ms=4)
     ax.set_xscale("log")
-    ax.set_xlabel("change of the ripple that the effect makes, relative")
+    ax.set_xlabel("relative change of the ripple that the effect makes")
     ax.set_ylabel("share of single effects")
-    ax.set_ylim(-0.1, 1.1)
-    ax.legend(loc="center left")
+    ax.set_xlim(0.7 * LEAST_CHANGE, GREATEST_CHANGE)
+    ax.set_ylim(-0.13, 1.13)
+    if bins:
+        ax.legend(loc="upper left")
     return fig
 
 
-def misfit(rows: list[dict]) -> Figure:
-    """Misfit of every case: nominal values, recalibrated, corrected; sorted by kind."""
-    kinds = ("none", "off", "single", "indistinguishable", "pair", "outside")
-    ordered = sorted(rows, key=lambda r: (kinds.index(r["kind"]), r["misfit_calibrated"]))
+def draw_misfits(rows: list[dict]) -> Figure:
+    """Misfit of every case, nominal, calibrated and corrected; sorted by kind."""
+    ordered = sorted(rows, key=lambda row: (KINDS.index(row["kind"]), row["misfit_calibrated"]))
     fig, axes = style.figure(1, 1, height=3.0)
     ax = axes[0, 0]
     x = np.arange(len(ordered))
-    for key, label, mark, colour in (
+    for key, label, marker, colour in (
         ("misfit_nominal", "nominal", "_", style.NOMINAL),
         ("misfit_calibrated", "calibrated", "o", style.CALIBRATED),
         ("misfit_corrected", "corrected", "x", style.CORRECTED),
     ):
-        ax.plot(x, [r[key] for r in ordered], mark, color=colour, label=label, ms=4)
+        ax.plot(x, [row[key] for row in ordered], marker, color=colour, label=label, ms=4)
     ax.set_yscale("log")
-    ends = [sum(r["kind"] == kind for r in ordered) for kind in kinds]
-    for kind, start, count in zip(kinds, np.cumsum([0, *ends]), ends):
+    counts = [sum(row["kind"] == kind for row in ordered) for kind in KINDS]
+    for kind, start, count in zip(KINDS, np.cumsum([0, *counts]), counts):
         if count:
             ax.axvline(start - 0.5, color=style.NEUTRAL, lw=0.5)
-            short = {"indistinguishable": "alike"}.get(kind, kind)
-            ax.text(start + 0.5 * (count - 1), 1.01, short, ha="center", va="bottom",
-                    transform=ax.get_xaxis_transform(), fontsize=7)  # fmt: skip
+            ax.text(start + 0.5 * (count - 1), 1.01, SHORT_NAMES.get(kind, kind), ha="center",
+                    va="bottom", transform=ax.get_xaxis_transform(), fontsize=7)  # fmt: skip
     ax.set_xticks([])
     ax.set_xlabel("cases")
     ax.set_ylabel("relative misfit")
@@ -82,48 +84,45 @@ def misfit(rows: list[dict]) -> Figure:
     return fig
 
 
-def bias(rows: list[dict]) -> Figure:
-    """Errors of calibrated delays and impedances of cases with an effect, before and after."""
+def draw_line_errors(rows: list[dict]) -> Figure:
+    """Distribution of errors of delays and impedances in cases with an effect, before and after."""
     fig, axes = style.figure(1, 2, height=2.4, sharey=True)
     for ax, quantity in zip(axes[0], ("delay", "impedance")):
-        for which, colour, dash in (
+        for twin, colour, dash in (
             ("calibrated", style.CALIBRATED, "-"),
             ("corrected", style.CORRECTED, "--"),
         ):
             errors = np.sort(
                 [
-                    abs(b["relative"])
-                    for r in rows
-                    if r["effects"]
-                    for b in r["bias"][which]
-                    if b["quantity"] == quantity
+                    abs(error["relative"])
+                    for row in rows
+                    if row["effects"]
+                    for error in row["line_errors"][twin]
+                    if error["quantity"] == quantity
                 ]
             )
-            if len(errors):
+            if len(errors) and errors[-1] > 0:
                 share = np.arange(1, len(errors) + 1) / len(errors)
-                ax.step(errors, share, dash, color=colour, label=which, where="post")
-        ax.set_xscale("log")
+                ax.step(errors, share, dash, color=colour, label=twin, where="post")
+                ax.set_xscale("log")
         ax.set_xlabel(f"relative error of a segment's {quantity}")
     axes[0, 0].set_ylabel("share of segments below")
-    axes[0, 0].legend(loc="lower right")
+    if axes[0, 0].lines:
+        axes[0, 0].legend(loc="lower right")
     return fig
 
 
-def probabilities(rows: list[dict]) -> Figure:
-    """Stated probability of named effects against how often such a name is right, pooled between
-    the values of STATED, with exact 95 % intervals."""
-    stated = np.array([pair for r in rows for pair in r["stated"]], float).reshape(-1, 2)
-    pool = np.digitize(stated[:, 0], STATED)
+def draw_probabilities(rows: list[dict]) -> Figure:
+    """Share of named effects that are right, by the probability that the verdict states.
+
+    Pooled between PROBABILITY_EDGES, since most are stated close to one; bars are exact 95 %
+    intervals.
+    """
     fig, axes = style.figure(1, 1, height=2.6)
     ax = axes[0, 0]
     ax.plot([0, 1], [0, 1], color=style.NEUTRAL, lw=0.8)
-    for k in range(len(STATED) + 1):
-        group = stated[pool == k]
-        if len(group):
-            p, right = group.mean(axis=0)
-            low, high = binomtest(int(group[:, 1].sum()), len(group)).proportion_ci()
-            spread = [[right - low], [high - right]]
-            ax.errorbar(p, right, spread, fmt="o", color=style.CORRECTED, ms=4, capsize=2)
+    for b in reliability_table(rows, PROBABILITY_EDGES):
+        _error_bar(ax, b.mean, b.right, style.CORRECTED, "o")
     ax.set_xlabel("stated probability, pooled at 0.5, 0.9 and 0.99")
     ax.set_ylabel("share that is right")
     ax.set_xlim(0, 1.03)
@@ -131,4 +130,15 @@ def probabilities(rows: list[dict]) -> Figure:
     return fig
 
 
-FIGURES = {"power": power, "misfit": misfit, "bias": bias, "probabilities": probabilities}
+def _error_bar(ax, x: float, rate: Rate, colour: str, marker: str, label: str | None = None):
+    low, high = rate.interval
+    spread = [[rate.share - low], [high - rate.share]]
+    ax.errorbar(x, rate.share, spread, fmt=marker, color=colour, ms=4, capsize=2, label=label)
+
+
+FIGURES = {
+    "power": draw_power,
+    "misfit": draw_misfits,
+    "line_errors": draw_line_errors,
+    "probabilities": draw_probabilities,
+}

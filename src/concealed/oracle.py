@@ -1,4 +1,7 @@
-"""What the truth is worth to one who knows it: the bound on what a search can find in the data."""
+"""Log evidence of the true effects, fitted from their true values: an upper reference for a search.
+
+It separates cases in which the search failed from cases in which the data do not hold the effect.
+"""
 
 from collections.abc import Mapping, Sequence
 from itertools import product
@@ -15,58 +18,58 @@ from rippletwin.twin.parameters import coordinates
 from rippletwin.twin.twin import Twin
 
 
-def worth(case_folder: str | Path, truth: dict) -> float | None:
-    """Log evidence that the true effects add to the line of a case without any, `truth` being what
-    a seal holds; see `worth_in`."""
+def oracle_log_evidence(case_folder: str | Path, truth: dict) -> float | None:
+    """Log evidence that the true effects add in a case; None without an effect, and as stated by
+    `log_evidence_of_effects`. `truth` is the content of the case's seal.
+    """
     if not truth["effects"]:
         return None
     case = load_case(case_folder, states={"healthy"})
-    base, data = prepare_base(
+    base, observations = prepare_base(
         case.rig, [observe_whole_and_halves(each, case.rig)[0] for each in case.healthy]
     )
     rig = truth["seal"]
     line = {"viscosity": rig["fluid"]["kinematic_viscosity"]}
     for k, segment in enumerate(rig["line"]["segments"], 1):
         line |= {f"{name}[{k}]": segment[name] for name in ("wave_speed", "diameter", "length")}
-    return worth_in(base, data, truth["effects"], line)
+    return log_evidence_of_effects(base, observations, truth["effects"], line)
 
 
-def worth_in(
-    base: Twin, data: Sequence, effects: list[dict], line: Mapping[str, float]
+def log_evidence_of_effects(
+    base: Twin, observations: Sequence, effects: list[dict], line: Mapping[str, float]
 ) -> float | None:
-    """Log evidence that the true `effects` add to the twin `base` of the observations `data`.
+    """Log evidence that the true `effects` add to the twin `base` of the observations.
 
-    Both are fitted as `explain` fits, but the effects set out from their true strengths and places,
-    also on the true `line` (its parameters by name), and the line without them also from where they
-    leave it. Less than `ACCEPT` no search can tell from chance; where it is more, one that finds
-    nothing has failed. None where nothing can be added: an effect that the library has not, or one
-    at shaft orders alone.
+    Both twins are fitted as `explain` fits them. The fit with the effects starts from their true
+    strengths and places, once on the nominal line and once on the true `line` (parameter name ->
+    value, SI units). The fit without effects also starts from the line of the better of these.
+    Below `thresholds.ACCEPT` a search cannot distinguish the effects from chance; above it, a
+    search that finds nothing has failed. None where an effect is not in the library or acts at
+    shaft orders alone.
     """
-    pool, found = Workers(base, data), applicable_candidates(base.rig, data)
+    pool, library = Workers(base, observations), applicable_candidates(base.rig, observations)
     choices = [
-        [c for c in found if (c[0].name, c[1].element) == (true["name"], true["element"])]
+        [c for c in library if (c[0].name, c[1].element) == (true["name"], true["element"])]
         for true in effects
     ]
     if not all(choices):
         return None
     jobs = []
     for hypothesis in product(*choices):
-        twin, values = base.with_(effects=hypothesis), _values(base.rig, hypothesis, effects)
+        twin, values = base.with_(effects=hypothesis), _true_values(base.rig, hypothesis, effects)
         theta = coordinates(twin.parameters, {**line, **values})
         start = {name: theta[twin.index[name]] for name in values}
+        aligned = align_shaft_angles(Posterior(twin, observations), theta)[1]
         jobs.append({"hypothesis": hypothesis, "starts": [start]})
-        jobs.append(
-            {"hypothesis": hypothesis, "theta": align_shaft_angles(Posterior(twin, data), theta)[1]}
-        )
-    known = _best(pool.fit(jobs))
-    without = pool.fit(
-        [{"hypothesis": ()}, {"hypothesis": (), "theta": transfer_theta(known, (), base)}]
-    )
-    return known.evidence - _best(without).evidence
+        jobs.append({"hypothesis": hypothesis, "theta": aligned})
+    with_effects = _best(pool.fit(jobs))
+    from_same_line = {"hypothesis": (), "theta": transfer_theta(with_effects, (), base)}
+    without = _best(pool.fit([{"hypothesis": ()}, from_same_line]))
+    return with_effects.evidence - without.evidence
 
 
-def _values(rig, hypothesis: Hypothesis, effects: list[dict]) -> dict[str, float]:
-    """The true parameters by name; a place is the one on the drawing."""
+def _true_values(rig, hypothesis: Hypothesis, effects: list[dict]) -> dict[str, float]:
+    """True parameters of the effects by name; positions are those on the drawing, m."""
     values = {}
     for (effect, place), true in zip(hypothesis, effects, strict=True):
         own = true["parameters"]

@@ -1,161 +1,234 @@
-"""The results as a page."""
+"""The page that reports a trial."""
+
+from collections import Counter
+from collections.abc import Iterable
 
 import numpy as np
 
 from concealed import summary
+from concealed.failures import circumstance, failure
+from concealed.score import PLAIN_CHANGE
+from rippletwin.explanation.thresholds import ACCEPT
+
+KINDS = {
+    "none": "no effect, nominal values within tolerance",
+    "off": "no effect, nominal values two to three standard deviations off",
+    "single": "one effect of the library",
+    "pair": "two effects of the library",
+    "outside": "an effect that the library does not have",
+    "indistinguishable": "an effect of a class declared indistinguishable beforehand",
+}
+GROUPS = {
+    "no effect": ("none", "off"),
+    "single effects": ("single", "indistinguishable"),
+    "pairs": ("pair",),
+    "outside the library": ("outside",),
+}
 
 
-def markdown(rows: list[dict], origin: dict) -> str:
-    """The page of all rows.
+def report_page(rows: list[dict], origin: dict) -> str:
+    """The page in Markdown, of the rows of `concealed.score.score_case`.
 
-    `origin` says where the cases come from: commit, number, not_committed (whether the tool was
-    changed since), checks (of the numerics: truth, error and allowed error in Pa).
+    `origin` states where the cases come from: `commit` (hash of the tool's tree), `number` (of the
+    trial), `not_committed` (whether the tool has changes that are not committed), `checks` (of the
+    numerics: a list of `truth`, `error` and `allowed`, the latter two in Pa).
     """
-    changed = ", the tool having changes that are not committed" if origin["not_committed"] else ""
     return "\n".join(
         [
-            "# What `rippletwin explain` finds when the effect is concealed",
+            "# How often `rippletwin explain` is right when the effect is concealed",
             "",
-            f"{len(rows)} cases drawn from tree `{origin['commit'][:12]}` and number "
-            f"{origin['number']}{changed}. Shares with exact 95 % intervals. docs/concealed.md "
-            "says how.",
+            *_origin(rows, origin),
+            *_terms(),
+            "## Scores",
             "",
-            *_table(
-                ("score", "target", "found"),
-                [(what, target, str(found)) for what, target, found in summary.scores(rows)],
-            ),
-            "## Beside simpler methods",
+            *_table(("score", "target", "result"),
+                    [(s.what, s.target, str(s.rate)) for s in summary.score_table(rows)]),
+            "## Comparison with simpler methods",
             "",
-            *_table(
-                ("method", "false alarms", "right effect, plain singles", "misnamed, outside"),
-                [tuple(map(str, row)) for row in summary.compared(rows)],
-            ),
-            "Recalibrating alone names nothing; its alarm is a misfit above 5 % after calibration.",
+            *_methods(rows),
+            "## Single effects by the change that they make in the ripple",
             "",
-            "## Power: single effects by the change they make in the ripple",
-            "",
-            *_table(
-                ("change", "alarm", "right effect"),
-                [(_span(a, b), str(c), str(d)) for a, b, c, d in summary.power(rows)],
-            ),
+            *_table(("change", "alarm", "effect or its class named"),
+                    [(_span(b.low, b.high), str(b.alarm), str(b.right))
+                     for b in summary.power_table(rows)]),
             "![power](figures/power.png)",
             "",
-            "## Stated probabilities",
+            "## Stated probabilities of named effects",
             "",
-            *_table(
-                ("stated", "mean stated", "right"),
-                [(_span(a, b), f"{m:.2f}", str(r)) for a, b, m, r in summary.reliability(rows)],
-            ),
-            f"Brier score {summary.brier(rows):.3f}.",
+            *_probabilities(rows),
+            "## Line parameters in cases with an effect",
             "",
-            "## Line parameters of cases with an effect",
+            *_table(("quantity", "twin", "mean error", "rms error",
+                     "within two stated standard deviations"),
+                    [(e.quantity, e.twin, f"{100 * e.mean:+.2f} %", _percent(e.rms, 2),
+                      str(e.within))
+                     for e in summary.line_error_table(rows)]),
+            "![errors](figures/line_errors.png)",
             "",
-            *_table(
-                ("quantity", "twin", "mean error", "rms error", "within two deviations"),
-                [
-                    (q, which, f"{mean:+.2%}", f"{rms:.2%}", str(within))
-                    for q, which, mean, rms, within in summary.biases(rows)
-                ],
-            ),
             "## Misfits",
             "",
             *_misfits(rows),
-            "![misfits](figures/misfit.png)",
-            "",
-            "## Every case",
-            "",
-            *_cases(rows),
             "## Failures",
             "",
             *_failures(rows),
-            "## Numerics",
+            "## All cases",
             "",
-            *_table(
-                ("checked against", "error, Pa rms", "allowed, Pa rms"),
-                [
-                    (c["truth"], f"{c['error']:.0f}", f"{c['allowed']:.0f}")
-                    for c in [*origin["checks"], *_refined(rows)]
-                ],
-            ),
+            *_cases(rows),
+            "## Numerics of the recordings",
+            "",
+            *_numerics(rows, origin["checks"]),
         ]
-    )
+    )  # fmt: skip
 
 
-def _refined(rows: list[dict]) -> list[dict]:
-    """The estimated errors of cases whose mesh was refined until they were small, as checks."""
+def _origin(rows: list[dict], origin: dict) -> list[str]:
+    counts = Counter(row["kind"] for row in rows)
+    changed = " The tool has changes that are not committed." if origin["not_committed"] else ""
+    seconds = np.array([row["seconds"] for row in rows])
     return [
-        {
-            "truth": f"finer meshes, case {k}",
-            "error": row["numerics"]["error"],
-            "allowed": row["numerics"]["allowed"],
-        }
-        for k, row in enumerate(rows)
-        if row["numerics"] is not None
+        f"{len(rows)} cases, drawn from tree `{origin['commit'][:12]}` and trial number "
+        f"{origin['number']} by `snakemake concealed`.{changed} The protocol is in "
+        "docs/concealed.md.",
+        "",
+        *_table(("kind", "cases", "what"),
+                [(f"`{kind}`", str(counts[kind]), what) for kind, what in KINDS.items()]),
+        f"The tool took {np.median(seconds):.0f} s a case (median, one process; "
+        f"{seconds.min():.0f} to {seconds.max():.0f} s).",
+        "",
+    ]  # fmt: skip
+
+
+def _terms() -> list[str]:
+    return [
+        "* Shares are followed by their exact 95 % confidence interval (Clopper and Pearson). "
+        "Where a case counts several times, the interval takes these as independent.",
+        "* *Change*: norm of the change that the effect makes in the sensors' ripple, relative. "
+        f"*Plain*: a change of {100 * PLAIN_CHANGE:.0f} % or more.",
+        "* *Oracle log evidence*: of the true effects, fitted from their true values. The data "
+        f"*support* an effect if it is {ACCEPT:.0f} or more, the threshold of the tool.",
+        "* *Misfit*: relative, of the whole data, if not held out. *Calibrated*: the least that "
+        "calibration reaches without an effect. *Absorbed*: 1 - calibrated/nominal. *Corrected*: "
+        "with the effects of the verdict.",
+        "* *Floor*: misfit that the error of the nominal flow ripple makes. A misfit is *at the "
+        f"floor* up to {summary.FLOOR_FACTOR} times it.",
+        "",
     ]
+
+
+def _methods(rows: list[dict]) -> list[str]:
+    return [
+        *_table(("method", "no effect: alarm", "plain single effects: effect or its class named",
+                 "outside the library: given a name"),
+                [tuple(map(str, method)) for method in summary.method_table(rows)]),
+        "Calibration alone names no effect; its alarm is a calibrated misfit above 5 %.",
+        "",
+    ]  # fmt: skip
+
+
+def _probabilities(rows: list[dict]) -> list[str]:
+    return [
+        *_table(("stated", "mean stated", "right"),
+                [(_span(b.low, b.high), f"{b.mean:.3f}", str(b.right))
+                 for b in summary.reliability_table(rows)]),
+        f"Brier score {summary.brier_score(rows):.3f}.",
+        "",
+        "![probabilities](figures/probabilities.png)",
+        "",
+    ]  # fmt: skip
 
 
 def _misfits(rows: list[dict]) -> list[str]:
     def median(name: str, kinds: tuple[str, ...]) -> str:
         values = [row[name] for row in rows if row["kind"] in kinds]
-        return f"{np.nanmedian(values):.2%}" if np.any(np.isfinite(values)) else "-"
+        return _percent(np.nanmedian(values), 2) if np.any(np.isfinite(values)) else "-"
 
-    names = ("misfit_nominal", "misfit_calibrated", "swallowed", "misfit_corrected")
-    names += ("held_out_before", "held_out_after")
-    groups = {
-        "no effect": ("none", "off"),
-        "single effects": ("single", "indistinguishable"),
-        "pairs": ("pair",),
-        "outside the library": ("outside",),
-    }
+    columns = {
+        "misfit_nominal": "nominal", "misfit_calibrated": "calibrated", "absorbed": "absorbed",
+        "misfit_corrected": "corrected", "held_out_calibrated": "held out, calibrated",
+        "held_out_corrected": "held out, corrected", "floor": "floor",
+    }  # fmt: skip
     return [
-        "Medians. Swallowed: 1 - (misfit after calibration)/(misfit with nominal values).",
+        "Medians over the cases.",
         "",
+        *_table(("cases", *columns.values()),
+                [(group, *(median(name, kinds) for name in columns))
+                 for group, kinds in GROUPS.items()]),
+        "![misfits](figures/misfit.png)",
+        "",
+    ]  # fmt: skip
+
+
+def _failures(rows: list[dict]) -> list[str]:
+    failed = [(row, what) for row in rows if (what := failure(row)) is not None]
+    if not failed:
+        return ["None.", ""]
+    return [
         *_table(
-            ("cases", "nominal", "calibrated", "swallowed", "corrected", "held out, calibrated",
-             "held out, corrected"),
-            [(g, *(median(name, kinds) for name in names)) for g, kinds in groups.items()],
+            ("case", "failure", "true effects", "named", "change", "oracle log evidence",
+             "cause by the data", "held out, corrected", "floor", "points", "sensors",
+             "noise, Pa"),
+            [
+                (
+                    str(row["case"]), what, row["effects"] or "-", row["named"] or "-",
+                    _percent(row['change'], 1), _log_evidence(row), circumstance(row),
+                    _percent(row['held_out_corrected'], 2), _percent(row['floor'], 2),
+                    str(row["points"]), str(row["sensors"]), f"{row['noise']:.0f}",
+                )
+                for row, what in failed
+            ],
         ),
+        "The verdicts' sentences:",
+        "",
+        *(f"* **Case {row['case']}** (`{row['verdict']}`): {row['sentence']}" for row, _ in failed),
+        "",
     ]  # fmt: skip
 
 
 def _cases(rows: list[dict]) -> list[str]:
     return _table(
-        ("case", "kind", "truth", "change", "worth", "nominal", "calibrated", "swallowed",
-         "corrected", "verdict", "said"),
+        ("case", "kind", "true effects", "change", "oracle log evidence", "verdict", "named",
+         "failure", "nominal", "calibrated", "absorbed", "corrected", "held out, corrected",
+         "floor"),
         [
             (
-                str(row["case"]), row["kind"], row["effects"] or "-", f"{row['change']:.1%}",
-                _worth(row), f"{row['misfit_nominal']:.1%}", f"{row['misfit_calibrated']:.2%}",
-                f"{row['swallowed']:.0%}", f"{row['misfit_corrected']:.2%}", row["verdict"],
-                row["said"] or "-",
+                str(row["case"]), row["kind"], row["effects"] or "-", _percent(row['change'], 1),
+                _log_evidence(row), row["verdict"], row["named"] or "-", failure(row) or "-",
+                _percent(row['misfit_nominal'], 1), _percent(row['misfit_calibrated'], 2),
+                _percent(row['absorbed'], 0), _percent(row['misfit_corrected'], 2),
+                _percent(row['held_out_corrected'], 2), _percent(row['floor'], 2),
             )
             for row in rows
         ],
     )  # fmt: skip
 
 
-def _failures(rows: list[dict]) -> list[str]:
-    lines = []
-    for row in rows:
-        what = summary.failed(row)
-        if what is not None:
-            lines += [
-                f"* **Case {row['case']}: {what}.** True: {row['effects'] or 'no effect'} "
-                f"(change {row['change']:.1%}, worth {_worth(row)}, {row['points']} points, "
-                f"{row['sensors']} sensors, noise {row['noise']:.0f} Pa). "
-                f"It said ({row['verdict']}): {row['sentence']}"
-            ]
-    return [*(lines or ["None."]), ""]
+def _numerics(rows: list[dict], checks: list[dict]) -> list[str]:
+    refined = [
+        {"truth": f"finer meshes, case {row['case']}"} | row["mesh"]
+        for row in rows
+        if row["mesh"] is not None
+    ]
+    return _table(
+        ("checked against", "error, Pa rms", "allowed, Pa rms"),
+        [(c["truth"], f"{c['error']:.0f}", f"{c['allowed']:.0f}") for c in [*checks, *refined]],
+    )
 
 
-def _worth(row: dict) -> str:
-    return "-" if row["worth"] is None else f"{row['worth']:.0f}"
+def _log_evidence(row: dict) -> str:
+    value = row["oracle_log_evidence"]
+    return "-" if value is None else f"{value:.0f}"
 
 
-def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:
+def _percent(share: float, digits: int) -> str:
+    return f"{100 * share:.{digits}f} %"
+
+
+def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> list[str]:
     lines = [head, ("---",) * len(head), *rows]
     return ["| " + " | ".join(cells) + " |" for cells in lines] + [""]
 
 
 def _span(low: float, high: float) -> str:
-    return f"{low:.0%} to {high:.0%}" if np.isfinite(high) else f"over {low:.0%}"
+    return (
+        f"{100 * low:.0f} to {100 * high:.0f} %" if np.isfinite(high) else f"over {100 * low:.0f} %"
+    )

@@ -1,119 +1,150 @@
-"""One case scored: what the tool said beside what was true."""
+"""Scoring of one case: the tool's verdict against the truth."""
 
 from collections.abc import Sequence
 
-SILENT = ("consistent", "calibration_only")
-PLAIN = 0.05
-"""Relative change of the ripple from which a single effect must be found: above the 1 to 4 % by
-which the nominal flow ripple is wrong."""
+import numpy as np
+from scipy.optimize import linear_sum_assignment
 
-ROOM = 0.01
-"""Of the line's length, added to either end of a position's interval: what lengths are known to."""
+SILENT_VERDICTS = ("consistent", "calibration_only")
+PLAIN_CHANGE = 0.05
+"""Relative change of the ripple from which an effect counts as plain: above the 1 to 4 % by which
+the nominal flow ripple is wrong."""
 
-GOOD_FIT = 0.05
-"""Relative misfit up to which one who only recalibrates is content."""
+POSITION_TOLERANCE = 0.01
+"""Of the line's length, added to both ends of a position's interval: lengths are known to that."""
+
+ACCEPTABLE_MISFIT = 0.05
+"""Relative misfit above which calibration alone raises the alarm."""
 
 
-def score(truth: dict, verdict: dict, baselines: dict, worth: float | None = None) -> dict:
-    """A flat row of one case; the keys are those of docs/concealed.md.
+def score_case(
+    truth: dict, verdict: dict, baselines: dict, oracle_log_evidence: float | None = None
+) -> dict:
+    """A flat row of one case.
 
-    `truth` is what the seal held, `verdict` verdict.json, `baselines` what concealed.tool wrote,
-    `worth` what concealed.oracle found.
+    Arguments: `truth` is the content of the seal, `verdict` that of verdict.json, `baselines` the
+    result of `concealed.tool`, `oracle_log_evidence` that of `concealed.oracle`.
+
+    Keys of the row:
+        kind, effects, change, noise, points, sensors, floor   from the truth; `effects` as text
+        plain            change >= PLAIN_CHANGE
+        mesh             estimated error of the recording's numerics, None for a linear line
+        oracle_log_evidence
+        verdict, named, sentence   from the verdict; `named` are its effects as text
+        alarm            the verdict is not one of SILENT_VERDICTS
+        effects_found    number of true effects that are named
+        right            every true effect is named, and there is one
+        wrong            named effects that count for no true effect, as text
+        places_right     for each found effect, whether its place is right
+        where_right      whether the verdict's `where` is the place of a true effect
+        intervals_hold   for each interval of a right effect, whether it holds the true value
+        probabilities    pairs (stated probability, right) of the named effects that state one
+        log_evidence     of each named effect, None where the verdict gives none
+        misfit_nominal   relative, of the whole data, with nominal values
+        misfit_calibrated, misfit_corrected   the same before and after, as the verdict states it
+        absorbed         1 - misfit_calibrated/misfit_nominal, the share that calibration absorbs
+        held_out_calibrated, held_out_corrected   the verdict's, of data that were left out
+        line_errors      {"calibrated", "corrected"}: see `line_errors`
+        baselines        {"bic", "sparse", "recalibrate"}: see `score_baseline`
+        seconds          run time of the tool
     """
-    true = truth["effects"]
-    said = claims(verdict)
-    classes = [set(names) for names in verdict["equivalents"] + truth["classes"]]
-    hits = [hit(effect, said, classes) for effect in true]
-    wrong = [
-        claim["name"]
-        for claim in said
-        if not any(alike(claim["name"], effect["name"], classes) for effect in true)
-    ]
-    loud = verdict["verdict"] not in SILENT
-    evidence = {each["effect"]: each["evidence"] for each in verdict["without"]}
-    before, after = baselines["nominal"], baselines["calibrated"]
+    true, named = truth["effects"], named_effects(verdict)
+    classes = [set(names) for names in [*verdict["equivalents"], *truth["classes"]]]
+    claims = assign_claims(true, named, classes)
+    found = [(effect, claim) for effect, claim in zip(true, claims) if claim is not None]
+    right = [any(claim is each for each in claims) for claim in named]
+    wrong = [claim["name"] for claim, ok in zip(named, right) if not ok]
+    log_evidence = {each["effect"]: each["evidence"] for each in verdict["without"]}
+    fit = verdict["fit"]
+    nominal, calibrated = baselines["nominal"], fit["before"]["in_sample"]
     return {
         "kind": truth["kind"],
         "effects": " + ".join(effect["name"] for effect in true),
         "change": truth["change"],
         "noise": truth["noise"],
-        "numerics": truth["mesh"],
         "points": truth["points"],
         "sensors": truth["sensors"],
-        "plain": truth["change"] >= PLAIN,
-        "worth": worth,
-        "verdict": verdict["verdict"],
-        "said": " + ".join(f"{claim['name']} ({claim['element']})" for claim in said),
-        "alarm": loud,
-        "found": sum(h is not None for h in hits),
-        "wrong": " + ".join(wrong),
-        "right": bool(true) and hits[0] is not None if len(true) == 1 else all(hits) and bool(true),
-        "clean": not wrong,
-        "in_place": [
-            place_right(effect, h, truth["length"])
-            for effect, h in zip(true, hits, strict=True)
-            if h is not None
-        ],
-        "place": located(true, verdict, truth["length"]),
-        "intervals": [
-            inside
-            for effect, h in zip(true, hits, strict=True)
-            if h is not None
-            for inside in covered(effect, h)
-        ],
-        "stated": [
-            (claim["probability"], not any(claim["name"] == name for name in wrong))
-            for claim in said
-        ],
-        "evidence": [evidence.get(claim["name"]) for claim in said],
-        "misfit_nominal": before,
-        "misfit_calibrated": after,
-        "misfit_corrected": baselines["corrected"],
-        "swallowed": max(0.0, 1.0 - after / before),
-        "held_out_before": verdict["fit"]["before"]["held_out"],
-        "held_out_after": verdict["fit"]["after"]["held_out"],
         "floor": truth["floor"],
-        "bias": {
-            which: bias(truth["segments"], rows) for which, rows in baselines["segments"].items()
+        "plain": truth["change"] >= PLAIN_CHANGE,
+        "mesh": truth["mesh"],
+        "oracle_log_evidence": oracle_log_evidence,
+        "verdict": verdict["verdict"],
+        "named": " + ".join(f"{claim['name']} ({claim['element']})" for claim in named),
+        "sentence": verdict["sentence"],
+        "alarm": verdict["verdict"] not in SILENT_VERDICTS,
+        "effects_found": len(found),
+        "right": bool(true) and len(found) == len(true),
+        "wrong": " + ".join(wrong),
+        "places_right": [is_place_right(*pair, truth["length"]) for pair in found],
+        "where_right": is_where_right(true, verdict, truth["length"]),
+        "intervals_hold": [inside for pair in found for inside in intervals_hold(*pair)],
+        "probabilities": [
+            (claim["probability"], ok)
+            for claim, ok in zip(named, right)
+            if claim.get("probability") is not None
+        ],
+        "log_evidence": [log_evidence.get(claim["name"]) for claim in named],
+        "misfit_nominal": nominal,
+        "misfit_calibrated": calibrated,
+        "misfit_corrected": fit["after"]["in_sample"],
+        "absorbed": max(0.0, 1.0 - calibrated / nominal),
+        "held_out_calibrated": fit["before"]["held_out"],
+        "held_out_corrected": fit["after"]["held_out"],
+        "line_errors": {
+            which: line_errors(truth["segments"], rows)
+            for which, rows in baselines["segments"].items()
         },
         "baselines": {
-            "bic": simple(true, baselines["bic"], truth["classes"]),
-            "sparse": simple(true, baselines["sparse"], truth["classes"]),
-            "recalibrate": {"alarm": after > GOOD_FIT, "right": False, "place": False, "said": ""},
+            "bic": score_baseline(true, baselines["bic"], truth["classes"]),
+            "sparse": score_baseline(true, baselines["sparse"], truth["classes"]),
+            "recalibrate": score_baseline(true, None, truth["classes"])
+            | {"alarm": calibrated > ACCEPTABLE_MISFIT},
         },
         "seconds": baselines["seconds"],
-        "sentence": verdict["sentence"],
     }
 
 
-def claims(verdict: dict) -> list[dict]:
-    """The effects that a verdict names; none where it says that it has no name."""
+def named_effects(verdict: dict) -> list[dict]:
+    """The effects that a verdict names; none unless it is `named` or `ambiguous`."""
     return verdict["effects"] if verdict["verdict"] in ("named", "ambiguous") else []
 
 
-def alike(name: str, other: str, classes: Sequence[set]) -> bool:
-    """Whether two names are the same, or of one stated class."""
+def same_or_equivalent(name: str, other: str, classes: Sequence[set]) -> bool:
+    """Whether two names are equal or in one class of effects that cannot be told apart."""
     return name == other or any({name, other} <= names for names in classes)
 
 
-def hit(effect: dict, said: list[dict], classes: Sequence[set]) -> dict | None:
-    """The claim that names a true effect: by its own name sooner than by one of its class."""
-    near = [claim for claim in said if alike(claim["name"], effect["name"], classes)]
-    near.sort(
-        key=lambda claim: (claim["name"] != effect["name"], claim["element"] != effect["element"])
-    )
-    return near[0] if near else None
+def assign_claims(
+    true: Sequence[dict], named: Sequence[dict], classes: Sequence[set]
+) -> list[dict | None]:
+    """For each true effect the named effect that counts for it, or None.
+
+    A named effect counts for one true effect at most, also where its class holds two. The
+    assignment finds as many true effects as possible; among those the most by their own names, and
+    then the most at their own elements.
+    """
+    gain = np.zeros((len(true), len(named)))
+    for k, effect in enumerate(true):
+        for n, claim in enumerate(named):
+            if same_or_equivalent(claim["name"], effect["name"], classes):
+                same_name = claim["name"] == effect["name"]
+                gain[k, n] = 1e4 + 1e2 * same_name + (claim["element"] == effect["element"])
+    assigned = [None] * len(true)
+    for k, n in zip(*linear_sum_assignment(gain, maximize=True)):
+        if gain[k, n] > 0:
+            assigned[k] = named[n]
+    return assigned
 
 
-def place_right(effect: dict, claim: dict, length: float) -> bool:
+def is_place_right(effect: dict, claim: dict, length: float) -> bool:
     """Whether a claim's element is the true one, or its position's interval holds the true one."""
     position = claim["parameters"].get("position")
     if effect["position"] is not None and position is not None:
-        return _holds(effect, position["ci95"], length)
+        return _holds_position(effect, position["ci95"], length)
     return claim["element"] == effect["element"]
 
 
-def located(true: list[dict], verdict: dict, length: float) -> bool:
+def is_where_right(true: list[dict], verdict: dict, length: float) -> bool:
     """Whether the verdict's `where` is the place of any true effect."""
     where = verdict["mismatch"]["where"]
     if where is None:
@@ -123,22 +154,27 @@ def located(true: list[dict], verdict: dict, length: float) -> bool:
             if where["element"] == effect["element"]:
                 return True
         elif where["element"] == f"segment {effect['segment']}" or (
-            where["element"].startswith("between") and _holds(effect, where["position_m"], length)
+            where["element"].startswith("between")
+            and _holds_position(effect, where["position_m"], length)
         ):
             return True
     return False
 
 
-def _holds(effect: dict, interval: Sequence[float], length: float) -> bool:
-    """In true metres or as on the drawing: the calibrated line is somewhere between."""
-    low, high = interval[0] - ROOM * length, interval[1] + ROOM * length
+def _holds_position(effect: dict, interval: Sequence[float], length: float) -> bool:
+    """Whether the widened interval holds the position, in true metres or as on the drawing.
+
+    The calibrated line's metres are between the two.
+    """
+    low = interval[0] - POSITION_TOLERANCE * length
+    high = interval[1] + POSITION_TOLERANCE * length
     return low <= effect["position"] <= high or low <= effect["position_nominal"] <= high
 
 
-def covered(effect: dict, claim: dict) -> list[bool]:
-    """Whether each 95 % interval of a rightly named effect holds the true value.
+def intervals_hold(effect: dict, claim: dict) -> list[bool]:
+    """Whether each 95 % interval of a claim by the effect's own name holds the true value.
 
-    Positions are left to `place_right`: they are known to the length's tolerance only.
+    Positions are left to `is_place_right`: they are known to the lengths' tolerance only.
     """
     if claim["name"] != effect["name"]:
         return []
@@ -149,10 +185,9 @@ def covered(effect: dict, claim: dict) -> list[bool]:
     ]
 
 
-def bias(true: list[dict], rows: list[dict]) -> list[dict]:
-    """Relative error and error in stated standard deviations of each delay and impedance.
-
-    Empty where `rows` is: the tool gave no twin.
+def line_errors(true: list[dict], rows: list[dict]) -> list[dict]:
+    """Errors of each segment's delay and impedance: `relative`, and `z` in stated standard
+    deviations. Empty where `rows` is: the tool gave no twin.
     """
     if not rows:
         return []
@@ -167,15 +202,19 @@ def bias(true: list[dict], rows: list[dict]) -> list[dict]:
     ]
 
 
-def simple(true: list[dict], picked: dict | None, classes: list[list[str]]) -> dict:
-    """A baseline that names one effect or none: alarm, right effect (any true one), right place."""
+def score_baseline(true: list[dict], picked: dict | None, classes: list[list[str]]) -> dict:
+    """Score of a method that picks one effect or none.
+
+    `alarm` whether it picks one, `right` whether that is a true one, `place` whether its element is
+    right too, `named` the pick as text.
+    """
     if picked is None:
-        return {"alarm": False, "right": False, "place": False, "said": ""}
+        return {"alarm": False, "right": False, "place": False, "named": ""}
     sets = [set(names) for names in classes]
-    right = [effect for effect in true if alike(picked["name"], effect["name"], sets)]
+    right = [effect for effect in true if same_or_equivalent(picked["name"], effect["name"], sets)]
     return {
         "alarm": True,
         "right": bool(right),
         "place": any(picked["element"] == effect["element"] for effect in right),
-        "said": f"{picked['name']} ({picked['element']})",
+        "named": f"{picked['name']} ({picked['element']})",
     }

@@ -1,22 +1,24 @@
-"""Rates over all cases, each with its interval, beside what was to be reached."""
+"""Shares and errors over all cases, each share with its confidence interval."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import binomtest
 
 from rippletwin.explanation.thresholds import ACCEPT
 
-CHANGES = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, np.inf)
-NEAR_FLOOR = 1.2
-PROBABILITIES = (0.0, 0.5, 0.8, 0.95, 0.99, 1.0)
+CHANGE_EDGES = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, np.inf)
+PROBABILITY_EDGES = (0.0, 0.5, 0.8, 0.95, 0.99, 1.0)
+FLOOR_FACTOR = 1.2
+"""A held-out misfit up to so many times the floor is as good as the nominal flow ripple allows."""
 
 
 @dataclass(frozen=True)
 class Rate:
-    """`hits` of `count`, with the exact 95 % interval of the share."""
+    """`hits` of `count` cases, with the exact 95 % confidence interval of the share."""
 
     hits: int
     count: int
@@ -27,7 +29,7 @@ class Rate:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """95 %, Clopper and Pearson, Biometrika 26, 1934; (0, 1) of nothing."""
+        """95 % interval of Clopper and Pearson, Biometrika 26, 1934; (0, 1) without a case."""
         if not self.count:
             return 0.0, 1.0
         low, high = binomtest(self.hits, self.count).proportion_ci()
@@ -36,203 +38,202 @@ class Rate:
     def __str__(self) -> str:
         if not self.count:
             return "no case"
-        low, high = self.interval
-        return f"{self.share:.0%} ({self.hits} of {self.count}; {low:.0%} to {high:.0%})"
+        low, high = map(percent, self.interval)
+        return f"{percent(self.share)} % ({low} to {high} %), {self.hits} of {self.count}"
 
 
-def rate(values: Iterable[bool]) -> Rate:
-    """Rate of what is true."""
-    values = list(values)
-    return Rate(sum(map(bool, values)), len(values))
+def percent(share: float) -> str:
+    """A share as a number of per cent: two digits, without any where it is 0 or 1."""
+    return f"{100 * share:.1f}" if 0 < share < 0.0995 else f"{100 * share:.0f}"
 
 
-def scores(rows: list[dict]) -> list[tuple[str, str, Rate]]:
-    """(what, target, rate) of each score of the tool."""
+def rate_of(outcomes: Iterable[bool]) -> Rate:
+    """Rate of the true outcomes."""
+    outcomes = list(outcomes)
+    return Rate(sum(map(bool, outcomes)), len(outcomes))
 
-    def of(*kinds: str, where: Callable[[dict], bool] = lambda row: True) -> list[dict]:
+
+class Score(NamedTuple):
+    """One line of the main table; `target` is text, empty where none was set."""
+
+    what: str
+    target: str
+    rate: Rate
+
+
+def score_table(rows: list[dict]) -> list[Score]:
+    """The main table over the rows of `concealed.score.score_case`."""
+
+    def cases(*kinds: str, where: Callable[[dict], bool] = lambda row: True) -> list[dict]:
         return [row for row in rows if row["kind"] in kinds and where(row)]
 
     def plain(row: dict) -> bool:
         return row["plain"]
 
-    singles, pairs = of("single", where=plain), of("pair")
-    twins, outside = of("indistinguishable"), of("outside")
-    loud = of("outside", where=plain)
-    placed = {
-        n: [p for row in of("single", where=plain) if row["sensors"] == n for p in row["in_place"]]
-        for n in (2, 3)
-    }
-    deviations = [b["z"] for row in rows for b in row["bias"]["corrected"]]
+    def places_right(sensors: int) -> Rate:
+        return rate_of(
+            right for row in singles if row["sensors"] == sensors for right in row["places_right"]
+        )
+
+    singles, pairs = cases("single", where=plain), cases("pair")
+    outside = cases("outside")
+    named_rightly = [row for row in rows if row["right"] and not row["wrong"]]
+    deviations = [error["z"] for row in rows for error in row["line_errors"]["corrected"]]
     return [
-        ("False alarms, nominal values within tolerance", "at most 2 %", _alarms(of("none"))),
-        ("False alarms, nominal values 2 to 3 deviations off", "at most 2 %", _alarms(of("off"))),
-        ("Plain single effects: alarm", "", _alarms(singles)),
-        (
-            "Plain single effects: right effect or class named",
-            "at least 90 %",
-            rate(row["right"] for row in singles),
-        ),
-        (
-            "... and nothing wrong beside it",
-            "",
-            rate(row["right"] and row["clean"] for row in singles),
-        ),
-        (
-            f"Of these, worth {ACCEPT:.0f} of log evidence to one who knows: right effect",
-            "at least 90 %",
-            rate(row["right"] for row in singles if held(row)),
-        ),
-        ("Rightly named, two sensors: right place", "at least 75 %", rate(placed[2])),
-        ("Rightly named, three sensors: right place", "at least 95 %", rate(placed[3])),
-        ("All single effects: right effect", "", rate(row["right"] for row in of("single"))),
-        (
-            "Pairs: at least one right, none wrong",
-            "at least 85 %",
-            rate(row["found"] > 0 and row["clean"] for row in pairs),
-        ),
-        ("Pairs: both right", "at least 65 %", rate(row["found"] == 2 for row in pairs)),
-        (
-            "Plain effects outside the library: unexplained",
-            "at least 90 %",
-            rate(row["verdict"] == "unexplained" for row in loud),
-        ),
-        (
-            "All effects outside the library: misnamed",
-            "at most 5 %",
-            rate(bool(row["said"]) for row in outside),
-        ),
-        (
-            "Declared indistinguishable: class or right name",
-            "",
-            rate(row["right"] and row["clean"] for row in twins),
-        ),
-        (
-            "95 % intervals that hold the true value",
-            "92 to 97 %",
-            rate(i for row in rows for i in row["intervals"]),
-        ),
-        (
-            "Rightly named: held-out misfit within 1.2 times the floor",
-            "",
-            rate(
-                row["held_out_after"] <= NEAR_FLOOR * row["floor"]
-                for row in rows
-                if row["right"] and row["clean"]
-            ),
-        ),
-        (
-            "Delays and impedances within two deviations, corrected",
-            "at least 95 %",
-            rate(abs(z) < 2 for z in deviations),
-        ),
-    ]
+        Score("No effect, nominal values within tolerance: alarm", "at most 2 %",
+              _alarms(cases("none"))),
+        Score("No effect, nominal values 2 to 3 standard deviations off: alarm", "at most 2 %",
+              _alarms(cases("off"))),
+        Score("Plain single effects: alarm", "", _alarms(singles)),
+        Score("Plain single effects: effect or its class named", "at least 90 %",
+              rate_of(row["right"] for row in singles)),
+        Score("Plain single effects: the same, and no wrong name beside it", "",
+              rate_of(row["right"] and not row["wrong"] for row in singles)),
+        Score("Plain single effects that the data support: effect or its class named",
+              "at least 90 %",
+              rate_of(row["right"] for row in singles if data_support_effects(row))),
+        Score("Plain single effects rightly named, two sensors: right place", "at least 75 %",
+              places_right(2)),
+        Score("Plain single effects rightly named, three sensors: right place", "at least 95 %",
+              places_right(3)),
+        Score("All single effects, also invisible ones: effect or its class named", "",
+              rate_of(row["right"] for row in cases("single"))),
+        Score("Pairs: at least one effect named, no wrong name", "at least 85 %",
+              rate_of(row["effects_found"] > 0 and not row["wrong"] for row in pairs)),
+        Score("Pairs: both effects named", "at least 65 %",
+              rate_of(row["effects_found"] == 2 for row in pairs)),
+        Score("Plain effects outside the library: verdict `unexplained`", "at least 90 %",
+              rate_of(row["verdict"] == "unexplained" for row in outside if plain(row))),
+        Score("All effects outside the library: given a name", "at most 5 %",
+              rate_of(bool(row["named"]) for row in outside)),
+        Score("Effects declared indistinguishable: class or effect named, no wrong name", "",
+              rate_of(row["right"] and not row["wrong"] for row in cases("indistinguishable"))),
+        Score("95 % intervals of rightly named effects: true value inside", "92 to 97 %",
+              rate_of(inside for row in rows for inside in row["intervals_hold"])),
+        Score("Cases rightly named, no wrong name: held-out misfit at the floor", "",
+              rate_of(at_floor(row) for row in named_rightly)),
+        Score("Delays and impedances, corrected: within two stated standard deviations",
+              "at least 95 %", rate_of(abs(z) < 2 for z in deviations)),
+    ]  # fmt: skip
 
 
-def held(row: dict) -> bool:
-    """Whether the data hold the effect, as far as `concealed.oracle` can tell."""
-    return row["worth"] is None or row["worth"] >= ACCEPT
+def data_support_effects(row: dict) -> bool:
+    """Whether the oracle's log evidence reaches the tool's threshold, or the oracle has none."""
+    return row["oracle_log_evidence"] is None or row["oracle_log_evidence"] >= ACCEPT
 
 
-def _alarms(rows: list[dict]) -> Rate:
-    return rate(row["alarm"] for row in rows)
+def at_floor(row: dict) -> bool:
+    """Whether the corrected twin predicts held-out data as well as the flow ripple allows."""
+    return row["held_out_corrected"] <= FLOOR_FACTOR * row["floor"]
 
 
-def compared(rows: list[dict]) -> list[tuple[str, Rate, Rate, Rate]]:
-    """(method, false alarms, right effect in plain single cases, misnamed outside the library)."""
+def _alarms(rows: Iterable[dict]) -> Rate:
+    return rate_of(row["alarm"] for row in rows)
+
+
+class MethodScore(NamedTuple):
+    """False alarms, plain single effects rightly named, effects outside the library named."""
+
+    method: str
+    false_alarms: Rate
+    right: Rate
+    misnamed: Rate
+
+
+def method_table(rows: list[dict]) -> list[MethodScore]:
+    """The tool beside the simpler methods."""
     free = [row for row in rows if row["kind"] in ("none", "off")]
     singles = [row for row in rows if row["kind"] == "single" and row["plain"]]
     outside = [row for row in rows if row["kind"] == "outside"]
-    table = [
-        (
-            "rippletwin explain",
-            _alarms(free),
-            rate(row["right"] for row in singles),
-            rate(bool(row["said"]) for row in outside),
+
+    def scored(method: str, result: Callable[[dict], dict]) -> MethodScore:
+        return MethodScore(
+            method,
+            rate_of(result(row)["alarm"] for row in free),
+            rate_of(result(row)["right"] for row in singles),
+            rate_of(bool(result(row)["named"]) for row in outside),
         )
+
+    return [
+        scored("`rippletwin explain`", lambda row: row),
+        scored("calibration alone", lambda row: row["baselines"]["recalibrate"]),
+        scored("least BIC of single effects", lambda row: row["baselines"]["bic"]),
+        scored("matching pursuit on the residual", lambda row: row["baselines"]["sparse"]),
     ]
-    for name, title in (
-        ("recalibrate", "recalibrate only"),
-        ("bic", "BIC pick"),
-        ("sparse", "sparse regression on the residual"),
-    ):
-        table.append(
-            (
-                title,
-                rate(row["baselines"][name]["alarm"] for row in free),
-                rate(row["baselines"][name]["right"] for row in singles),
-                rate(bool(row["baselines"][name]["said"]) for row in outside),
-            )
-        )
-    return table
 
 
-def power(rows: list[dict]) -> list[tuple[float, float, Rate, Rate]]:
-    """(from, to, alarm, right effect) of single effects by the change that they make."""
+class PowerBin(NamedTuple):
+    """Single effects whose change of the ripple lies between `low` and `high`."""
+
+    low: float
+    high: float
+    alarm: Rate
+    right: Rate
+
+
+def power_table(rows: list[dict]) -> list[PowerBin]:
+    """Detection and naming of single effects by the change that they make; no empty bins."""
     singles = [row for row in rows if row["kind"] in ("single", "indistinguishable")]
     return [
-        (
-            low,
-            high,
-            _alarms(inside),
-            rate(row["right"] for row in inside),
-        )
-        for low, high in pairwise(CHANGES)
+        PowerBin(low, high, _alarms(inside), rate_of(row["right"] for row in inside))
+        for low, high in pairwise(CHANGE_EDGES)
         if (inside := [row for row in singles if low <= row["change"] < high])
     ]
 
 
-def reliability(rows: list[dict]) -> list[tuple[float, float, float, Rate]]:
-    """(from, to, mean stated probability, right) of the named effects."""
-    stated = [pair for row in rows for pair in row["stated"]]
-    table = []
-    for low, high in pairwise(PROBABILITIES):
-        last = high == 1.0
-        inside = [(p, right) for p, right in stated if low <= p < high or (last and p == 1.0)]
+class ProbabilityBin(NamedTuple):
+    """Named effects whose stated probability lies between `low` and `high`; `mean` is theirs."""
+
+    low: float
+    high: float
+    mean: float
+    right: Rate
+
+
+def reliability_table(rows: list[dict], edges: Iterable[float] = PROBABILITY_EDGES) -> list:
+    """ProbabilityBins between the `edges`, the last of which is inside; no empty bins."""
+    stated = [pair for row in rows for pair in row["probabilities"]]
+    edges, table = list(edges), []
+    for low, high in pairwise(edges):
+        last = high == edges[-1]
+        inside = [(p, right) for p, right in stated if low <= p < high or (last and p == high)]
         if inside:
             mean = float(np.mean([p for p, _ in inside]))
-            table.append((low, high, mean, rate(right for _, right in inside)))
+            table.append(ProbabilityBin(low, high, mean, rate_of(right for _, right in inside)))
     return table
 
 
-def brier(rows: list[dict]) -> float:
+def brier_score(rows: list[dict]) -> float:
     """Mean square of stated probability less outcome (Brier, Mon. Weather Rev. 78, 1950)."""
-    stated = [pair for row in rows for pair in row["stated"]]
+    stated = [pair for row in rows for pair in row["probabilities"]]
     return float(np.mean([(p - right) ** 2 for p, right in stated])) if stated else float("nan")
 
 
-def biases(rows: list[dict]) -> list[tuple[str, str, float, float, Rate]]:
-    """(quantity, which, mean relative error, its rms, within two deviations), with an effect."""
+class LineErrors(NamedTuple):
+    """Mean and root mean square of relative errors, and the share within two stated deviations."""
+
+    quantity: str
+    twin: str
+    mean: float
+    rms: float
+    within: Rate
+
+
+def line_error_table(rows: list[dict]) -> list[LineErrors]:
+    """Errors of calibrated and corrected delays and impedances in cases with an effect."""
     table = []
     for quantity in ("delay", "impedance"):
-        for which in ("calibrated", "corrected"):
-            found = [
-                b
+        for twin in ("calibrated", "corrected"):
+            errors = [
+                error
                 for row in rows
                 if row["effects"]
-                for b in row["bias"][which]
-                if b["quantity"] == quantity
+                for error in row["line_errors"][twin]
+                if error["quantity"] == quantity
             ]
-            if found:
-                errors = np.array([b["relative"] for b in found])
-                within = rate(abs(b["z"]) < 2 for b in found)
-                rms = float(np.sqrt(np.mean(errors**2)))
-                table.append((quantity, which, float(errors.mean()), rms, within))
+            if errors:
+                relative = np.array([error["relative"] for error in errors])
+                rms = float(np.sqrt(np.mean(relative**2)))
+                within = rate_of(abs(error["z"]) < 2 for error in errors)
+                table.append(LineErrors(quantity, twin, float(relative.mean()), rms, within))
     return table
-
-
-def failed(row: dict) -> str | None:
-    """In what a case falls short, in words; None where it does not."""
-    kind = row["kind"]
-    if kind in ("none", "off"):
-        return "false alarm" if row["alarm"] else None
-    if kind == "outside":
-        if row["said"]:
-            return "misnamed"
-        return "not noticed" if row["plain"] and not row["alarm"] else None
-    if row["wrong"]:
-        return "wrong name" if not row["found"] else "a wrong name beside a right one"
-    if kind == "pair":
-        return None if row["found"] == 2 else f"{row['found']} of 2 found"
-    if not row["right"]:
-        return ("not noticed" if not row["alarm"] else "not named") if row["plain"] else None
-    return None if all(row["in_place"]) else "wrong place"

@@ -1,7 +1,7 @@
-"""The tool on one case, and what simpler methods make of the same fits; knows nothing of the truth.
+"""The tool on one case, and the results of simpler methods; the truth is unknown to all of them.
 
-`python -m concealed.tool CASE OUT` writes verdict.json and twin.json, the same as `rippletwin
-explain`, and baselines.json.
+`python -m concealed.tool CASE OUT` writes verdict.json and twin.json, as `rippletwin explain` does,
+and baselines.json. It runs in one process: its confinement has no shared memory.
 """
 
 import json
@@ -13,7 +13,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from concealed.sparse import pick
+from concealed.sparse import pick_by_matching_pursuit
+from rippletwin.calibration.calibrate import align
 from rippletwin.calibration.likelihood import Likelihood
 from rippletwin.calibration.misfit import misfit
 from rippletwin.calibration.report import segment_table
@@ -22,84 +23,76 @@ from rippletwin.explanation.explain import explain
 from rippletwin.explanation.search.stepwise_search import applicable_candidates
 from rippletwin.explanation.verdict.verdict_file import write_verdict
 
-
-def main(case_folder: str, out: str, processes: int = 1) -> None:
-    """Explain one case and write what was found; a tool that fails has said nothing."""
-    started = time.perf_counter()
-    out = Path(out)
-    try:
-        explanation = explain(load_case(case_folder, states={"healthy"}), processes)
-        write_verdict(explanation, out)
-        seconds = time.perf_counter() - started
-    except Exception as error:  # whatever it is: one case must not end the trial
-        traceback.print_exc()
-        (out / "verdict.json").write_text(json.dumps(crash(error)))
-        seconds, explanation = time.perf_counter() - started, None
-    found = NOTHING if explanation is None else baselines(explanation)
-    (out / "baselines.json").write_text(json.dumps(found | {"seconds": seconds}, indent=1) + "\n")
-
-
-NOTHING = {
+NO_BASELINES = {
     "nominal": float("nan"),
-    "calibrated": float("nan"),
-    "corrected": float("nan"),
     "segments": {"calibrated": [], "corrected": []},
     "bic": None,
     "sparse": None,
 }
+"""The baselines of a case in which the tool failed: they use its fits."""
 
 
-def crash(error: Exception) -> dict:
-    """What stands for the verdict where there is none."""
-    nothing = {"in_sample": float("nan"), "held_out": float("nan")}
+def main(case_folder: str, out: str) -> None:
+    """Explain one case and write the results; an error of the tool gives the verdict `crashed`."""
+    started = time.perf_counter()
+    out = Path(out)
+    try:
+        explanation = explain(load_case(case_folder, states={"healthy"}), processes=1)
+        write_verdict(explanation, out)
+        seconds = time.perf_counter() - started
+    except Exception as error:  # any error: one case must not end the trial
+        traceback.print_exc()
+        (out / "verdict.json").write_text(json.dumps(crash_verdict(error)))
+        seconds, explanation = time.perf_counter() - started, None
+    results = NO_BASELINES if explanation is None else compute_baselines(explanation)
+    (out / "baselines.json").write_text(json.dumps(results | {"seconds": seconds}, indent=1) + "\n")
+
+
+def crash_verdict(error: Exception) -> dict:
+    """The verdict of a tool that ended with an error: the keys that scoring reads."""
+    unknown = {"in_sample": float("nan"), "held_out": float("nan")}
     return {
         "verdict": "crashed",
         "mismatch": {"present": None, "where": None},
         "effects": [],
         "equivalents": [],
-        "fit": {"before": nothing, "after": nothing},
+        "fit": {"before": unknown, "after": unknown},
         "without": [],
         "sentence": f"It ended with an error: {error!r}",
     }
 
 
-def baselines(explanation) -> dict:
-    """What recalibration, BIC and a sparse regression on the residual say of an Explanation.
+def compute_baselines(explanation) -> dict:
+    """Results of simpler methods on the data and the fits of an Explanation.
 
-    nominal, calibrated, corrected   relative misfits of the whole data: with nominal values (the
-        shaft angle and nothing else fitted), recalibrated, and with what was accepted
-    segments   delay and impedance of each segment with standard deviations, recalibrated
-        ("calibrated") and with what was accepted ("corrected")
-    bic        name and element of the effect that the Bayesian information criterion picks, or None
-    sparse     the same of the regression
+    nominal    relative misfit of the whole data with nominal values; of each recording only the
+               shaft angle is fitted
+    segments   delay and impedance of each segment with standard deviations, from the calibration
+               without effects ("calibrated") and from the explanation ("corrected")
+    bic        name and element of the effect that `pick_by_bic` picks, or None
+    sparse     the same of `pick_by_matching_pursuit`
     """
     base, accepted = explanation.search.base, explanation.judgement.accepted
     observations = list(explanation.observations)
     likelihood = Likelihood(base.twin.with_(theta=np.zeros_like(base.twin.theta)), observations)
+    nominal = align(likelihood, np.zeros(len(likelihood.twin.parameters)))
+    candidates = applicable_candidates(explanation.rig, observations)
     return {
-        "nominal": misfit(likelihood, turned(likelihood)).relative,
-        "calibrated": misfit(likelihood, base.twin.theta).relative,
-        "corrected": explanation.validation.after["in_sample"].misfit,
+        "nominal": misfit(likelihood, nominal).relative,
         "segments": {
-            "calibrated": segment_table(_as_calibration(base)),
-            "corrected": segment_table(_as_calibration(accepted)),
+            "calibrated": _segments(base),
+            "corrected": _segments(accepted),
         },
-        "bic": bic(explanation),
-        "sparse": pick(base, applicable_candidates(explanation.rig, observations), observations),
+        "bic": pick_by_bic(explanation),
+        "sparse": pick_by_matching_pursuit(base, candidates, observations),
     }
 
 
-def turned(likelihood: Likelihood) -> np.ndarray:
-    """Nominal coordinates with each recording's shaft angle where the prediction fits best."""
-    from rippletwin.calibration.calibrate import align
+def pick_by_bic(explanation) -> dict | None:
+    """`name` and `element` of the single effect with the least k ln n - 2 ln L, or None.
 
-    return align(likelihood, np.zeros(len(likelihood.twin.parameters)))
-
-
-def bic(explanation) -> dict | None:
-    """The single effect, or none, with the least k ln n - 2 ln L (Schwarz, Ann. Statist. 6, 1978).
-
-    Of the explanation's own fits, at their posterior modes; n counts real numbers measured.
+    L is the likelihood at the posterior modes of the explanation's own fits, k the number of
+    parameters, n that of real numbers measured (Schwarz, Ann. Statist. 6, 1978).
     """
     count = sum(2 * o.values.size for o in explanation.observations)
 
@@ -115,9 +108,9 @@ def bic(explanation) -> dict | None:
     return {"name": effect.name, "element": place.element}
 
 
-def _as_calibration(fit) -> SimpleNamespace:
-    return SimpleNamespace(twin=fit.twin, covariance=fit.covariance)
+def _segments(fit) -> list[dict]:
+    return segment_table(SimpleNamespace(twin=fit.twin, covariance=fit.covariance))
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:3], *map(int, sys.argv[3:4]))
+    main(*sys.argv[1:3])

@@ -1,5 +1,6 @@
 """The confinement of the tool: what it can open and what it cannot."""
 
+import ast
 import os
 import subprocess
 import sys
@@ -77,6 +78,18 @@ def run_confined(program, *arguments, read=(), write=(), **environment):
     command = [sys.executable, "-m", "concealed.jail", *paths, "--"]
     command += [sys.executable, "-c", program, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, env=os.environ | environment)
+
+
+def test_what_runs_the_tool_does_not_import_the_rig():
+    """No file of the package `concealed` imports `virtualrig`: only the workflow's scripts know
+    both."""
+    for file in (SOURCE / "concealed").glob("*.py"):
+        nodes = list(ast.walk(ast.parse(file.read_text())))
+        names = [
+            alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names
+        ]
+        names += [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
+        assert not any(name.split(".")[0] == "virtualrig" for name in names), file
 
 
 def test_the_truth_cannot_be_read(tmp_path):

@@ -101,30 +101,30 @@ rule commit_verdicts:
         "../scripts/commit_verdicts.py"
 
 
-rule worth_concealed:
+rule oracle_concealed:
     input:
         commitments=rules.commit_verdicts.output,
         case=rules.conceal.output.case,
         seal=rules.conceal.output.seal,
         key=rules.conceal.output.key,
-        source=library("worth_concealed.py"),
+        source=library("oracle_concealed.py"),
     output:
-        f"{CONCEALED}/worth/{{hidden}}.json",
+        f"{CONCEALED}/oracle/{{hidden}}.json",
     log:
-        f"{RESULTS}/logs/worth_concealed/{{hidden}}.log",
+        f"{RESULTS}/logs/oracle_concealed/{{hidden}}.log",
     benchmark:
-        f"{RESULTS}/benchmarks/worth_concealed/{{hidden}}.tsv"
+        f"{RESULTS}/benchmarks/oracle_concealed/{{hidden}}.tsv"
     threads: 1
     resources:
         mem_mb=2000,
     script:
-        "../scripts/worth_concealed.py"
+        "../scripts/oracle_concealed.py"
 
 
 rule score_concealed:
     input:
         commitments=rules.commit_verdicts.output,
-        worths=expand(rules.worth_concealed.output, hidden=HIDDEN),
+        oracles=expand(rules.oracle_concealed.output, hidden=HIDDEN),
         seals=expand(rules.conceal.output.seal, hidden=HIDDEN),
         seal_keys=expand(rules.conceal.output.key, hidden=HIDDEN),
         verdicts=expand(rules.explain_concealed.output.verdict, hidden=HIDDEN),

@@ -3,10 +3,10 @@
 import json
 from pathlib import Path
 
-from concealed.commitments import digests
+from concealed.commitments import sha256_of_files
 from job import start
 
 tell = start(snakemake)
 paths = [*snakemake.input.seals, *snakemake.input.verdicts, *snakemake.input.baselines]
-Path(snakemake.output[0]).write_text(json.dumps(digests(paths), indent=1) + "\n")
+Path(snakemake.output[0]).write_text(json.dumps(sha256_of_files(paths), indent=1) + "\n")
 tell(f"{len(paths)} files committed to")

@@ -1,0 +1,40 @@
+"""Cases in which the tool falls short: in what, and what the data say of the cause."""
+
+from concealed.summary import at_floor, data_support_effects
+
+
+def failure(row: dict) -> str | None:
+    """In what a case falls short, in words; None where it does not.
+
+    An effect that is not plain may be missed. A plain effect outside the library must raise the
+    alarm, and no effect outside the library may be given a name.
+    """
+    kind = row["kind"]
+    if kind in ("none", "off"):
+        return "false alarm" if row["alarm"] else None
+    if kind == "outside":
+        if row["named"]:
+            return "misnamed"
+        return "not noticed" if row["plain"] and not row["alarm"] else None
+    if row["wrong"]:
+        return "wrong name beside a right one" if row["effects_found"] else "wrong name"
+    if kind == "pair":
+        return None if row["effects_found"] == 2 else f"{row['effects_found']} of 2 effects named"
+    if not row["right"]:
+        return ("not noticed" if not row["alarm"] else "not named") if row["plain"] else None
+    return None if all(row["places_right"]) else "wrong place"
+
+
+def circumstance(row: dict) -> str:
+    """What the row says of a failure's cause: evidence in the data, and the fit that was reached.
+
+    It separates what no method can find in the data from what the search missed, and a wrong model
+    that predicts as well as the true one from one that does not.
+    """
+    if row["verdict"] == "crashed":
+        return "the tool ended with an error"
+    fit = "held-out misfit at the floor" if at_floor(row) else "held-out misfit above the floor"
+    if row["oracle_log_evidence"] is None:
+        return fit
+    support = "support" if data_support_effects(row) else "do not support"
+    return f"data {support} the true effects; {fit}"
