@@ -1,4 +1,4 @@
-"""Both flow sensors on the paper's line, by band: prints the table of docs/flow_sensor.md.
+"""Both flow sensors on the paper's line, by band: the table of docs/explanation/flow_sensor.md.
 
 The truth is the lumped pump with a worn slipper, its pressure by the twin with the full-amplitude
 orifice; the sensors know the line with a linear one. `python benchmarks/flow_sensor.py`

@@ -1,4 +1,4 @@
-"""Virtual flow sensors against the virtual rig's true outlet flow: tables of docs/flow_sensor.md.
+"""Virtual flow sensors against the virtual rig's true flow (docs/explanation/flow_sensor.md).
 
     python benchmarks/flow_sensor_truth.py FOLDER [--steps 300] [--seconds 3]
 

@@ -1,4 +1,6 @@
-"""What a real line lacks, found on one measurement and shown on another: docs/validation.md.
+"""What a real line lacks, found on one measurement and shown on another.
+
+The table of docs/explanation/validation.md:
 
     python benchmarks/measured_tube.py RUN_1 RUN_2 FOLDER
 

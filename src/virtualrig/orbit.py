@@ -3,7 +3,7 @@
 At constant speed the bench settles into a motion that repeats every revolution. Where the speed
 wanders the bench can march on from there at the speed of each instant, or a recording can be
 composed of a few orbits, which is right where a line forgets faster than its speed changes and
-no resonance is sharper than the wander is wide (docs/virtualrig.md).
+no resonance is sharper than the wander is wide (docs/explanation/virtual_rig.md).
 """
 
 from collections.abc import Callable

@@ -1,6 +1,7 @@
 """The paper's line model against a real measurement: an air-filled tube, open at its end.
 
-The measurements are not part of the project; docs/validation.md says where they come from.
+The measurements are not part of the project; docs/explanation/validation.md says where they come
+from.
 """
 
 from __future__ import annotations

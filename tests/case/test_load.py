@@ -165,12 +165,13 @@ def test_every_key_of_the_schema_is_described():
 
 
 def test_the_example_of_the_documentation_is_valid():
-    """docs/cases.md's complete rig.yaml passes the schema and names every key but the exclusive."""
+    """The complete sheet of docs/reference/rig_yaml.md passes the schema and names every key but
+    the exclusive."""
     import jsonschema
 
     from rippletwin.case.rig_yaml import _Loader
 
-    text = (ROOT / "docs" / "cases.md").read_text()
+    text = (ROOT / "docs" / "reference" / "rig_yaml.md").read_text()
     example = yaml.load(text.split("```yaml")[1].split("```")[0], Loader=_Loader)
     jsonschema.Draft202012Validator(schema()).validate(example)
     properties = schema()["properties"]

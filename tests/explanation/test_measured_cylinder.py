@@ -22,7 +22,7 @@ from rippletwin.twin.twin import Twin
 CYLINDER = MEASURED / "cylinder"
 pytestmark = pytest.mark.skipif(
     not (CYLINDER / "measured_1.txt").exists(),
-    reason="the measured cylinder is not there: docs/validation.md says how to get it",
+    reason="the measured cylinder is not there: docs/explanation/validation.md says how to get it",
 )
 
 SHEET = ROOT / "resources" / "air_tube" / "rig.yaml"

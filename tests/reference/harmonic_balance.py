@@ -74,7 +74,7 @@ def balance_orifice(
     `mean_flow` (m3/s) that it lets through, ripple included. `orders` (F,) are the whole numbers
     that `network.s` is multiples of; by default 1..F. Orders that are not there carry no pressure.
     At most `passes` corrections are made to the linearised orifice's pressure; 1 is enough inside
-    a fit (docs/line.md has the errors).
+    a fit (docs/explanation/line.md has the errors).
 
     Afterwards `network.load` is ("state", (p, q)), so that its answers hold at full amplitude.
     Raises ValueError where not exactly one of K and mean flow is given, the mean drop is not

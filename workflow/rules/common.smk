@@ -36,7 +36,7 @@ if RECORDED_HERE:
 elif Path(RIG).is_file():
     SHEET = yaml.safe_load(Path(RIG).read_text())
 else:
-    raise WorkflowError(f"case: {CASE} has no rig.yaml; see docs/cases.md")
+    raise WorkflowError(f"case: {CASE} has no rig.yaml; see docs/reference/rig_yaml.md")
 
 
 def recordings():

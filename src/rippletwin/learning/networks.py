@@ -1,6 +1,6 @@
 """The ten classifiers of the paper: plain and residual networks on time windows and on images.
 
-Numbers are those of `architectures`; docs/learning.md tells how the paper's tables are
+Numbers are those of `architectures`; docs/explanation/learning.md tells how the paper's tables are
 read where they leave a choice. A time window is convolved as an image of one row: the same
 arithmetic as a 1D convolution, for which the CPU kernels of torch are up to twice as fast in
 channels-last order.
