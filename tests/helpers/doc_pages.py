@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -49,7 +50,8 @@ def blocks_of(page: Path) -> list[Block]:
         elif opened is not None and fence:
             start, language, lines, long = opened
             name = str(page.relative_to(ROOT))
-            found.append(Block(name, start, language, "\n".join(lines) + "\n", long))
+            text = textwrap.dedent("\n".join(lines)) + "\n"
+            found.append(Block(name, start, language, text, long))
             opened = None
         elif opened is not None:
             opened[2].append(line)
