@@ -1,7 +1,7 @@
-"""The virtual test bench's command line: virtualrig record | check | conceal.
+"""Command line of the virtual rig: virtualrig record | check | conceal.
 
-`record` makes a case folder of recordings; `check` tries the numerics and `conceal` makes a case
-whose effect is drawn at random, its truth sealed (docs/concealed.md).
+`record` records a case folder. `check` checks the numerics of concealed cases, and `conceal`
+records a case drawn at random and seals its truth (docs/concealed.md).
 """
 
 import argparse
@@ -15,12 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from virtualrig.conceal import conceal
-from virtualrig.draw import draw, generator
-from virtualrig.exact import checks
+from virtualrig.conceal import record_concealed_case
+from virtualrig.draw import draw_case, random_generator
+from virtualrig.exact import check_numerics
 from virtualrig.folder import (
-    listed,
-    prepare,
+    prepare_folder,
+    recording_entry,
     ripple_name,
     write_recording,
     write_ripple,
@@ -40,7 +40,7 @@ _HEALTHY = tuple(
     for speed, bar in ((1200, 60), (800, 95), (1200, 95), (1000, 60), (1000, 120), (800, 60))
 )
 POINTS = {"full": _STATES + _HEALTHY, "smoke": _STATES + _HEALTHY[:1]}
-"""Operating points: each state at 1000 r/min and 9.5 MPa, the healthy pump at others."""
+"""Operating points: each state at 1000 r/min and 9.5 MPa, the healthy pump at others too."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -115,7 +115,7 @@ def _record(options: argparse.Namespace) -> None:
     unknown = {fault for point in points for fault in point.faults} - set(rig.faults)
     if unknown:
         raise RigError(f"{options.sealed}: field faults: no {', '.join(sorted(unknown))}")
-    prepare(options.out, options.true_flow)
+    prepare_folder(options.out, options.true_flow)
     work = partial(_record_point, options, known, rig)
     pool = ProcessPoolExecutor(options.processes, get_context("fork"))
     try:
@@ -123,7 +123,7 @@ def _record(options: argparse.Namespace) -> None:
             print(f"virtualrig: {number}/{len(points)} {label}", file=sys.stderr, flush=True)
     finally:
         pool.shutdown(cancel_futures=True)
-    entries = [listed(point, options.flow_ripple and not point.faults) for point in points]
+    entries = [recording_entry(point, options.flow_ripple and not point.faults) for point in points]
     write_sheet(options.out, known, entries)
 
 
@@ -139,11 +139,11 @@ def _record_point(options: argparse.Namespace, known: dict, rig: Rig, index: int
 
 
 def _check(options: argparse.Namespace) -> None:
-    found = checks(options.cases, options.commit, options.number)
-    options.out.write_text(json.dumps([vars(check) for check in found], indent=1) + "\n")
-    for check in found:
+    checks = check_numerics(options.cases, options.commit, options.number)
+    options.out.write_text(json.dumps([vars(check) for check in checks], indent=1) + "\n")
+    for check in checks:
         print(f"virtualrig: {check}", file=sys.stderr)
-    wrong = [str(check) for check in found if not check.passed]
+    wrong = [str(check) for check in checks if not check.passed]
     if wrong:
         options.out.unlink()
         raise RigError(f"the numerics are not good enough: {'; '.join(wrong)}")
@@ -156,8 +156,9 @@ def _conceal(options: argparse.Namespace) -> None:
     if not 0 <= options.case < options.cases:
         raise RigError(f"--case {options.case}: there are {options.cases} cases, from 0")
     trial = (options.commit, options.number)
-    drawn = draw(options.cases, *trial, options.case)
-    truth = conceal(drawn, options.out, generator(*trial, "recording", options.case))
+    drawn = draw_case(options.cases, *trial, options.case)
+    rng = random_generator(*trial, "recording", options.case)
+    truth = record_concealed_case(drawn, options.out, rng)
     key = new_key()
     options.seal.write_text(json.dumps(seal(truth, key)) + "\n")
     options.key.write_bytes(key)

@@ -1,112 +1,30 @@
-"""Effects at random places and of random strength, for rigs whose effect is concealed.
+"""Random effects for concealed cases: which arguments they have and what the truth then is.
 
-One short function an effect: it draws the arguments of `virtualrig.effects` and says in the words
-of a verdict what the truth then is. Strengths are log-uniform between two ends,
-the weaker below what any method could see, the stronger plain to the eye.
+Each function draws one effect at a random place. `level`, from 0 to 1, is its strength on a
+logarithmic scale: at 0 no method can see the effect, at 1 it is plain to the eye.
 """
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
-AT_LEAST = 0.2
-"""Metres that a place keeps from joints, ends and other places: short pipes cost small steps."""
+from virtualrig.drawn_effect import DrawnEffect, RigContext, log_between
 
-PASSIVE = 0.9  # of the gain at which a valve begins to feed the line at some frequency
-
-
-@dataclass(frozen=True)
-class Concealed:
-    """An effect as drawn.
-
-    `arguments` are those of the rig's effect; `element` and `parameters` (name -> true value) are
-    in a verdict's words; `position` in m from the pump outlet where the effect sits at one;
-    `level` is where its strength lies between the weak and the strong end, 0 to 1, on a logarithmic
-    scale; None where it has no strength.
-    """
-
-    name: str
-    element: str
-    arguments: dict
-    level: float | None
-    position: float | None = None
-    parameters: dict[str, float] = field(default_factory=dict)
-
-    def to_dict(self) -> dict:
-        return asdict(self)
-
-    @property
-    def entry(self) -> dict:
-        """Its entry in a seal's `effects`."""
-        return {"name": self.name, **self.arguments}
+PASSIVE_SHARE = 0.9  # of the gain at which a valve begins to feed the line at some frequency
 
 
-@dataclass
-class Bare:
-    """What drawing an effect needs to know of the rig it goes into.
-
-    `segments` are the true ones; `modulus` is that by which the rig turns a volume into a
-    compliance, Pa; `flow` (m3/s) and `pressure` (Pa) are means over the operating points; `taken`
-    are the places in use.
-    """
-
-    rng: np.random.Generator
-    segments: list[dict]
-    sensors: int
-    density: float
-    modulus: float
-    flow: float
-    pressure: float
-    taken: list[float] = field(default_factory=list)
-
-    def between(self, weak: float, strong: float, level: float) -> float:
-        return weak * (strong / weak) ** level
-
-    def uniform(self, low: float, high: float) -> float:
-        return float(self.rng.uniform(low, high))
-
-    def log_uniform(self, low: float, high: float) -> float:
-        return float(low * (high / low) ** self.rng.uniform())
-
-    @property
-    def length(self) -> float:
-        return sum(segment["length"] for segment in self.segments)
-
-    def place(self) -> float:
-        """A position on the line, away from what is there."""
-        ends = np.concatenate([[0.0], np.cumsum([s["length"] for s in self.segments])])
-        for _ in range(1000):
-            position = self.uniform(0.0, self.length)
-            if np.abs(np.array([*ends, *self.taken]) - position).min() > AT_LEAST:
-                self.taken.append(position)
-                return position
-        raise RuntimeError("no room on the line")
-
-    def segment_at(self, position: float) -> int:
-        """Index of the segment that holds `position`."""
-        ends = np.cumsum([s["length"] for s in self.segments])
-        return int(min(np.searchsorted(ends, position), len(ends) - 1))
-
-    def stiffness(self, k: int) -> float:
-        """rho a^2 of segment k, Pa."""
-        return self.density * self.segments[k]["wave_speed"] ** 2
-
-    def bore(self, k: int) -> float:
-        """Cube of segment k's diameter over 20 mm: what volumes scale with."""
-        return (self.segments[k]["diameter"] / 0.02) ** 3
+def unsteady_friction(rig: RigContext, level: float) -> DrawnEffect:
+    """Friction of the unsteady velocity profile; without a strength."""
+    return DrawnEffect("unsteady_friction", "line", {}, None)
 
 
-def unsteady_friction(bare: Bare, level: float) -> Concealed:
-    return Concealed("unsteady_friction", "line", {}, None)
-
-
-def viscoelastic_wall(bare: Bare, level: float) -> Concealed:
-    longest = np.array([s["length"] for s in bare.segments])
-    k = int(bare.rng.choice(len(longest), p=longest / longest.sum()))
-    compliance = bare.between(0.01, 0.3, level)
-    time = bare.log_uniform(1e-4, 1e-3)
-    return Concealed(
+def viscoelastic_wall(rig: RigContext, level: float) -> DrawnEffect:
+    """In one segment, drawn in proportion to its length; 1 to 30 % of the compliance."""
+    lengths = np.array([s["length"] for s in rig.segments])
+    k = int(rig.rng.choice(len(lengths), p=lengths / lengths.sum()))
+    compliance = log_between(0.01, 0.3, level)
+    time = rig.log_uniform(1e-4, 1e-3)
+    return DrawnEffect(
         "viscoelastic_wall",
         f"segment {k + 1}",
         {"segment": k + 1, "compliance": compliance, "time": time},
@@ -115,9 +33,10 @@ def viscoelastic_wall(bare: Bare, level: float) -> Concealed:
     )
 
 
-def entrained_air(bare: Bare, level: float) -> Concealed:
-    fraction, exponent = bare.between(3e-4, 3e-2, level), bare.uniform(1.05, 1.35)
-    return Concealed(
+def entrained_air(rig: RigContext, level: float) -> DrawnEffect:
+    """All along the line; 0.03 to 3 % of the volume at atmospheric pressure."""
+    fraction, exponent = log_between(3e-4, 3e-2, level), rig.uniform(1.05, 1.35)
+    return DrawnEffect(
         "entrained_air",
         "line",
         {"fraction": fraction, "exponent": exponent},
@@ -126,11 +45,12 @@ def entrained_air(bare: Bare, level: float) -> Concealed:
     )
 
 
-def side_branch(bare: Bare, level: float) -> Concealed:
-    position = bare.place()
-    segment = bare.segments[bare.segment_at(position)]
-    diameter = segment["diameter"] * bare.between(0.1, 0.9, level)
-    length = bare.log_uniform(0.2, 1.2)
+def side_branch(rig: RigContext, level: float) -> DrawnEffect:
+    """A closed pipe of 10 to 90 % of the diameter and 0.2 to 1.2 m."""
+    position = rig.draw_position()
+    segment = rig.segments[rig.segment_at(position)]
+    diameter = segment["diameter"] * log_between(0.1, 0.9, level)
+    length = rig.log_uniform(0.2, 1.2)
     arguments = {
         "position": position,
         "length": length,
@@ -138,52 +58,54 @@ def side_branch(bare: Bare, level: float) -> Concealed:
         "wave_speed": segment["wave_speed"],
     }
     parameters = {"position": position, "length": length, "diameter": diameter}
-    return Concealed("side_branch", "position", arguments, level, position, parameters)
+    return DrawnEffect("side_branch", "position", arguments, level, position, parameters)
 
 
-def leak(bare: Bare, level: float) -> Concealed:
-    """As a share of the pump's flow; through a gap (laminar) or a hole (square law)."""
-    position, lost = bare.place(), bare.flow * bare.between(0.003, 0.2, level)
-    if bare.rng.uniform() < 0.5:
-        arguments = {"position": position, "conductance": lost / bare.pressure}
-        at_reference = lost / bare.pressure
+def leak(rig: RigContext, level: float) -> DrawnEffect:
+    """0.3 to 20 % of the pump's flow, through a gap (laminar) or a hole (square law)."""
+    position, lost = rig.draw_position(), rig.flow * log_between(0.003, 0.2, level)
+    if rig.rng.uniform() < 0.5:
+        arguments = {"position": position, "conductance": lost / rig.pressure}
+        at_reference = lost / rig.pressure
     else:
-        arguments = {"position": position, "orifice": lost / np.sqrt(bare.pressure)}
+        arguments = {"position": position, "orifice": lost / np.sqrt(rig.pressure)}
         at_reference = 0.5 * arguments["orifice"] / np.sqrt(1e7)
     parameters = {"position": position, "conductance": float(at_reference)}
-    return Concealed("leak", "position", _plain(arguments), level, position, parameters)
+    return DrawnEffect("leak", "position", _plain(arguments), level, position, parameters)
 
 
-def line_volume(bare: Bare, level: float) -> Concealed:
-    position = bare.place()
-    k = bare.segment_at(position)
-    volume = bare.between(2e-6, 2e-4, level) * bare.bore(k)
-    held = {"position": position, "volume": volume * bare.stiffness(k) / bare.modulus}
+def line_volume(rig: RigContext, level: float) -> DrawnEffect:
+    """2 to 200 cm3, scaled by the bore; true is what it holds in the line's liquid and wall."""
+    position = rig.draw_position()
+    k = rig.segment_at(position)
+    volume = log_between(2e-6, 2e-4, level) * rig.volume_scale(k)
+    parameters = {"position": position, "volume": volume * rig.stiffness(k) / rig.modulus}
     arguments = {"position": position, "volume": volume}
-    return Concealed("line_volume", "position", arguments, level, position, held)
+    return DrawnEffect("line_volume", "position", arguments, level, position, parameters)
 
 
-def load_volume(bare: Bare, level: float) -> Concealed:
-    volume = bare.between(2e-6, 2e-4, level) * bare.bore(-1)
-    held = volume * bare.stiffness(-1) / bare.modulus
-    return Concealed("load_volume", "load", {"volume": volume}, level, None, {"volume": held})
+def load_volume(rig: RigContext, level: float) -> DrawnEffect:
+    """2 to 200 cm3, scaled by the bore, at the load."""
+    volume = log_between(2e-6, 2e-4, level) * rig.volume_scale(-1)
+    parameters = {"volume": volume * rig.stiffness(-1) / rig.modulus}
+    return DrawnEffect("load_volume", "load", {"volume": volume}, level, None, parameters)
 
 
-def source_impedance(bare: Bare, level: float) -> Concealed:
-    volume = bare.between(2e-6, 2e-4, level) * bare.bore(0)
-    held = volume * bare.stiffness(0) / bare.modulus
-    return Concealed(
-        "source_impedance", "source", {"volume": volume}, level, None, {"volume": held}
-    )
+def source_impedance(rig: RigContext, level: float) -> DrawnEffect:
+    """2 to 200 cm3, scaled by the bore, at the pump."""
+    volume = log_between(2e-6, 2e-4, level) * rig.volume_scale(0)
+    parameters = {"volume": volume * rig.stiffness(0) / rig.modulus}
+    return DrawnEffect("source_impedance", "source", {"volume": volume}, level, None, parameters)
 
 
-def load_dynamics(bare: Bare, level: float) -> Concealed:
-    gain = bare.between(0.03, 2.0, level)
-    frequency, damping = bare.log_uniform(100.0, 1200.0), bare.log_uniform(0.2, 0.8)
+def load_dynamics(rig: RigContext, level: float) -> DrawnEffect:
+    """A valve of second order that opens with the pressure."""
+    gain = log_between(0.03, 2.0, level)
+    frequency, damping = rig.log_uniform(100.0, 1200.0), rig.log_uniform(0.2, 0.8)
     # A valve that feeds the line may chatter, and nothing is periodic then. The real part of its
     # 1/2 + gain H is least above resonance, by gain/(4 damping (1 + damping)).
-    gain = min(gain, PASSIVE * 2 * damping * (1 + damping))
-    return Concealed(
+    gain = min(gain, PASSIVE_SHARE * 2 * damping * (1 + damping))
+    return DrawnEffect(
         "load_dynamics",
         "load",
         {"gain": gain, "frequency_hz": frequency, "damping": damping},
@@ -193,24 +115,26 @@ def load_dynamics(bare: Bare, level: float) -> Concealed:
     )
 
 
-def piston_spread(bare: Bare, level: float) -> Concealed:
-    bore = bare.between(1e-4, 1e-2, level)
+def piston_spread(rig: RigContext, level: float) -> DrawnEffect:
+    """Bore areas, leakages and angles that differ from piston to piston."""
+    bore = log_between(1e-4, 1e-2, level)
     arguments = {"bore_area": bore, "case_leakage": 20 * bore, "angle_deg": 20 * bore}
-    arguments["seed"] = int(bare.rng.integers(2**31))
-    return Concealed("piston_spread", "source", arguments, level)
+    arguments["seed"] = int(rig.rng.integers(2**31))
+    return DrawnEffect("piston_spread", "source", arguments, level)
 
 
-def speed_fluctuation(bare: Bare, level: float) -> Concealed:
-    """Once a revolution, the twin's form of it."""
-    amplitude = bare.between(1e-4, 1e-2, level)
-    arguments = {"order": 1, "amplitude": amplitude, "phase": bare.uniform(0, 2 * np.pi)}
-    return Concealed("speed_fluctuation", "source", arguments, level)
+def speed_fluctuation(rig: RigContext, level: float) -> DrawnEffect:
+    """Once a revolution: the form that the twin has."""
+    amplitude = log_between(1e-4, 1e-2, level)
+    arguments = {"order": 1, "amplitude": amplitude, "phase": rig.uniform(0, 2 * np.pi)}
+    return DrawnEffect("speed_fluctuation", "source", arguments, level)
 
 
-def sensor_dynamics(bare: Bare, level: float) -> Concealed:
-    frequency, damping = bare.between(30000.0, 1500.0, level), bare.log_uniform(0.05, 0.5)
+def sensor_dynamics(rig: RigContext, level: float) -> DrawnEffect:
+    """A resonance at 30 to 1.5 kHz of one sensor."""
+    frequency, damping = log_between(30000.0, 1500.0, level), rig.log_uniform(0.05, 0.5)
     return _at_sensor(
-        bare,
+        rig,
         "sensor_dynamics",
         level,
         {"frequency_hz": frequency, "damping": damping},
@@ -218,70 +142,78 @@ def sensor_dynamics(bare: Bare, level: float) -> Concealed:
     )
 
 
-def sensor_gain(bare: Bare, level: float) -> Concealed:
-    error = bare.between(0.002, 0.2, level) * bare.rng.choice([-1.0, 1.0])
+def sensor_gain(rig: RigContext, level: float) -> DrawnEffect:
+    """One sensor's gain is wrong by 0.2 to 20 %."""
+    error = log_between(0.002, 0.2, level) * rig.rng.choice([-1.0, 1.0])
     return _at_sensor(
-        bare, "sensor_gain", level, {"gain": float(1 + error)}, {"gain_error": float(error)}
+        rig, "sensor_gain", level, {"gain": float(1 + error)}, {"gain_error": float(error)}
     )
 
 
-def sensor_delay(bare: Bare, level: float) -> Concealed:
-    delay = bare.between(1e-6, 3e-4, level)
-    return _at_sensor(bare, "sensor_delay", level, {"delay": delay}, {"delay": delay})
+def sensor_delay(rig: RigContext, level: float) -> DrawnEffect:
+    """One sensor is late by 1 to 300 us."""
+    delay = log_between(1e-6, 3e-4, level)
+    return _at_sensor(rig, "sensor_delay", level, {"delay": delay}, {"delay": delay})
 
 
-def accumulator(bare: Bare, level: float) -> Concealed:
-    position = bare.place()
+def accumulator(rig: RigContext, level: float) -> DrawnEffect:
+    """Gas of 0.02 to 5 cm3, scaled by the bore, at the mean pressure."""
+    position = rig.draw_position()
     arguments = {
         "position": position,
-        "gas_volume": bare.between(2e-8, 5e-6, level) * bare.bore(bare.segment_at(position)),
-        "gas_pressure": bare.pressure,
+        "gas_volume": log_between(2e-8, 5e-6, level) * rig.volume_scale(rig.segment_at(position)),
+        "gas_pressure": rig.pressure,
     }
-    return Concealed("accumulator", "position", arguments, level, position)
+    return DrawnEffect("accumulator", "position", arguments, level, position)
 
 
-def stiffening_liquid(bare: Bare, level: float) -> Concealed:
-    """About the mean pressure, so that calibration takes up what is the same at every point."""
-    arguments = {"per_pascal": bare.between(1e-9, 5e-8, level), "reference": bare.pressure}
-    return Concealed("stiffening_liquid", "line", arguments, level)
+def stiffening_liquid(rig: RigContext, level: float) -> DrawnEffect:
+    """About the mean pressure: calibration can absorb what all operating points have in common."""
+    arguments = {"per_pascal": log_between(1e-9, 5e-8, level), "reference": rig.pressure}
+    return DrawnEffect("stiffening_liquid", "line", arguments, level)
 
 
-def turbulent_friction(bare: Bare, level: float) -> Concealed:
-    return Concealed(
-        "turbulent_friction", "line", {"factor": bare.between(0.01, 1.0, level)}, level
+def turbulent_friction(rig: RigContext, level: float) -> DrawnEffect:
+    """Darcy factor of 0.01 to 1."""
+    return DrawnEffect(
+        "turbulent_friction", "line", {"factor": log_between(0.01, 1.0, level)}, level
     )
 
 
-def moving_bend(bare: Bare, level: float) -> Concealed:
-    return _side_arm(bare, "moving_bend", level, 40.0, 300.0)
+def moving_bend(rig: RigContext, level: float) -> DrawnEffect:
+    """A side arm that resonates at 40 to 300 Hz."""
+    return _side_arm(rig, "moving_bend", level, 40.0, 300.0)
 
 
-def resonator(bare: Bare, level: float) -> Concealed:
-    return _side_arm(bare, "resonator", level, 200.0, 2000.0)
+def resonator(rig: RigContext, level: float) -> DrawnEffect:
+    """A side arm that resonates at 200 to 2000 Hz."""
+    return _side_arm(rig, "resonator", level, 200.0, 2000.0)
 
 
-def _side_arm(bare: Bare, name: str, level: float, low: float, high: float) -> Concealed:
-    position = bare.place()
-    volume = bare.between(1e-6, 1e-4, level) * bare.bore(bare.segment_at(position))
+def _side_arm(rig: RigContext, name: str, level: float, low: float, high: float) -> DrawnEffect:
+    position = rig.draw_position()
+    volume = log_between(1e-6, 1e-4, level) * rig.volume_scale(rig.segment_at(position))
     arguments = {
         "position": position,
-        "frequency_hz": bare.log_uniform(low, high),
-        "damping": bare.log_uniform(0.02, 0.3),
-        "compliance": volume / bare.modulus,
+        "frequency_hz": rig.log_uniform(low, high),
+        "damping": rig.log_uniform(0.02, 0.3),
+        "compliance": volume / rig.modulus,
     }
-    return Concealed(name, "position", arguments, level, position)
+    return DrawnEffect(name, "position", arguments, level, position)
 
 
-def _at_sensor(bare: Bare, name: str, level: float, arguments: dict, truth: dict) -> Concealed:
-    k = int(bare.rng.integers(bare.sensors)) + 1
-    return Concealed(name, f"sensor p{k}", {"sensor": k, **arguments}, level, None, truth)
+def _at_sensor(
+    rig: RigContext, name: str, level: float, arguments: dict, truth: dict
+) -> DrawnEffect:
+    k = int(rig.rng.integers(rig.sensors)) + 1
+    return DrawnEffect(name, f"sensor p{k}", {"sensor": k, **arguments}, level, None, truth)
 
 
 def _plain(arguments: dict) -> dict:
     return {key: float(value) for key, value in arguments.items()}
 
 
-def _named(*functions: Callable[[Bare, float], Concealed]) -> dict:
+def _named(*functions: Callable[[RigContext, float], DrawnEffect]) -> dict:
     return {function.__name__: function for function in functions}
 
 
@@ -293,20 +225,20 @@ LIBRARY = _named(
 OUTSIDE = _named(accumulator, stiffening_liquid, turbulent_friction, moving_bend, resonator)
 
 
-def at_pump(bare: Bare, level: float) -> tuple[Concealed, list[str]]:
-    """A volume right at the pump: its outlet's or the line's, the equations are the same."""
-    return source_impedance(bare, level), ["line_volume", "source_impedance"]
+def at_pump(rig: RigContext, level: float) -> tuple[DrawnEffect, list[str]]:
+    """A volume at the pump: the equations do not tell the outlet's from the line's."""
+    return source_impedance(rig, level), ["line_volume", "source_impedance"]
 
 
-def at_load(bare: Bare, level: float) -> tuple[Concealed, list[str]]:
-    """A volume right at the load."""
-    return load_volume(bare, level), ["line_volume", "load_volume"]
+def at_load(rig: RigContext, level: float) -> tuple[DrawnEffect, list[str]]:
+    """A volume at the load: the equations do not tell the load's from the line's."""
+    return load_volume(rig, level), ["line_volume", "load_volume"]
 
 
-def of_two_gains(bare: Bare, level: float) -> tuple[Concealed, list[str]]:
-    """One sensor's gain; where the source is uncertain only the ratio of the gains is seen."""
-    return sensor_gain(bare, level), ["sensor_gain"]
+def of_two_gains(rig: RigContext, level: float) -> tuple[DrawnEffect, list[str]]:
+    """One sensor's gain: with an uncertain source only the ratio of the gains can be seen."""
+    return sensor_gain(rig, level), ["sensor_gain"]
 
 
 INDISTINGUISHABLE = (at_pump, at_load, of_two_gains)
-"""Declared before any recording: each draws an effect and names the class that it belongs to."""
+"""Declared before any recording: each draws an effect and states the class that it belongs to."""

@@ -1,4 +1,4 @@
-"""Every concealed effect: what it changes in the draft of a rig. One short function an effect."""
+"""Effects of the virtual rig. Each function changes the draft of a rig."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ from virtualrig.pump import Pump
 
 @dataclass
 class Draft:
-    """A rig being put together. Positions in metres from the pump outlet.
+    """A rig before it is built. Positions are in metres from the pump outlet.
 
     `segments` are keyword arguments of Pipe; `fittings` (position, keyword arguments of Node);
     `branches` (position, keyword arguments of Pipe), dead ends; `sensing` one dict a sensor, of
@@ -30,7 +30,7 @@ class Draft:
         return sum(segment["length"] for segment in self.segments)
 
     def fit(self, position: float, **node: float) -> None:
-        """Put an element at `position`; raises ValueError outside the line."""
+        """Add elements at `position`; raises ValueError outside the line."""
         if not 0 <= position <= self.length:
             raise ValueError(
                 f"position {position} m is outside the line (0 to {self.length:.3f} m)"
@@ -39,6 +39,7 @@ class Draft:
 
 
 def unsteady_friction(draft: Draft) -> None:
+    """Friction of the unsteady laminar velocity profile."""
     draft.friction = "unsteady"
 
 
@@ -95,7 +96,7 @@ def load_dynamics(
 
 
 def source_impedance(draft: Draft, volume: float) -> None:
-    """The pump's outlet volume, m3, which its ports and the line share."""
+    """A volume at the pump's outlet, m3, between its ports and the line."""
     line_volume(draft, 0.0, volume)
 
 
@@ -109,7 +110,7 @@ def piston_spread(
 
 
 def speed_fluctuation(draft: Draft, order: int, amplitude: float, phase: float = 0.0) -> None:
-    """Crank speed swings by `amplitude` (relative) `order` times a revolution."""
+    """The crank's speed varies by `amplitude` (relative) `order` times a revolution."""
     draft.ripple.append((float(order), amplitude, phase))
 
 
@@ -119,11 +120,12 @@ def sensor_dynamics(draft: Draft, sensor: int, frequency_hz: float, damping: flo
 
 
 def sensor_gain(draft: Draft, sensor: int, gain: float) -> None:
+    """Readings of sensor `sensor` are `gain` times the pressure ripple."""
     draft.sensing[sensor - 1]["gain"] = gain
 
 
 def sensor_delay(draft: Draft, sensor: int, delay: float) -> None:
-    """Delay in s."""
+    """Readings of sensor `sensor` are late by `delay` s."""
     draft.sensing[sensor - 1]["delay"] = delay
 
 
@@ -135,9 +137,7 @@ def accumulator(
 
 
 def stiffening_liquid(draft: Draft, per_pascal: float, reference: float) -> None:
-    """rho a^2 grows by `per_pascal` of itself a Pa above `reference` Pa: wave speed with
-    pressure.
-    """
+    """rho a^2 grows with pressure, by `per_pascal` of itself a Pa above `reference` Pa."""
     for segment in draft.segments:
         segment.update(stiffening=per_pascal, reference=reference)
 
@@ -152,8 +152,8 @@ def turbulent_friction(draft: Draft, factor: float) -> None:
 def moving_bend(
     draft: Draft, position: float, frequency_hz: float, damping: float, compliance: float
 ) -> None:
-    """A bend on a spring: pressure moves it, and its motion makes room, `compliance` m3/Pa when
-    slow.
+    """A bend on a spring: pressure moves it, and its motion adds volume, slowly `compliance`
+    m3/Pa.
     """
     resonator(draft, position, frequency_hz, damping, compliance)
 

@@ -1,8 +1,8 @@
-"""The rig's numerics against an exact solution, on the kind of rig that concealed cases are.
+"""Checks of the rig's numerics on rigs drawn like the concealed cases.
 
-For a ripple so small that the load's orifice is a resistance, a line of uniform pipes driven by a
+At a ripple so small that the load's orifice is a resistance, a line of uniform pipes driven by a
 given flow has an exact periodic solution: transfer matrices with laminar friction, steady or
-unsteady (Zielke, J. Basic Eng. 90, 1968). At full ripple there is none; there the mesh is halved.
+unsteady (Zielke, J. Basic Eng. 90, 1968). At the whole ripple a finer mesh is the reference.
 """
 
 from dataclasses import dataclass
@@ -10,31 +10,31 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ive
 
-from virtualrig.draw import Drawn, draw
+from virtualrig.draw import DrawnCase, draw_case
 from virtualrig.orbit import Bench, Orbit
 from virtualrig.resolution import (
-    ALLOWED,
-    NUMERICS,
-    REFINE,
-    SETTLED,
-    built,
-    driving,
-    harmonics,
-    orders,
-    resolved,
-    rms,
-    settled,
+    ALLOWED_ERROR,
+    BASE_NUMERICS,
+    BASE_STEP_DIVISOR,
+    SETTLING_TOLERANCE,
+    build_drawn,
+    choose_mesh,
+    harmonics_of_orbit,
+    rms_of_harmonics,
+    settled_harmonics,
+    shaft_orders,
+    true_flow,
 )
 from virtualrig.rig import Rig
 
-SMALL = 1e-3
-FINER, WIDER = {"points": 9.0, "degree": 8, "modes": 14}, 1.5
-"""Of a finer mesh, and by how much its band of frequencies is wider."""
+SMALL_RIPPLE = 1e-3  # of the whole
+FINER_MESH = {"points": 9.0, "degree": 8, "modes": 14}
+FINER_BAND = 1.5  # of the mesh's highest frequency
 
 
 @dataclass(frozen=True)
 class Check:
-    """Error of one rig's sensors, Pa rms of the whole ripple, against `truth`; `allowed` in Pa."""
+    """Largest error at a rig's sensors against `truth`, and the allowed one, Pa rms."""
 
     truth: str
     error: float
@@ -48,40 +48,43 @@ class Check:
         return f"{self.truth}: {self.error:.1f} Pa rms, allowed {self.allowed:.1f} Pa"
 
 
-def checks(count: int, commit: str, number: int) -> list[Check]:
-    """Three rigs drawn like the cases, but from other random numbers."""
-    rigs = [draw(count, commit, f"{number} numerics", k % count) for k in range(3)]
+def check_numerics(count: int, commit: str, number: int) -> list[Check]:
+    """Checks of three rigs, drawn like the cases from other random numbers."""
+    rigs = [draw_case(count, commit, f"{number} numerics", k % count) for k in range(3)]
     return [
-        against_matrices(rigs[0], "steady"),
-        against_matrices(rigs[1], "unsteady"),
-        against_finer(rigs[2]),
+        check_against_matrices(rigs[0], "steady"),
+        check_against_matrices(rigs[1], "unsteady"),
+        check_against_finer(rigs[2]),
     ]
 
 
-def against_matrices(drawn: Drawn, friction: str) -> Check:
-    """The bare line of a drawn rig at small ripple; the error is scaled to the whole ripple."""
+def check_against_matrices(drawn: DrawnCase, friction: str) -> Check:
+    """The line of a drawn rig, without effects, at small ripple; the error is scaled up.
+
+    `friction` is "steady" or "unsteady".
+    """
     effects = [{"name": "unsteady_friction"}] if friction == "unsteady" else []
-    rig = built(drawn, NUMERICS, effects=effects)
+    rig = build_drawn(drawn, BASE_NUMERICS, effects=effects)
     point = drawn.points[0]
-    flow = driving(rig, point)(point.speed_rpm)
-    small = flow.mean() + SMALL * (flow - flow.mean())
+    flow = true_flow(rig, point)(point.speed_rpm)
+    small = flow.mean() + SMALL_RIPPLE * (flow - flow.mean())
     valve = flow.mean() / np.sqrt(point.load_pressure)
     noise = rig.noise
-    orbit = Bench(rig, flow=small, refine=REFINE).settle(
-        point.speed_rpm, point.load_pressure, valve, SMALL * SETTLED * noise
+    orbit = Bench(rig, flow=small, step_divisor=BASE_STEP_DIVISOR).settle(
+        point.speed_rpm, point.load_pressure, valve, SMALL_RIPPLE * SETTLING_TOLERANCE * noise
     )
-    seen = orders(point.speed_rpm)
+    seen = shaft_orders(point.speed_rpm)
     # harmonics of the straight lines that the bench draws between the samples
     drive = 2 * np.fft.rfft(small)[seen] / len(small) * np.sinc(seen / len(small)) ** 2
     truth = transfer_matrix(rig, drive, seen * point.speed_rpm / 60, orbit, friction)
-    error = rms(harmonics(orbit, seen) - truth) / SMALL
-    return Check(f"exact solution, {friction} friction", float(error.max()), ALLOWED * noise)
+    error = rms_of_harmonics(harmonics_of_orbit(orbit, seen) - truth) / SMALL_RIPPLE
+    return Check(f"exact solution, {friction} friction", float(error.max()), ALLOWED_ERROR * noise)
 
 
 def transfer_matrix(
     rig: Rig, drive: np.ndarray, frequency_hz: np.ndarray, orbit: Orbit, friction: str
 ) -> np.ndarray:
-    """Pressures (sensors, F) of a bare line with flow `drive` (F,) into x = 0 and a linear load."""
+    """Pressures (sensors, F), Pa, of a line with a linear load and flow `drive` (F,) into x = 0."""
     s = 2j * np.pi * frequency_hz
     density, viscosity = rig.network.density, rig.network.viscosity
     load = 0.5 * orbit.valve / np.sqrt(orbit.load_pressure)
@@ -113,10 +116,12 @@ def transfer_matrix(
     )
 
 
-def against_finer(drawn: Drawn) -> Check:
-    """A drawn rig, whatever it conceals, at full ripple on a finer mesh and with smaller steps."""
-    numerics, _ = resolved(drawn)
-    finer = numerics | FINER | {"frequency": WIDER * numerics["frequency"]}
-    point, rig = drawn.points[0], built(drawn, numerics)
-    error = rms(settled(rig, point) - settled(built(drawn, finer), point, 2))
-    return Check("finer mesh, whole ripple", float(error.max()), ALLOWED * rig.noise)
+def check_against_finer(drawn: DrawnCase) -> Check:
+    """A drawn rig with its effects, at the whole ripple, on a finer mesh with shorter steps."""
+    numerics, _ = choose_mesh(drawn)
+    finer = numerics | FINER_MESH | {"frequency": FINER_BAND * numerics["frequency"]}
+    point, rig = drawn.points[0], build_drawn(drawn, numerics)
+    error = rms_of_harmonics(
+        settled_harmonics(rig, point) - settled_harmonics(build_drawn(drawn, finer), point, 2)
+    )
+    return Check("finer mesh, whole ripple", float(error.max()), ALLOWED_ERROR * rig.noise)

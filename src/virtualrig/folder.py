@@ -1,6 +1,4 @@
-"""Writing a case folder: rig.yaml with the sheet's values and HDF5 recordings. Nothing of the
-truth.
-"""
+"""Writing of a case folder: rig.yaml with the data sheet's values, and HDF5 recordings."""
 
 from pathlib import Path
 
@@ -51,7 +49,7 @@ def write_ripple(path: Path, angle_deg: np.ndarray, flow: np.ndarray) -> None:
     np.savetxt(path, table, fmt="%.9g", delimiter=",", header="angle_deg,flow_m3_s", comments="")
 
 
-def listed(point: Point, with_ripple: bool) -> dict:
+def recording_entry(point: Point, with_ripple: bool) -> dict:
     """The entry of one recording in rig.yaml."""
     entry = {
         "file": f"recordings/{point.label}.h5",
@@ -69,8 +67,11 @@ def ripple_name(point: Point) -> str:
     return f"flow_ripple_{point.label}.csv"
 
 
-def prepare(folder: Path, truth: Path | None) -> None:
-    """An empty case folder; raises RigError where it has content, or the truth would go into it."""
+def prepare_folder(folder: Path, truth: Path | None) -> None:
+    """Make an empty case folder.
+
+    Raises RigError where it has content, or where the folder `truth` lies in it.
+    """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise RigError(f"--out {folder}: exists and is not empty; name a new folder")
     if truth is not None and truth.resolve().is_relative_to(folder.resolve()):

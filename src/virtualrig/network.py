@@ -1,10 +1,10 @@
-"""Pipes and nodes in engineering terms, and the numbers the time stepper makes of them."""
+"""Pipes and nodes in engineering terms, and their tables for the time stepper."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from virtualrig import stepper
+from virtualrig import multistep, node_elements, waves
 from virtualrig.profile import steady_mode, velocity_modes
 from virtualrig.spectral_element import derivative, interpolation, lobatto
 
@@ -35,7 +35,7 @@ class Pipe:
 
 @dataclass(frozen=True)
 class Node:
-    """Elements between a node and the tank; names are those of the stepper's node table."""
+    """Elements between a node and the tank; names are those of the node table."""
 
     volume: float = 0.0
     gas_volume: float = 0.0
@@ -73,30 +73,30 @@ class Network:
     modes: int = 10
 
 
-def elements(network: Network) -> list[int]:
+def element_counts(network: Network) -> list[int]:
     """Number of spectral elements of each pipe."""
     per_metre = network.frequency * network.points / network.degree
     return [max(1, int(np.ceil(p.length * per_metre / p.wave_speed))) for p in network.pipes]
 
 
 def largest_step(network: Network) -> float:
-    """The greatest time step, s, that is stable with a fifth in hand.
+    """Four fifths of the greatest stable time step, s.
 
-    SBDF4 with upwind fluxes holds up to 0.048, 0.035, 0.026, 0.021 element widths a wave's transit
-    for degrees 4 to 7 (eigenvalues of a periodic pipe).
+    SBDF4 with upwind fluxes is stable up to 0.048, 0.035, 0.026, 0.021 of a wave's transit time
+    through an element for degrees 4 to 7 (eigenvalues of a periodic pipe).
     """
     share = 0.028 * (5 / network.degree) ** 1.5
-    counts = elements(network)
+    counts = element_counts(network)
     return min(
         share * p.length / count / p.wave_speed
         for p, count in zip(network.pipes, counts, strict=True)
     )
 
 
-def line(network: Network, dt: float) -> stepper.Line:
-    """The pipes cut into spectral elements, for time steps of `dt` s."""
+def discretise(network: Network, dt: float) -> waves.Line:
+    """The pipes divided into spectral elements, for time steps of `dt` s."""
     _, weights = lobatto(network.degree)
-    counts = elements(network)
+    counts = element_counts(network)
     last = np.cumsum(counts) - 1
     rho = network.density
 
@@ -112,10 +112,10 @@ def line(network: Network, dt: float) -> stepper.Line:
     width = np.repeat([p.length / c for p, c in zip(network.pipes, counts, strict=True)], counts)
     area = each(lambda p: np.pi / 4 * p.diameter**2)
     speed = each(lambda p: p.wave_speed)
-    gains = 1 / (stepper.LEAD + dt * each(lambda p: _modes(network, p)[0]))
+    gains = 1 / (multistep.LEAD + dt * each(lambda p: _modes(network, p)[0]))
     wall, air = each(lambda p: p.wall or (0.0, 1.0)), each(lambda p: p.air or (0.0, 1.0))
     growth, drag = each(lambda p: p.stiffening), each(lambda p: p.drag)
-    return stepper.Line(
+    return waves.Line(
         derivative=derivative(lobatto(network.degree)[0]),
         lift=1 / weights[0],
         inflow=-2 / width * rho * speed**2 / area,
@@ -136,8 +136,8 @@ def line(network: Network, dt: float) -> stepper.Line:
 
 
 def _modes(network: Network, pipe: Pipe) -> tuple[np.ndarray, np.ndarray]:
-    """Decay rates, 1/s, and weights (modes,) of a pipe's velocity modes; unused ones weigh
-    nothing.
+    """Decay rates, 1/s, and weights (modes,) of a pipe's velocity modes; zero weights for unused
+    ones.
     """
     if pipe.friction == "unsteady":
         rates, weights = velocity_modes(network.modes)
@@ -170,46 +170,47 @@ def node_table(network: Network) -> np.ndarray:
 def sensor_rows(network: Network) -> tuple[np.ndarray, np.ndarray]:
     """Element of each sensor, and the interpolation row (sensors, n) in it."""
     nodes, _ = lobatto(network.degree)
-    counts = elements(network)
-    found, rows = [], []
+    counts = element_counts(network)
+    indices, rows = [], []
     for pipe, position in network.sensors:
         share = position / network.pipes[pipe].length * counts[pipe]
         inside = min(int(share), counts[pipe] - 1)
-        found.append(sum(counts[:pipe]) + inside)
+        indices.append(sum(counts[:pipe]) + inside)
         rows.append(interpolation(nodes, 2 * (share - inside) - 1)[0])
-    return np.array(found), np.array(rows)
+    return np.array(indices), np.array(rows)
 
 
-def still(network: Network, cut: stepper.Line, pressure: float, flow: float, pistons: int):
-    """A state at rest in time: `pressure` everywhere, `flow` through the pipes that lead to the
-    load.
+def state_at_rest(network: Network, line: waves.Line, pressure: float, flow: float, pistons: int):
+    """A steady state: `pressure` (Pa) everywhere, `flow` (m3/s) through the pipes to the load.
 
-    Chambers start at `pressure`; dead-end pipes (whose end node has no way out) carry no flow.
+    Chambers start at `pressure`; pipes that end at a node without an outlet carry no flow.
     """
-    n, count = network.degree + 1, len(cut.inflow)
+    n, count = network.degree + 1, len(line.inflow)
     through = np.zeros(count)
     leaving = {pipe.start for pipe in network.pipes}
     for k, pipe in enumerate(network.pipes):
         end = network.nodes[pipe.end]
         if pipe.end in leaving or end.orifice > 0 or end.leak > 0:
-            through[cut.first[k] : cut.last[k] + 1] = flow
-    share = cut.pushes / cut.pushes.sum(axis=0) * through
+            through[line.first[k] : line.last[k] + 1] = flow
+    share = line.pushes / line.pushes.sum(axis=0) * through
     table = node_table(network)
-    node = np.zeros((stepper.DEPTH, stepper.NODE_STATES, len(network.nodes)))
-    node[:, stepper.STORED] = table[:, stepper.VOLUME] * pressure
-    gas = table[:, stepper.GAS_VOLUME]
-    exponent = 1 / table[:, stepper.GAS_EXPONENT]
-    node[:, stepper.STORED] -= gas * (table[:, stepper.GAS_PRESSURE] / pressure) ** exponent
-    arm = table[:, stepper.ARM_STIFFNESS] > 0
-    node[:, stepper.ARM_VOLUME, arm] = pressure / table[arm, stepper.ARM_STIFFNESS]
-    return stepper.State(
-        pressure=np.full((stepper.DEPTH, n, count), pressure),
-        modes=np.repeat(share[:, None], stepper.DEPTH, axis=1),
+    node = np.zeros((multistep.DEPTH, node_elements.NODE_STATES, len(network.nodes)))
+    node[:, node_elements.STORED] = table[:, node_elements.VOLUME] * pressure
+    gas = table[:, node_elements.GAS_VOLUME]
+    exponent = 1 / table[:, node_elements.GAS_EXPONENT]
+    node[:, node_elements.STORED] -= (
+        gas * (table[:, node_elements.GAS_PRESSURE] / pressure) ** exponent
+    )
+    arm = table[:, node_elements.ARM_STIFFNESS] > 0
+    node[:, node_elements.ARM_VOLUME, arm] = pressure / table[arm, node_elements.ARM_STIFFNESS]
+    return waves.State(
+        pressure=np.full((multistep.DEPTH, n, count), pressure),
+        modes=np.repeat(share[:, None], multistep.DEPTH, axis=1),
         flow=np.repeat(through[None], n, axis=0).copy(),
-        strain=np.full((stepper.DEPTH, n, count), pressure),
-        pressure_rate=np.zeros((stepper.DEPTH, n, count)),
-        flow_drive=np.zeros((stepper.DEPTH, n, count)),
+        strain=np.full((multistep.DEPTH, n, count), pressure),
+        pressure_rate=np.zeros((multistep.DEPTH, n, count)),
+        flow_drive=np.zeros((multistep.DEPTH, n, count)),
         node_pressure=np.full(len(network.nodes), pressure),
         node=node,
-        chamber=np.full((stepper.DEPTH, pistons), pressure),
+        chamber=np.full((multistep.DEPTH, pistons), pressure),
     )

@@ -1,4 +1,4 @@
-"""Laminar pipe friction from the velocity profile: the momentum equation resolved over the radius.
+"""Laminar pipe friction: the momentum equation resolved over the radius.
 
 In an axisymmetric laminar flow the axial velocity u(r, t) diffuses, u_t = -p_x/rho + nu (r
 u_r)_r/r, u(R, t) = 0. Expanded in its own modes J0(j_n r/R), the flow of the pipe is a sum of
@@ -34,10 +34,10 @@ def _bessel_zeros(count: int) -> np.ndarray:
 def velocity_modes(
     count: int, slowest: float = 200.0, fastest: float = 2e5
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Decay rates and weights of `count` lags that stand for the whole velocity profile.
+    """Decay rates and weights of `count` lags that approximate the whole velocity profile.
 
     Rates are in units of nu/R^2, and so are `slowest` and `fastest`, the angular frequencies
-    between which the lags are to hold. The admittance of a metre of pipe is then
+    between which the approximation holds. The admittance of a metre of pipe is then
     (A/rho) sum_n weight_n/(s + rate_n nu/R^2). Returns (rates, weights), each (count,).
     """
     j = _bessel_zeros(_SERIES_TERMS)

@@ -1,4 +1,4 @@
-"""The test bench's axial piston pump: chambers of a compressible liquid between two port plates.
+"""Axial piston pump of the virtual rig: chambers of a compressible liquid between two ports.
 
 Crank angle is zero where a piston is furthest out; a chamber then shrinks, and delivers, for half a
 turn. Around both dead centres a chamber is shut off for `port_overlap_deg`; from there the port in
@@ -68,8 +68,8 @@ class Fault:
     leak_area: float
 
 
-def tables(pump: Pump, density: float, faults: tuple[Fault, ...] = ()):
-    """The numbers the time stepper reads: (pistons, CHAMBER_COLUMNS) and (PORT_ENTRIES,)."""
+def pump_tables(pump: Pump, density: float, faults: tuple[Fault, ...] = ()):
+    """Tables for the time stepper: (pistons, CHAMBER_COLUMNS) and (PORT_ENTRIES,)."""
     spread = np.zeros((pump.pistons, 3)) if pump.spread is None else np.asarray(pump.spread)
     orifice = pump.discharge_coefficient * np.sqrt(2 / density)
     chambers = np.zeros((pump.pistons, CHAMBER_COLUMNS))
@@ -122,10 +122,11 @@ def port_opening(angle, ports):
 
 
 @njit(cache=True, fastmath=True)
-def crank(angle, speed, chambers, ports, stations):
-    """What the crank angle settles for each chamber, into `stations` (pistons, 4).
+def chamber_kinematics(angle, speed, chambers, ports, stations):
+    """Write what depends on the crank angle alone into `stations` (pistons, 4).
 
-    Bulk modulus over volume, displaced flow, and orifice coefficients of delivery and suction port.
+    Its columns are bulk modulus over volume, displaced flow, and the orifice coefficients of
+    delivery and suction port.
     """
     full = ports[ORIFICE] * ports[AREA]
     for i in range(len(chambers)):
@@ -189,8 +190,8 @@ def step_chambers(stations, history, lead, chambers, ports, outlet_lead, outlet_
                 matrix[k, i] -= stations[k, 0] * tangent
         _eliminate(matrix)
         largest = 0.0
-        # a square-root orifice near zero drop sends Newton's method to and fro: halve every
-        # other step
+        # near zero pressure drop a square-root orifice makes Newton's method oscillate: halve
+        # every other step
         damping = 0.5 if iteration > 4 and iteration % 2 == 1 else 1.0
         for i in range(n + 1):
             x[i] += damping * matrix[i, n + 1]

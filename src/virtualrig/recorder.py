@@ -1,4 +1,4 @@
-"""Recordings of a rig as a data logger sees them: wandering speed, sensors, noise, a fixed rate."""
+"""Recordings of a rig by a data logger: wandering speed, sensors, noise, a constant rate."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from virtualrig.rig import Rig, Sensing, build
 
 SAMPLING_RATE_HZ = 51200.0
 
-MARGIN = 0.05  # s that a march runs on before the first and after the last sample
+MARGIN_S = 0.05  # that a march runs before the first and after the last sample
 
 
 @dataclass(frozen=True)
@@ -45,44 +45,47 @@ def record(
     rng: np.random.Generator,
     flow: Callable[[float], np.ndarray] | None = None,
     tolerance: float = 20.0,
-    refine: int = 1,
+    step_divisor: int = 1,
     marched: bool = False,
 ) -> Take:
-    """One recording of `rig` at `point`. Its first sample falls at a random crank angle.
+    """One recording of `rig` at `point`; its first sample is at a random crank angle.
 
-    `flow`, `refine` and `tolerance` as in `Bench` and `Bench.settle`. Where the speed wanders the
-    bench is run at the speed of every instant if `marched`, which takes as long as the recording
-    is; else the recording is composed of three orbits.
+    `flow`, `step_divisor` and `tolerance` are those of `Bench` and `Bench.settle`. If the speed
+    wanders and `marched` is true, the rig is run at the speed of every instant over the whole
+    recording. Otherwise the recording is composed of three orbits.
     """
     set_speed = point.speed_rpm * (1 + rig.speed_error * rng.standard_normal())
     set_pressure = point.load_pressure * (1 + rig.load_pressure_error * rng.standard_normal())
     count = round(point.seconds * SAMPLING_RATE_HZ)
-    speed = set_speed * (1 + wander(count, rig.wander, rig.correlation_s, rng))
+    speed = set_speed * (1 + draw_speed_wander(count, rig.wander, rig.correlation_s, rng))
     turns = rng.uniform() + np.concatenate([[0.0], np.cumsum(speed[:-1])]) / 60 / SAMPLING_RATE_HZ
-    bench = Bench(rig, point.faults, flow, refine)
+    bench = Bench(rig, point.faults, flow, step_divisor)
     if marched and rig.wander > 0:
-        pressure, orbit = march(bench, speed, turns, set_pressure, tolerance)
+        pressure, orbit = march_recording(bench, speed, turns, set_pressure, tolerance)
     else:
-        orbits = family(bench, speed, set_pressure, tolerance)
-        pressure, orbit = follow(orbits, rig.sensing, speed, turns), orbits[len(orbits) // 2]
+        orbits = settle_orbits(bench, speed, set_pressure, tolerance)
+        pressure, orbit = (
+            compose_from_orbits(orbits, rig.sensing, speed, turns),
+            orbits[len(orbits) // 2],
+        )
     pressure += rig.noise * rng.standard_normal(pressure.shape)
     return Take(pressure, turns, orbit)
 
 
 def nominal_ripple(known: dict, point: Point) -> tuple[np.ndarray, np.ndarray]:
-    """What a model of the sheet's pump on the sheet's line gives: crank angle, deg, and flow, m3/s.
+    """Outlet flow of the data sheet's pump on the data sheet's line: crank angle, deg, and m3/s.
 
-    No concealed physics: values of the sheet, steady friction, the operating point as set. One
-    revolution in steps of 360/RECORDS deg.
+    Without effects, with steady friction, at the operating point as set; one revolution in steps
+    of 360/RECORDS degrees.
     """
     orbit = Bench(build(known, {})).settle(point.speed_rpm, point.load_pressure)
     return 360 * np.arange(len(orbit.outlet_flow)) / len(orbit.outlet_flow), orbit.outlet_flow
 
 
-def wander(
+def draw_speed_wander(
     count: int, deviation: float, correlation_s: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """Slow relative deviation of speed (count,): Gaussian, smooth, with zero mean."""
+    """Slow relative deviation of the speed (count,): Gaussian, smooth, of zero mean."""
     step = 0.02
     grid = np.arange(int(np.ceil(count / SAMPLING_RATE_HZ / step)) + 2)
     width = correlation_s / 2 / step
@@ -94,10 +97,12 @@ def wander(
     return values - values.mean()
 
 
-def family(bench: Bench, speed: np.ndarray, load_pressure: float, tolerance: float) -> list[Orbit]:
-    """Orbits at the mean of `speed` (r/min) and, where it wanders, at its extremes.
+def settle_orbits(
+    bench: Bench, speed: np.ndarray, load_pressure: float, tolerance: float
+) -> list[Orbit]:
+    """Orbits at the mean of `speed` (r/min) and, if it varies, at its extremes.
 
-    The valve is set once, at the mean.
+    The valve is set once, at the mean speed.
     """
     middle = bench.settle(speed.mean(), load_pressure, tolerance=tolerance)
     reach = np.abs(speed - speed.mean()).max()
@@ -110,7 +115,7 @@ def family(bench: Bench, speed: np.ndarray, load_pressure: float, tolerance: flo
     return [low, middle, high]
 
 
-def follow(
+def compose_from_orbits(
     orbits: list[Orbit], sensing: tuple[Sensing, ...], speed: np.ndarray, turns: np.ndarray
 ) -> np.ndarray:
     """Sensed pressure (sensors, samples) along the orbits at `speed` (r/min) and crank `turns`.
@@ -123,35 +128,36 @@ def follow(
     for k, orbit in enumerate(orbits):
         others = np.delete(knots, k)
         share = np.prod([(speed - other) / (knots[k] - other) for other in others], axis=0)
-        sensed = sense(orbit, sensing)
+        sensed = sensed_pressure(orbit, sensing)
         grid = np.linspace(0, 1, sensed.shape[1] + 1)
         closed = np.concatenate([sensed, sensed[:, :1]], axis=1)
         total += share * CubicSpline(grid, closed, axis=1, bc_type="periodic")(phase)
     return total
 
 
-def march(
+def march_recording(
     bench: Bench, speed: np.ndarray, turns: np.ndarray, load_pressure: float, tolerance: float
 ) -> tuple[np.ndarray, Orbit]:
-    """Sensed pressure (sensors, samples) of the bench run at `speed` (r/min) and crank `turns`,
-    which are those of the samples, and the orbit it set out from.
+    """Sensed pressure (sensors, samples), Pa, of a run at the speed of every instant.
 
-    The valve is set once, at the mean. Before the first sample the speed is the first sample's.
+    `speed` (samples,) in r/min and crank `turns` (samples,) are those of the samples. The valve is
+    set once, at the mean speed. Before the first sample the speed is that of the first sample.
+    Also returns the orbit from which the run starts.
     """
-    valve = bench.valve(speed.mean(), load_pressure, tolerance)
+    valve = bench.valve_for(speed.mean(), load_pressure, tolerance)
     first = bench.settle(speed[0], load_pressure, valve, tolerance)
-    before = (turns[0] % 1.0) + np.ceil(MARGIN * speed[0] / 60)  # revolutions, from crank angle 0
+    before = (turns[0] % 1.0) + np.ceil(MARGIN_S * speed[0] / 60)  # revolutions, from crank angle 0
     seconds = np.arange(len(speed)) / SAMPLING_RATE_HZ + before * 60 / speed[0]
     step = 60 / speed[0] / RECORDS
-    at = step * np.arange(1, int(np.ceil((seconds[-1] + MARGIN) / step)) + 1)
+    at = step * np.arange(1, int(np.ceil((seconds[-1] + MARGIN_S) / step)) + 1)
     pressure = bench.march(speed[0], np.interp(at - step / 2, seconds, speed / speed[0] - 1))
-    # the filter wraps around: what that spoils at either end lies within the margins
+    # the filter is periodic: the errors at both ends lie within the margins
     sensed = _filtered(pressure, 1 / (step * pressure.shape[1]), bench.rig.sensing)
     return CubicSpline(at, sensed, axis=1)(seconds), first
 
 
-def sense(orbit: Orbit, sensing: tuple[Sensing, ...]) -> np.ndarray:
-    """What the sensors make of an orbit's pressures: gain, delay and resonance, order by order."""
+def sensed_pressure(orbit: Orbit, sensing: tuple[Sensing, ...]) -> np.ndarray:
+    """An orbit's pressures (sensors, RECORDS) as sensed: gain, delay and resonance of each."""
     return _filtered(orbit.pressure, orbit.speed_rpm / 60, sensing)
 
 

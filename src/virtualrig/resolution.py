@@ -1,85 +1,95 @@
-"""How fine a drawn rig's mesh and steps must be for its error to stay below a tenth of its noise.
+"""Choice of mesh and time step of a drawn rig: errors below a tenth of its noise.
 
-Waves on a linear line keep to their frequency: harmonics below HIGHEST_HZ need only be resolved
-themselves. Where the liquid yields less than in proportion to the pressure, as with air in it, all
-harmonics of the pump's flow feed those below, also the unresolved ones, and the error falls with
-the square of the elements' width, whatever their degree. There the mesh is refined rig by rig.
+Waves on a linear line keep their frequency, so only the harmonics below HIGHEST_HZ have to be
+resolved. Air and a stiffening liquid are nonlinear: all harmonics of the pump's flow couple to
+those below HIGHEST_HZ, also the unresolved ones, and the error falls with the square of the
+elements' width, whatever their degree. The mesh of such a rig is refined until its error is small
+enough.
 """
 
+from collections.abc import Callable
 from functools import cache, partial
 from itertools import pairwise
 
 import numpy as np
 
-from virtualrig.draw import HIGHEST_HZ, Drawn
+from virtualrig.draw import DrawnCase
+from virtualrig.draw_rig import HIGHEST_HZ
 from virtualrig.orbit import Bench, Orbit
 from virtualrig.recorder import Point
 from virtualrig.rig import Rig, build
 from virtualrig.source import constant_pressure_flow
 
-NUMERICS = {"frequency": 7000.0, "points": 8.0, "degree": 7, "modes": 10}
-REFINE = 3
-"""Of a linear line: ripples are stronger and noise is weaker here than on the built-in rig, and a
-line that ends in a volume rings on for forty revolutions, so that errors add up: hence elements of
-higher degree and a third of the stable time step. Finer meshes have steps of about that size."""
+BASE_NUMERICS = {"frequency": 7000.0, "points": 8.0, "degree": 7, "modes": 10}
+BASE_STEP_DIVISOR = 3
+"""Mesh and parts of the stable time step of a linear line. Ripples are stronger and noise is weaker
+than on the built-in rig, and a line that ends in a volume rings for forty revolutions, over which
+errors add up: so elements have a higher degree and steps are shorter."""
 
-FINEST = 4
-"""Meshes beyond the first at most, of a line that is not linear: up to 28 kHz."""
+MAX_REFINEMENTS = 4
+"""Meshes beyond the first at most, of a nonlinear line: up to 28 kHz."""
 
-ALLOWED = 0.1
+ALLOWED_ERROR = 0.1
 """Of the noise: the largest error at any sensor, rms below HIGHEST_HZ."""
 
-SETTLED = 0.01
-"""Pressures are periodic when they change by less than this share of the noise in a revolution."""
+SETTLING_TOLERANCE = 0.01
+"""Of the noise: change of pressures in a revolution below which they count as periodic."""
 
 
-def resolved(drawn: Drawn) -> tuple[dict, float | None]:
-    """Numerics for a drawn rig, and the error that they leave, Pa rms, estimated; None for a linear
-    line, of which `virtualrig.exact` tries some.
+def choose_mesh(drawn: DrawnCase) -> tuple[dict, float | None]:
+    """Numerics for a drawn rig, and their estimated error in Pa rms; None for a linear line.
 
-    Each mesh has elements narrower by the root of two than the one before, so that an error of
-    second order is halved: the finer of two is wrong by about what they differ, the coarser by
-    twice as much. The largest error at any operating point counts.
+    Elements of each mesh are narrower by the root of two than those of the one before, so an error
+    of second order is halved. The finer of two meshes is then wrong by about their difference, the
+    coarser by twice that. The largest error at any operating point and sensor counts. Linear lines
+    are checked by `virtualrig.exact`.
     """
-    if not any(p.air or p.stiffening for p in built(drawn, NUMERICS).network.pipes):
-        return NUMERICS, None
+    if not any(p.air or p.stiffening for p in build_drawn(drawn, BASE_NUMERICS).network.pipes):
+        return BASE_NUMERICS, None
     meshes = [
-        NUMERICS | {"frequency": NUMERICS["frequency"] * 2 ** (0.5 * k)} for k in range(FINEST + 1)
+        BASE_NUMERICS | {"frequency": BASE_NUMERICS["frequency"] * 2 ** (0.5 * k)}
+        for k in range(MAX_REFINEMENTS + 1)
     ]
     before = None
     for coarser, mesh in pairwise([None, *meshes]):
-        rig = built(drawn, mesh)
-        after = [settled(rig, point) for point in drawn.points]
+        rig = build_drawn(drawn, mesh)
+        after = [settled_harmonics(rig, point) for point in drawn.points]
         if before is not None:
-            error = max(float(rms(a - b).max()) for a, b in zip(after, before))
-            if 2 * error <= ALLOWED * rig.noise:
+            error = max(float(rms_of_harmonics(a - b).max()) for a, b in zip(after, before))
+            if 2 * error <= ALLOWED_ERROR * rig.noise:
                 return coarser, 2 * error
-            if error <= ALLOWED * rig.noise:
+            if error <= ALLOWED_ERROR * rig.noise:
                 break
         before = after
     return mesh, error
 
 
-def built(drawn: Drawn, numerics: dict, **changed) -> Rig:
-    """The true rig of a drawn case, entries of its seal changed."""
+def build_drawn(drawn: DrawnCase, numerics: dict, **changed) -> Rig:
+    """The true rig of a drawn case; `changed` replaces entries of its seal."""
     return build(drawn.sheet, drawn.seal | {"numerics": numerics} | changed)
 
 
-def refine(rig: Rig) -> int:
-    """Parts of the stable time step of a rig's mesh, which grows shorter with its elements."""
-    return max(1, round(REFINE * NUMERICS["frequency"] / rig.network.frequency))
+def step_divisor(rig: Rig) -> int:
+    """Into how many parts a rig's stable time step is divided.
+
+    The stable step is shorter on finer meshes, so fewer parts suffice there.
+    """
+    return max(1, round(BASE_STEP_DIVISOR * BASE_NUMERICS["frequency"] / rig.network.frequency))
 
 
-def settled(rig: Rig, point: Point, finer: int = 1) -> np.ndarray:
-    """Complex amplitudes (sensors, orders) of the shaft's orders below HIGHEST_HZ, Pa; with time
-    steps `finer` times as short as `refine` says."""
-    bench = Bench(rig, flow=driving(rig, point), refine=finer * refine(rig))
-    orbit = bench.settle(point.speed_rpm, point.load_pressure, tolerance=SETTLED * rig.noise)
-    return harmonics(orbit, orders(point.speed_rpm))
+def settled_harmonics(rig: Rig, point: Point, finer: int = 1) -> np.ndarray:
+    """Complex peak amplitudes (sensors, orders) of the shaft orders below HIGHEST_HZ, Pa.
+
+    Time steps are `finer` times as short as `step_divisor` makes them.
+    """
+    bench = Bench(rig, flow=true_flow(rig, point), step_divisor=finer * step_divisor(rig))
+    tolerance = SETTLING_TOLERANCE * rig.noise
+    orbit = bench.settle(point.speed_rpm, point.load_pressure, tolerance=tolerance)
+    return harmonics_of_orbit(orbit, shaft_orders(point.speed_rpm))
 
 
-def driving(rig: Rig, point: Point):
-    """Function of the speed in r/min: the true pump's flow (SAMPLES,), which drives the line."""
+def true_flow(rig: Rig, point: Point) -> Callable[[float], np.ndarray]:
+    """Function of the speed in r/min: the true pump's flow (SAMPLES,), m3/s, over a revolution."""
     return cache(
         partial(
             constant_pressure_flow,
@@ -91,16 +101,16 @@ def driving(rig: Rig, point: Point):
     )
 
 
-def orders(speed_rpm: float) -> np.ndarray:
-    """The shaft's orders below HIGHEST_HZ."""
+def shaft_orders(speed_rpm: float) -> np.ndarray:
+    """The shaft orders below HIGHEST_HZ."""
     return np.arange(1, int(HIGHEST_HZ * 60 / speed_rpm) + 1)
 
 
-def harmonics(orbit: Orbit, orders: np.ndarray) -> np.ndarray:
-    """Complex amplitudes (sensors, orders) of an orbit's pressures, Pa."""
+def harmonics_of_orbit(orbit: Orbit, orders: np.ndarray) -> np.ndarray:
+    """Complex peak amplitudes (sensors, orders) of an orbit's pressures, Pa."""
     return 2 * np.fft.rfft(orbit.pressure, axis=1)[:, orders] / orbit.pressure.shape[1]
 
 
-def rms(harmonics: np.ndarray) -> np.ndarray:
-    """Root mean square (sensors,) of a pressure of these amplitudes."""
+def rms_of_harmonics(harmonics: np.ndarray) -> np.ndarray:
+    """Root mean square (sensors,) of a signal with complex peak amplitudes (sensors, orders)."""
     return np.sqrt(np.sum(np.abs(harmonics) ** 2, axis=1) / 2)

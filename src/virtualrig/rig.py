@@ -1,4 +1,4 @@
-"""A rig put together from its sheet (what its owner knows) and its seal (what it really is)."""
+"""A rig, built from its data sheet (what its owner knows) and its seal (what it really is)."""
 
 import inspect
 import re
@@ -18,12 +18,12 @@ SEAL = Path(__file__).with_name("sealed.yaml")
 
 
 class RigError(ValueError):
-    """A sheet, seal or command that the rig cannot work with; the message names file and field."""
+    """A wrong data sheet, seal or command; the message names file and field."""
 
 
 @dataclass(frozen=True)
 class Sensing:
-    """What a sensor makes of the pressure; delay in s, resonance (Hz, damping ratio)."""
+    """Response of a sensor: gain, delay in s, resonance (Hz, damping ratio)."""
 
     gain: float = 1.0
     delay: float = 0.0
@@ -53,7 +53,7 @@ class Rig:
 
 
 class _Loader(yaml.SafeLoader):
-    """PyYAML takes 9.5e6 for text, since YAML 1.1 wants 9.5e+6; people write the former."""
+    """Reads 9.5e6 as a number; YAML 1.1, which PyYAML follows, requires 9.5e+6."""
 
 
 _Loader.add_implicit_resolver(
@@ -75,7 +75,7 @@ def read_yaml(path: Path | str) -> dict:
 
 
 def read_rig(sheet: Path | str = SHEET, seal: Path | str = SEAL) -> tuple[dict, Rig]:
-    """The sheet as it goes into the case, and the true rig. Raises RigError."""
+    """The data sheet as it goes into rig.yaml, and the true rig. Raises RigError."""
     known, true = read_yaml(sheet), read_yaml(seal)
     try:
         return known, build(known, true)
@@ -87,8 +87,8 @@ def read_rig(sheet: Path | str = SHEET, seal: Path | str = SEAL) -> tuple[dict, 
 def build(known: dict, true: dict) -> Rig:
     """The rig of two mappings laid out like sheet.yaml and sealed.yaml.
 
-    What the seal leaves out of fluid, line and sensors is as on the sheet. Raises ValueError,
-    KeyError or TypeError for entries that are wrong, missing or unknown.
+    Without an entry in the seal, fluid, line and sensors are those of the data sheet. Raises
+    ValueError, KeyError or TypeError for entries that are wrong, missing or unknown.
     """
     fluid = known["fluid"] | true.get("fluid", {})
     differs = true.get("pump", {})
@@ -99,7 +99,7 @@ def build(known: dict, true: dict) -> Rig:
     draft = Draft(pump, [dict(segment) for segment in line["segments"]], [{} for _ in sensors])
     for effect in true.get("effects", []):
         arguments = {key: value for key, value in effect.items() if key != "name"}
-        apply(draft, effect["name"], arguments)
+        apply_effect(draft, effect["name"], arguments)
     network, load_node = lay_out(draft, sensors, fluid, true.get("numerics", {}))
     speed = true.get("speed", {})
     return Rig(
@@ -119,7 +119,7 @@ def build(known: dict, true: dict) -> Rig:
     )
 
 
-def apply(draft: Draft, name: str, arguments: dict) -> None:
+def apply_effect(draft: Draft, name: str, arguments: dict) -> None:
     """Add effect `name` to the draft; raises ValueError naming what is unknown or out of range."""
     if name not in EFFECTS:
         raise ValueError(f"effect {name!r} is unknown; known are {', '.join(sorted(EFFECTS))}")
@@ -131,7 +131,7 @@ def apply(draft: Draft, name: str, arguments: dict) -> None:
 
 
 def lay_out(draft: Draft, sensors: list[float], fluid: dict, numerics: dict) -> tuple[Network, int]:
-    """Cut the draft's line at its fittings into pipes and nodes; returns it and the load's node."""
+    """The draft's line, divided at its fittings into pipes and nodes, and the load's node."""
     ends = np.cumsum([segment["length"] for segment in draft.segments])
     places = sorted({0.0, *map(float, ends), *(float(at) for at, _ in draft.fittings)})
     merged = [places[0]]
@@ -179,9 +179,7 @@ def lay_out(draft: Draft, sensors: list[float], fluid: dict, numerics: dict) -> 
 
 
 def _join(node: Node, elements: dict) -> Node:
-    """`node` with more elements; those that add up (volumes, leaks) do, others may be there
-    once.
-    """
+    """`node` with more elements. Volumes and leaks add up; other elements may occur once."""
     values = {}
     for name, value in elements.items():
         present, empty = getattr(node, name), getattr(Node(), name)

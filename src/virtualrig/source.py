@@ -1,7 +1,7 @@
 """The pump's flow into a constant pressure: what a pump model without a line gives.
 
-A rig driven by this flow has an ideal flow source. Whatever else the real outlet does (its volume,
-its passage) is then an effect of its own and can be concealed.
+A rig driven by this flow has an ideal flow source. A volume or a passage at the real outlet is then
+an effect of its own and can be concealed.
 """
 
 from collections.abc import Sequence
@@ -13,17 +13,17 @@ from virtualrig.pump import (
     LAMINAR,
     MOST_NEWTON_STEPS,
     Pump,
-    crank,
+    chamber_kinematics,
     orifice_flow,
+    pump_tables,
     step_chambers,
-    tables,
 )
 
 SAMPLES = 18432
-"""A revolution; so many that drawing straight lines between them costs 0.1 % at 5 kHz."""
+"""A revolution; linear interpolation between them errs by 0.1 % at 5 kHz."""
 
-_TURNS = 3
-_STIFF = 1e3  # m3/s/Pa: holds the outlet at its pressure to within a fraction of a pascal
+_REVOLUTIONS = 3
+_OUTLET_CONDUCTANCE = 1e3  # m3/s/Pa: keeps the outlet within a fraction of a pascal
 
 
 def constant_pressure_flow(
@@ -38,7 +38,7 @@ def constant_pressure_flow(
     `ripple` rows (order, relative amplitude of crank speed, phase) as in `virtualrig.stepper.run`.
     Raises RuntimeError where a step of the chambers does not converge.
     """
-    chambers, ports = tables(pump, density)
+    chambers, ports = pump_tables(pump, density)
     rows = np.array(ripple, dtype=float).reshape(-1, 3)
     flow, newton = _march(chambers, ports, 2 * np.pi * speed_rpm / 60, rows, pressure)
     if newton > MOST_NEWTON_STEPS:
@@ -58,13 +58,13 @@ def _march(chambers, ports, speed, ripple, pressure):
     history = np.zeros(n)
     flow = np.zeros(SAMPLES)
     most = 0
-    for step in range(1, SAMPLES * _TURNS + 1):
+    for step in range(1, SAMPLES * _REVOLUTIONS + 1):
         turn = 2 * np.pi * step / SAMPLES
         angle, rate = turn, 1.0
         for order, amplitude, shift in ripple:
             angle += amplitude / order * np.sin(order * turn + shift)
             rate += amplitude * np.cos(order * turn + shift)
-        crank(angle, speed * rate, chambers, ports, stations)
+        chamber_kinematics(angle, speed * rate, chambers, ports, stations)
         for i in range(n):
             history[i] = (
                 4 * past[0, i] - 3 * past[1, i] + 4 / 3 * past[2, i] - past[3, i] / 4
@@ -72,7 +72,15 @@ def _march(chambers, ports, speed, ripple, pressure):
             x[i] = 2 * past[0, i] - past[1, i]
         x[n] = pressure
         used = step_chambers(
-            stations, history, lead, chambers, ports, _STIFF, _STIFF * pressure, x, matrix
+            stations,
+            history,
+            lead,
+            chambers,
+            ports,
+            _OUTLET_CONDUCTANCE,
+            _OUTLET_CONDUCTANCE * pressure,
+            x,
+            matrix,
         )
         most = max(most, used)
         delivered = 0.0

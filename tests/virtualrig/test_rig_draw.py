@@ -6,36 +6,40 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from virtualrig.conceal import compared
-from virtualrig.draw import MIX, UNCERTAINTY, draw, generator, kinds
-from virtualrig.draw_effects import Bare, load_dynamics
+from virtualrig.conceal import change_and_floor
+from virtualrig.draw import MIX, case_kinds, draw_case, random_generator
+from virtualrig.draw_effects import load_dynamics
+from virtualrig.draw_rig import UNCERTAINTY
+from virtualrig.drawn_effect import RigContext
 from virtualrig.pump import Pump
 from virtualrig.rig import build
+from virtualrig.source import constant_pressure_flow
 
 
 @pytest.mark.parametrize("count", [60, 400])
-def test_mix_is_the_stated_one(count):
-    """Counts of each kind are the stated shares of the number of cases, exactly where they can."""
-    counts = Counter(kind for kind, _ in kinds(count, "a", 1))
+def test_kinds_have_the_stated_shares(count):
+    """Counts of each kind are the stated shares of the number of cases, rounded to whole cases."""
+    counts = Counter(kind for kind, _ in case_kinds(count, "a", 1))
     assert counts == {kind: round(share * count) for kind, share in MIX.items()}
 
 
 def test_cases_follow_from_commit_and_number_and_from_nothing_else():
-    """The same twice; another commit or number gives other cases and another order."""
-    first, again = draw(60, "a", 1, 5), draw(60, "a", 1, 5)
+    """A case comes out twice the same; another commit or number gives other cases and another
+    order; each purpose has random numbers of its own."""
+    first, again = draw_case(60, "a", 1, 5), draw_case(60, "a", 1, 5)
     assert first.sheet == again.sheet and first.truth == again.truth
-    assert draw(60, "b", 1, 5).sheet != first.sheet != draw(60, "a", 2, 5).sheet
-    assert kinds(60, "a", 1) != kinds(60, "b", 1)
-    streams = [generator("a", 1, "case", k).uniform() for k in range(50)]
+    assert draw_case(60, "b", 1, 5).sheet != first.sheet != draw_case(60, "a", 2, 5).sheet
+    assert case_kinds(60, "a", 1) != case_kinds(60, "b", 1)
+    streams = [random_generator("a", 1, "case", k).uniform() for k in range(50)]
     assert len(set(streams)) == 50
 
 
 @pytest.fixture(scope="module")
 def drawn():
-    return [draw(60, "a", 1, k) for k in range(60)]
+    return [draw_case(60, "a", 1, k) for k in range(60)]
 
 
-def test_drawn_rigs_are_what_is_promised(drawn):
+def test_drawn_rigs_have_the_documented_ranges(drawn):
     """Two to four segments, two or three sensors, one to three points, noise of 0.5 to 4 kPa, and
     every rig can be built."""
     assert {len(d.sheet["line"]["segments"]) for d in drawn} == {2, 3, 4}
@@ -47,7 +51,7 @@ def test_drawn_rigs_are_what_is_promised(drawn):
         assert len(rig.sensing) == len(d.sheet["sensors"])
 
 
-def test_nominal_values_are_off_by_their_stated_uncertainty(drawn):
+def test_nominal_values_deviate_by_their_stated_uncertainty(drawn):
     """Over all cases wave speeds deviate by one standard deviation, in `off` cases by two to
     three."""
     pulls = {True: [], False: []}
@@ -60,22 +64,21 @@ def test_nominal_values_are_off_by_their_stated_uncertainty(drawn):
     assert (np.abs(pulls[True]) >= 2).all() and (np.abs(pulls[True]) <= 3).all()
 
 
-def test_drawn_valves_feed_the_line_at_no_frequency():
-    """The real part of flow over pressure is positive at all frequencies, by evaluation, also of
-    the strongest; an active valve may chatter instead of settling into a ripple."""
+def test_drawn_valves_are_passive_at_all_frequencies():
+    """Flow over pressure of the strongest valves has a positive real part at all frequencies: an
+    active valve may chatter instead of settling into a ripple."""
     ratio = np.linspace(0.01, 10.0, 5000)  # of the valve's own frequency
     for k in range(300):
-        valve = load_dynamics(Bare(np.random.default_rng(k), [], 2, 870.0, 1.5e9, 1e-3, 1e7), 1.0)
+        context = RigContext(np.random.default_rng(k), [], 2, 870.0, 1.5e9, 1e-3, 1e7)
+        valve = load_dynamics(context, 1.0)
         gain, damping = valve.arguments["gain"], valve.arguments["damping"]
         assert np.min((0.5 + gain / (1 - ratio**2 + 2j * damping * ratio)).real) > 0.0
 
 
-def test_flow_ripple_is_wrong_by_what_was_drawn():
-    """The true pump's ripple, by this test's own spectrum and search for the angle, differs from
-    the nominal one by the stated 1 to 4 %."""
-    from virtualrig.source import constant_pressure_flow
-
-    d = draw(60, "a", 1, 3)
+def test_the_flow_ripple_is_wrong_by_the_drawn_error():
+    """The true pump's ripple differs from the nominal one by the drawn 1 to 4 %, by this test's own
+    spectrum and search for the shaft angle."""
+    d = draw_case(60, "a", 1, 3)
     point, density = d.points[0], d.sheet["fluid"]["density"]
     pump = Pump(**d.sheet["pump"])
     true = pump.changed(d.seal["pump"]["relative"], d.seal["pump"]["timing_deg"])
@@ -93,12 +96,12 @@ def test_flow_ripple_is_wrong_by_what_was_drawn():
 
 
 @pytest.mark.long
-def test_floor_is_what_the_wrong_pump_leaves(drawn):
-    """A true pump that is the sheet's leaves nothing, exactly; the one drawn leaves an error of the
-    size of its flow's, which a line's resonances turn into a few times more or less."""
+def test_the_floor_is_the_misfit_that_the_wrong_pump_makes(drawn):
+    """It is exactly zero where the true pump is the data sheet's. With the drawn pump it is the
+    error of the flow, up to a factor of five by the line's resonances."""
     d = next(d for d in drawn if d.truth["kind"] == "none" and len(d.points) == 1)
     right = replace(d, seal=d.seal | {"pump": {}})
-    exact = compared(right)
+    exact = change_and_floor(right)
     assert exact == {"change": 0.0, "floor": 0.0}
-    wrong = compared(d)
+    wrong = change_and_floor(d)
     assert d.truth["source_error"] / 5 < wrong["floor"] < 5 * d.truth["source_error"]

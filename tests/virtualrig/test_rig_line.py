@@ -27,7 +27,7 @@ LENGTH = sum(segment["length"] for segment in SEGMENTS)
 SENSORS = (0.42, 1.6)
 SPEED_RPM, PRESSURE, FLOW = 3000.0, 9.5e6, 7e-4
 HARMONICS = np.arange(2, 61, 2)
-NUMERICS = {"frequency": 4500.0}
+BASE_NUMERICS = {"frequency": 4500.0}
 S = 2j * np.pi * HARMONICS * SPEED_RPM / 60
 
 
@@ -111,7 +111,7 @@ def bench(flow, *effects, friction="unsteady", tolerance=0.5):
     for name, arguments in effects:
         EFFECTS[name](draft, **arguments)
     fluid = {"density": RHO, "kinematic_viscosity": NU}
-    network, load = lay_out(draft, list(SENSORS), fluid, NUMERICS)
+    network, load = lay_out(draft, list(SENSORS), fluid, BASE_NUMERICS)
     rig = Rig(draft.pump, network, load, {}, tuple(Sensing(**c) for c in draft.sensing))
     valve = FLOW / np.sqrt(PRESSURE)
     orbit = Bench(rig, flow=flow).settle(SPEED_RPM, PRESSURE, valve, tolerance, 200)

@@ -7,7 +7,14 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from virtualrig.orbit import Bench
-from virtualrig.pump import Fault, Pump, crank, port_opening, step_chambers, tables
+from virtualrig.pump import (
+    Fault,
+    Pump,
+    chamber_kinematics,
+    port_opening,
+    pump_tables,
+    step_chambers,
+)
 from virtualrig.rig import build, read_yaml
 
 RHO, OUTLET, SPEED = 870.0, 9.5e6, 2 * np.pi * 1000 / 60
@@ -16,7 +23,7 @@ PUMP = Pump(pistons=3, dead_volume=4e-6, port_opening_deg=12.0)
 
 def chambers_by_multistep(steps, turns, faults=()):
     """Chamber pressures and delivered flow at a constant outlet pressure, BDF4, last revolution."""
-    chambers, ports = tables(PUMP, RHO, faults)
+    chambers, ports = pump_tables(PUMP, RHO, faults)
     stations, matrix = np.zeros((3, 4)), np.zeros((4, 5))
     dt = 2 * np.pi / SPEED / steps
     past = [np.full(3, OUTLET)] * 4
@@ -24,7 +31,7 @@ def chambers_by_multistep(steps, turns, faults=()):
     pressures, flows = [], []
     stiff_outlet = 1e3  # m3/s/Pa: holds the outlet at its pressure to within 1e-7 Pa
     for step in range(1, steps * turns + 1):
-        crank(SPEED * step * dt, SPEED, chambers, ports, stations)
+        chamber_kinematics(SPEED * step * dt, SPEED, chambers, ports, stations)
         history = (4 * past[0] - 3 * past[1] + 4 / 3 * past[2] - past[3] / 4) / dt
         lead = 25 / 12 / dt
         step_chambers(
@@ -100,7 +107,7 @@ def test_chambers_are_those_of_radau(leak_area):
 
 def test_ports_open_one_at_a_time():
     """Both ports are shut about the dead centres, and never open to a chamber together."""
-    _, ports = tables(Pump(port_overlap_deg=4.0), RHO)
+    _, ports = pump_tables(Pump(port_overlap_deg=4.0), RHO)
     angle = np.radians(np.arange(0, 360, 0.25))
     delivery = np.array([port_opening(a, ports) for a in angle])
     suction = np.array([port_opening(a + np.pi, ports) for a in angle])

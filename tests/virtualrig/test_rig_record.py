@@ -13,7 +13,14 @@ import yaml
 
 from virtualrig.cli import main
 from virtualrig.orbit import Bench, Orbit
-from virtualrig.recorder import SAMPLING_RATE_HZ, Point, follow, record, sense, wander
+from virtualrig.recorder import (
+    SAMPLING_RATE_HZ,
+    Point,
+    compose_from_orbits,
+    draw_speed_wander,
+    record,
+    sensed_pressure,
+)
 from virtualrig.rig import SEAL, SHEET, RigError, Sensing, build, read_rig, read_yaml
 
 QUICK = {
@@ -34,7 +41,7 @@ def orbit(harmonic, speed_rpm=1000.0, sensors=1, delay=0.0):
 def test_sensor_gain_delay_and_resonance_are_those_of_the_formulae():
     """A cosine at 450 Hz comes out with the second-order response at 450 Hz, gain and delay."""
     sensing = (Sensing(gain=1.1, delay=2e-4, resonance=(900.0, 0.2)),)
-    out = sense(orbit(27), sensing)[0]
+    out = sensed_pressure(orbit(27), sensing)[0]
     got = 2 * np.fft.rfft(out)[27] / 4608
     response = 1 / (1 - 0.25 + 2j * 0.2 * 0.5)
     assert got == pytest.approx(1.1 * response * np.exp(-2j * np.pi * 450 * 2e-4), rel=1e-9)
@@ -44,7 +51,7 @@ def test_sensor_gain_delay_and_resonance_are_those_of_the_formulae():
 def test_wander_is_slow_and_as_strong_as_told():
     """Over many seconds: the stated deviation, and next to nothing within one revolution."""
     rng = np.random.default_rng(0)
-    runs = np.array([wander(256000, 1e-3, 0.8, rng) for _ in range(20)])
+    runs = np.array([draw_speed_wander(256000, 1e-3, 0.8, rng) for _ in range(20)])
     assert runs.std() == pytest.approx(1e-3, rel=0.15)
     assert (runs[:, 3072:] - runs[:, :-3072]).std() < 0.2e-3
 
@@ -54,10 +61,10 @@ def test_recording_follows_the_crank_and_the_line_between_orbits():
     speeds = np.linspace(998.0, 1002.0, 20000)
     turns = 0.3 + np.cumsum(speeds) / 60 / SAMPLING_RATE_HZ
     orbits = [orbit(18, s, delay=2e-3) for s in (998.0, 1000.0, 1002.0)]
-    got = follow(orbits, (Sensing(),), speeds, turns)[0]
+    got = compose_from_orbits(orbits, (Sensing(),), speeds, turns)[0]
     truth = 5 + np.cos(2 * np.pi * 18 * (turns - 2e-3 * speeds / 60))
     assert np.abs(got - truth).max() < 1e-4
-    one = follow(orbits[1:2], (Sensing(),), speeds, turns)[0]
+    one = compose_from_orbits(orbits[1:2], (Sensing(),), speeds, turns)[0]
     assert np.abs(one - truth).max() > 5e-3
 
 
@@ -225,7 +232,7 @@ def test_built_in_rig_is_converged_to_a_tenth_of_its_noise():
     fine = replace(rig, network=replace(rig.network, points=9.0, frequency=8000.0, modes=14))
     valve = 2.25e-7
     coarse = Bench(rig).settle(1000.0, 9.5e6, valve, tolerance=3.0).pressure
-    finer = Bench(fine, refine=2).settle(1000.0, 9.5e6, valve, tolerance=3.0).pressure
+    finer = Bench(fine, step_divisor=2).settle(1000.0, 9.5e6, valve, tolerance=3.0).pressure
     change = np.fft.rfft(coarse - finer, axis=1)[:, 1:300] / coarse.shape[1]
     assert np.sqrt(2 * (np.abs(change) ** 2).sum(axis=1)).max() < 0.1 * rig.noise
 
