@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from virtualrig.draw import DrawnCase, ripple_difference
+from virtualrig.draw import DrawnCase
+from virtualrig.draw_rig import ripple_difference
 from virtualrig.folder import (
     prepare_folder,
     recording_entry,
