@@ -17,7 +17,7 @@ from rippletwin.case.model import (
     Sensor,
     Uncertainty,
 )
-from rippletwin.case.readers import reader_of
+from rippletwin.case.readers.registry import reader_of
 from rippletwin.case.rig_yaml import read_sheet
 from rippletwin.errors import InputError
 

@@ -1,31 +1,5 @@
-"""One reader a file format, registered by suffix; a new format is one new file here.
+"""Readers of recordings, one file a format; `registry` names each with its suffixes.
 
 A reader is `read(path, sensors) -> Signals`: `sensors` are the names the rig expects; it raises
 InputError where the file lacks one of them or cannot be read.
 """
-
-from __future__ import annotations
-
-from collections.abc import Callable
-from importlib import import_module
-from pathlib import Path
-
-from rippletwin.case.readers.signals import Signals
-from rippletwin.errors import InputError
-
-MODULES = {".h5": "hdf5", ".hdf5": "hdf5", ".csv": "csv_text", ".mat": "matlab", ".tdms": "tdms"}
-
-__all__ = ["MODULES", "Signals", "reader_of"]
-
-
-def reader_of(path: Path) -> Callable[[Path, list[str]], Signals]:
-    """The reader for a file's suffix; its library is imported only now."""
-    name = MODULES.get(path.suffix.lower())
-    if name is None:
-        raise InputError(
-            path,
-            "file",
-            f"no reader for {path.suffix or 'a file without a suffix'}",
-            f"Give one of {', '.join(MODULES)}",
-        )
-    return import_module(f"rippletwin.case.readers.{name}").read

@@ -18,7 +18,7 @@ import numpy as np
 from rippletwin.calibration.fit import Fit, posterior_at_fit
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.line.frequency_domain.line_network import Network
-from rippletwin.twin.effects.passive_network import one_port
+from rippletwin.twin.effects.base import LineState
 from rippletwin.twin.forward_model import ForwardModel, reflection
 
 PROBE_SHARE = 1e-4
@@ -241,10 +241,15 @@ def is_passive(fit: Fit, which: int = -1) -> bool:
     Re Y(s) >= 0 for Re s >= 0 (Brune 1931, J. Math. Phys. 10:191): looked at along the imaginary
     axis and a grid of the right half-plane up to 100 kHz. Raises ValueError for a named effect.
     """
-    effect, _, values = fit.twin.effect_values(fit.twin.theta)[which]
+    twin = fit.twin
+    effect, place, values = twin.effect_values(twin.theta)[which]
     if effect.named:
         raise ValueError(f"{effect.name} is no nameless network")
     w = 2 * np.pi * np.geomspace(0.1, 1e5, 400)
     s = np.concatenate([1j * w, *(w * (np.tan(a) + 1j) * np.cos(a) for a in (0.3, 0.9, 1.5))])
-    immittance = one_port(s, values, 1.0)
+    v, fluid = twin.arrays(twin.theta), twin.rig.fluid
+    state = LineState(fluid.density, v.viscosity, v.diameters, v.wave_speeds, v.lengths)
+    line = Network(s, v.lengths, series=np.ones((len(v.lengths), len(s))), shunt=None)
+    effect.apply(line, state, values, place)
+    (immittance,) = (insert.immittance for insert in line.inserts)
     return bool(np.all(immittance.real >= -1e-9 * np.abs(immittance)))

@@ -141,20 +141,10 @@ class Effect:
     named: bool = True
     friction: str | None = None
 
-    def __reduce__(self):
-        """Pickled by name, for the registry has it in every process."""
-        return _by_name, (self.name,)
-
     def suits(self, rig) -> bool:
         """Whether the effect exists in the rig's medium."""
         gas = rig.fluid.heat_capacity_ratio is not None
         return self.medium == "any" or (self.medium == "gas") == gas
-
-
-def _by_name(name: str) -> Effect:
-    from rippletwin.twin.effects.library import EFFECTS
-
-    return EFFECTS[name]
 
 
 def line_place(rig) -> tuple[Place, ...]:

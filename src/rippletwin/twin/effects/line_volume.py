@@ -12,23 +12,20 @@ from rippletwin.twin.effects.base import (
     position_place,
     segment_at,
 )
+from rippletwin.twin.effects.lumped_elements import volume_compliance
 from rippletwin.twin.priors import lognormal
-
-
-def volume_admittance(s, volume, density, wave_speed):
-    """s V/(rho a^2), m3/(Pa s)."""
-    return s * volume / (density * wave_speed**2)
 
 
 def _apply(network, line, values, place):
     k = segment_at(network.lengths, values["position"])
-    admittance = volume_admittance(network.s, values["volume"], line.density, line.wave_speeds[k])
-    network.inserts.append(Insert(on_line(network, values["position"]), "shunt", admittance))
+    compliance = volume_compliance(values["volume"], line.density, line.wave_speeds[k])
+    position = on_line(network, values["position"])
+    network.inserts.append(Insert(position, "shunt", network.s * compliance))
 
 
 def _in_time(line, state, values, place):
     k = segment_at([pipe.length for pipe in line.pipes], values["position"])
-    compliance = volume_admittance(1.0, values["volume"], state.density, state.wave_speeds[k])
+    compliance = volume_compliance(values["volume"], state.density, state.wave_speeds[k])
     line.inserts.append(capacitance(on_line(line, values["position"]), compliance))
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from rippletwin.line.frequency_domain.line_network import Insert
 from rippletwin.line.time_domain.line_elements import Element, inertance
 from rippletwin.twin.effects.base import ATMOSPHERE, Effect, Parameter, Place
+from rippletwin.twin.effects.lumped_elements import second_order_lag
 from rippletwin.twin.priors import lognormal, normal
 
 
@@ -25,8 +26,7 @@ def _apply(network, line, values, place):
     if place.form == "inertance":
         network.inserts.append(Insert(end, "series", s * values["inertance"]))
         return
-    w = 2.0 * np.pi * values["natural_frequency"]
-    motion = w**2 / (s**2 + 2.0 * values["damping_ratio"] * w * s + w**2)
+    motion = second_order_lag(s, values["natural_frequency"], values["damping_ratio"])
     opening = values["gain"] * motion
     network.inserts.append(Insert(end, "shunt", opening / line.load_resistance))
     network.opening = opening

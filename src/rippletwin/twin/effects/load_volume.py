@@ -5,17 +5,17 @@ from __future__ import annotations
 from rippletwin.line.frequency_domain.line_network import Insert
 from rippletwin.line.time_domain.line_elements import capacitance
 from rippletwin.twin.effects.base import Effect, Parameter, load_place
-from rippletwin.twin.effects.line_volume import volume_admittance
+from rippletwin.twin.effects.lumped_elements import volume_compliance
 from rippletwin.twin.priors import lognormal
 
 
 def _apply(network, line, values, place):
-    admittance = volume_admittance(network.s, values["volume"], line.density, line.wave_speeds[-1])
-    network.inserts.append(Insert(network.length, "shunt", admittance))
+    compliance = volume_compliance(values["volume"], line.density, line.wave_speeds[-1])
+    network.inserts.append(Insert(network.length, "shunt", network.s * compliance))
 
 
 def _in_time(line, state, values, place):
-    compliance = volume_admittance(1.0, values["volume"], state.density, state.wave_speeds[-1])
+    compliance = volume_compliance(values["volume"], state.density, state.wave_speeds[-1])
     line.inserts.append(capacitance(line.length, compliance))
 
 

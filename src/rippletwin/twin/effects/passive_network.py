@@ -18,7 +18,7 @@ from rippletwin.twin.priors import lognormal
 RESONATORS = ((500.0, "first"), (1800.0, "second"))  # prior median frequency in Hz, name
 
 
-def one_port(s, values, unit):
+def _one_port(s, values, unit):
     """Immittance in the unit of `unit`, a characteristic immittance."""
     total = values["flat"] + s * values["rising"] / (2.0 * np.pi * 1000.0)
     for _, name in RESONATORS:
@@ -33,7 +33,7 @@ def _apply(network, line, values, place):
     kind = place.form
     unit = 1.0 / characteristic if kind == "shunt" else characteristic
     position = on_line(network, values["position"])
-    network.inserts.append(Insert(position, kind, one_port(network.s, values, unit)))
+    network.inserts.append(Insert(position, kind, _one_port(network.s, values, unit)))
 
 
 def _parameters(rig, place):

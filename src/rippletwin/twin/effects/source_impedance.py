@@ -7,7 +7,7 @@ import numpy as np
 from rippletwin.line.frequency_domain.line_network import Insert
 from rippletwin.line.time_domain.line_elements import Element, inertance
 from rippletwin.twin.effects.base import Effect, Parameter, Place
-from rippletwin.twin.effects.line_volume import volume_admittance
+from rippletwin.twin.effects.lumped_elements import volume_compliance
 from rippletwin.twin.priors import lognormal
 
 
@@ -16,8 +16,8 @@ def _places(rig):
 
 
 def _apply(network, line, values, place):
-    admittance = volume_admittance(network.s, values["volume"], line.density, line.wave_speeds[0])
-    admittance = admittance + values["conductance"]
+    compliance = volume_compliance(values["volume"], line.density, line.wave_speeds[0])
+    admittance = network.s * compliance + values["conductance"]
     network.source_admittance = network.source_admittance + admittance
     if place.form == "volume and passage":
         impedance = network.s * values["inertance"]
@@ -43,7 +43,7 @@ def _parameters(rig, place):
 
 
 def _in_time(line, state, values, place):
-    compliance = volume_admittance(1.0, values["volume"], state.density, state.wave_speeds[0])
+    compliance = volume_compliance(values["volume"], state.density, state.wave_speeds[0])
     line.source.append(Element(0.0, "shunt", (compliance, values["conductance"])))
     if place.form == "volume and passage":
         line.inserts.insert(0, inertance(0.0, values["inertance"]))
