@@ -16,6 +16,7 @@ from rippletwin.flow_sensor import pinn
 from rippletwin.flow_sensor.estimate import band_limit
 from rippletwin.flow_sensor.line_response import network_of
 from rippletwin.flow_sensor.spectral_inversion import estimate_flow
+from rippletwin.harmonics import one_period
 from rippletwin.pump.faults import Slipper
 from rippletwin.pump.outlets import ConstantPressure
 from rippletwin.pump.simulation import simulate
@@ -51,9 +52,8 @@ def main():
     print("| sensors | noise, kPa | wave speed | method | 0-0.5 kHz | 0.5-1 | 1-1.5 | all | ms |")
     print("|---|---|---|---|---|---|---|---|---|")
     for sensors in SENSORS:
-        spectrum = np.zeros((sensors, SAMPLES // 2 + 1), complex)
-        spectrum[:, orders] = Twin(rig(sensors)).respond(worn, SPEED, PRESSURE, orders)
-        clean = np.fft.irfft(spectrum * SAMPLES / 2)
+        response = Twin(rig(sensors)).respond(worn, SPEED, PRESSURE, orders)
+        clean = one_period(response, SAMPLES, orders)
         for factor in (1.0, 1.01):
             network = network_of(Twin(rig(sensors, factor)), PRESSURE, healthy)
             started = time.perf_counter()

@@ -33,6 +33,7 @@ from rippletwin.flow_sensor import pinn
 from rippletwin.flow_sensor.estimate import band_limit
 from rippletwin.flow_sensor.line_response import network_of
 from rippletwin.flow_sensor.spectral_inversion import estimate_flow
+from rippletwin.harmonics import peak_amplitudes
 from rippletwin.learning.dataset import augment
 from rippletwin.learning.networks import build
 from rippletwin.learning.training import TrainingSettings, predict, train
@@ -124,7 +125,7 @@ def windows_of(recording, pistons: int, truth: Path):
     windows = cut.windows[:WINDOWS]
     start = np.angle(windows[:, -2, 0] + 1j * windows[:, -1, 0])
     orders = np.arange(1, int(BAND / cut.speed_hz.mean()) + 1)
-    harmonics = np.fft.rfft(flow)[orders] * 2 / len(flow)
+    harmonics = peak_amplitudes(flow)[orders]
     return (
         windows[:, :-2],
         cut.speed_hz[:WINDOWS],

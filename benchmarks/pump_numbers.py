@@ -15,6 +15,7 @@ import argparse
 import numpy as np
 
 from rippletwin.case.model import Fluid
+from rippletwin.harmonics import peak_amplitudes
 from rippletwin.pump.ripple_sensitivity import ripple_change
 from virtualrig.draw import draw
 from virtualrig.pump import Pump
@@ -25,7 +26,7 @@ MODULUS, TIMING = 0.1, 1.0  # what a unit of each coordinate is: relative, deg
 
 
 def harmonics(flow: np.ndarray, orders: np.ndarray) -> np.ndarray:
-    return 2.0 / len(flow) * np.fft.rfft(flow)[orders]
+    return peak_amplitudes(flow)[orders]
 
 
 def aligned(true: np.ndarray, nominal: np.ndarray, orders: np.ndarray) -> np.ndarray:

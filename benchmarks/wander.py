@@ -16,6 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rippletwin.harmonics import peak_amplitudes
 from rippletwin.spectra.angular_resampling import cut_revolutions
 from rippletwin.spectra.speed_regression import harmonics_at_mean_speed, mean_speed
 from virtualrig.recorder import SAMPLING_RATE_HZ, Point, record
@@ -53,8 +54,7 @@ def harmonics(take, speed_rpm: float):
     revolutions = cut_revolutions(take.pressure, SAMPLING_RATE_HZ, PISTONS, speed_rpm)
     speed = mean_speed(revolutions.speed_hz)
     orders = PISTONS * np.arange(1, int(HIGHEST_HZ / speed / PISTONS) + 1)
-    spectra = 2 * np.fft.rfft(revolutions.windows, axis=2)[:, :, orders]
-    spectra /= revolutions.windows.shape[2]
+    spectra = peak_amplitudes(revolutions.windows)[:, :, orders]
     return (
         speed,
         orders,

@@ -54,8 +54,11 @@ def modules() -> dict:
 
 def imports_of(path) -> set[str]:
     """Modules that a source file imports; of `from a import b` it is a.b where that is a module."""
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    found, tree = set(), ast.parse(path.read_text())
+    for node in ast.walk(tree):  # what only a type checker reads is never imported
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            node.body = []
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             found |= {name.name for name in node.names}
         elif isinstance(node, ast.ImportFrom):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from rippletwin.case.model import Fluid, Segment
-from rippletwin.line.frequency_domain.line_network import Network
+from rippletwin.harmonics import peak_amplitudes
+from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
 from rippletwin.pump.faults import Cylinder, Slipper
 from rippletwin.pump.geometry import Geometry, kinematic_flow
@@ -30,7 +31,7 @@ def piped():
 
 def harmonics(ripple, orders):
     """Peak complex amplitudes (..., F) of one revolution (..., M)."""
-    return 2 * np.fft.rfft(ripple)[..., orders] / ripple.shape[-1]
+    return peak_amplitudes(ripple)[..., orders]
 
 
 def relative_rms(a, b):
@@ -296,7 +297,7 @@ def test_norton_source_answers_a_line_as_the_coupled_pump_does(piped):
     truth = harmonics(piped.sensor_pressure, orders)
 
     def error(admittance, count):
-        network = Network(
+        network = FrequencyDomainLine(
             s=s,
             lengths=np.array([PIPE.length]),
             series=series_impedance(

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from scipy.special import jv
 
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor
-from rippletwin.line.frequency_domain.line_network import Network
+from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
 from rippletwin.twin import twin_file
 from rippletwin.twin.effects.base import LineState, Place
@@ -43,7 +42,7 @@ def rig(gas=False):
 
 
 def network(rig, friction="steady"):
-    """Network and line state of a rig with a resistance of 3e10 Pa s/m3 at its end."""
+    """Line and its state of a rig with a resistance of 3e10 Pa s/m3 at its end."""
     density, viscosity = rig.fluid.density, rig.fluid.kinematic_viscosity
     gas = rig.fluid.is_gas
     series = [
@@ -56,7 +55,7 @@ def network(rig, friction="steady"):
         shunt_admittance(S, density=density, wave_speed=s.wave_speed, diameter=s.diameter)
         for s in rig.line
     ]
-    net = Network(
+    net = FrequencyDomainLine(
         s=S,
         lengths=np.array([s.length for s in rig.line]),
         series=np.array(series),
@@ -255,21 +254,6 @@ def test_effect_in_a_twin_survives_plain_data():
     again = twin_file.from_dict(twin_file.to_dict(twin))
     assert again.effects[0][0].name == "line_volume"
     np.testing.assert_array_equal(again.theta, twin.theta)
-
-
-def test_modulation_makes_the_sidebands_of_a_modulated_wave():
-    """Analytic (Jacobi and Anger): order 27 of a shaft ahead by |b| cos(t + arg b) spreads to order
-    n as j^(n-27) J_(n-27)(27 |b|) n/27; what is left of it is not it less its sidebands."""
-    from rippletwin.harmonics import peak_amplitudes, phase_modulate
-
-    b, spectrum = 0.02 * np.exp(0.4j), np.zeros(28, complex)
-    spectrum[27] = 3.0 * np.exp(1j)
-    orders = np.arange(22, 33)
-    m = orders - 27
-    exact = 1j**m * jv(m, 27 * abs(b)) * np.exp(1j * m * np.angle(b)) * orders / 27 * spectrum[27]
-    np.testing.assert_allclose(
-        peak_amplitudes(phase_modulate(spectrum, b, 256))[orders], exact, atol=1e-9
-    )
 
 
 def test_half_sine_harmonics_and_equal_pistons():

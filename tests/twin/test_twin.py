@@ -11,9 +11,9 @@ import pytest
 from harmonic_balance import balance_orifice
 from rippletwin.calibration.likelihood import Likelihood
 from rippletwin.calibration.misfit import misfit, theil
-from rippletwin.case.model import FlowRipple, Load
+from rippletwin.case.model import Load
 from rippletwin.harmonics import flow_harmonics
-from rippletwin.line.frequency_domain.line_network import Network
+from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
 from rippletwin.twin import twin_file
 from rippletwin.twin.effects.base import Place
@@ -41,7 +41,7 @@ def test_three_points_at_once_equal_newtons_harmonic_balance_one_by_one():
     for o, predicted in zip(points, twin.predict(points)):
         orders = np.append(o.orders, o.orders[-1] + 9 * np.arange(1, 4))
         s = 2j * np.pi * orders * o.speed_hz
-        network = Network(
+        network = FrequencyDomainLine(
             s=s,
             lengths=np.array([x.length for x in rig.line]),
             series=np.array(
@@ -83,16 +83,6 @@ def test_the_orifice_is_not_linear_at_this_ripple():
     small = replace(small, flow=small.flow + 1e-4 * (o.flow_ripple.flow - small.flow))
     linear = 1e4 * Twin(rig, [o]).predict([replace(o, flow_ripple=small)])[0]
     assert np.linalg.norm(full - linear) > 1e-3 * np.linalg.norm(full)
-
-
-def test_flow_harmonics_are_those_of_the_ripple():
-    """Amplitude and phase of a known cosine come back, from even and from uneven angles."""
-    for angle in (np.arange(0.0, 360.0, 0.5), np.sort(np.r_[0.0, np.arange(0.2, 360.0, 0.37)])):
-        flow = 2.0 + 0.5 * np.cos(9 * np.deg2rad(angle) + 0.3)
-        mean, ninth, other = flow_harmonics(FlowRipple(angle, flow), np.array([0, 9, 18]))
-        assert mean == pytest.approx(2.0, rel=1e-4)
-        assert ninth == pytest.approx(0.5 * np.exp(0.3j), rel=2e-3)
-        assert abs(other) < 1e-3
 
 
 def test_the_shaft_angle_shifts_the_recording_in_time():

@@ -17,7 +17,7 @@ import numpy as np
 
 from rippletwin.calibration.fit import Fit, posterior_at_fit
 from rippletwin.calibration.posterior import Posterior
-from rippletwin.line.frequency_domain.line_network import Network
+from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.twin.effects.base import LineState
 from rippletwin.twin.forward_model import ForwardModel, reflection
 
@@ -49,7 +49,7 @@ class MissingImmittance:
         return describe_law(self.frequency_hz, self.points, 1.0 / np.maximum(self.sd, 1e-300) ** 2)
 
 
-def observable_of(posterior: Posterior, network: Network) -> np.ndarray:
+def observable_of(posterior: Posterior, network: FrequencyDomainLine) -> np.ndarray:
     """What a network would be seen as, (S, F): pressures, or reflection coefficients."""
     twin = posterior.twin
     if posterior.observations[0].kind != "input_impedance":
@@ -113,7 +113,9 @@ def missing_immittance(
     )
 
 
-def _networks(posterior: Posterior, effect, place, values) -> tuple[Network, Network]:
+def _networks(
+    posterior: Posterior, effect, place, values
+) -> tuple[FrequencyDomainLine, FrequencyDomainLine]:
     """The fit's line without one effect and with it, the load's state held where an orifice is."""
     twin, forward = posterior.twin, posterior.forward
     rest = tuple(pair for pair in twin.effects if pair != (effect, place))
@@ -129,12 +131,12 @@ def _networks(posterior: Posterior, effect, place, values) -> tuple[Network, Net
         shunt=without.shunt.copy(),
         inserts=list(without.inserts),
     )
-    line = forward._line_state(twin.arrays(twin.theta))
-    effect.apply(changed, line, values, place)
+    state = forward.line_state(twin.arrays(twin.theta))
+    effect.apply(changed, state, values, place)
     return without, changed
 
 
-def _changed_quantity(without: Network, changed: Network):
+def _changed_quantity(without: FrequencyDomainLine, changed: FrequencyDomainLine):
     """(words, where, unit, change (F,)) of the first quantity in which two networks differ."""
 
     def over(x):
@@ -169,7 +171,9 @@ def _changed_quantity(without: Network, changed: Network):
     return None
 
 
-def _interpolate_networks(without: Network, changed: Network, share: float) -> Network:
+def _interpolate_networks(
+    without: FrequencyDomainLine, changed: FrequencyDomainLine, share: float
+) -> FrequencyDomainLine:
     """The network with `share` of every change; 1 is `changed`."""
 
     def mix(a, b):
@@ -249,7 +253,7 @@ def is_passive(fit: Fit, which: int = -1) -> bool:
     s = np.concatenate([1j * w, *(w * (np.tan(a) + 1j) * np.cos(a) for a in (0.3, 0.9, 1.5))])
     v, fluid = twin.arrays(twin.theta), twin.rig.fluid
     state = LineState(fluid.density, v.viscosity, v.diameters, v.wave_speeds, v.lengths)
-    line = Network(s, v.lengths, series=np.ones((len(v.lengths), len(s))), shunt=None)
+    line = FrequencyDomainLine(s, v.lengths, series=np.ones((len(v.lengths), len(s))), shunt=None)
     effect.apply(line, state, values, place)
     (immittance,) = (insert.immittance for insert in line.inserts)
     return bool(np.all(immittance.real >= -1e-9 * np.abs(immittance)))

@@ -170,11 +170,8 @@ def _variance(o) -> np.ndarray:
 
 
 def _response(twin: Twin, observation) -> np.ndarray:
-    """Readings (S, F) for unit flow at every order, the orifice linear."""
-    forward = ForwardModel(twin, [observation])
-    forward.source.flow = np.ones_like(forward.source.flow)
-    forward._orifice = None
-    return forward(twin.theta)[0]
+    """Readings (S, F) for unit flow at every order, load and line linear."""
+    return ForwardModel(twin, [observation]).unit_response(twin.theta)[0]
 
 
 def _fit_modulation(even, orders, off, flow, unit, pistons):

@@ -2,12 +2,12 @@
 
 An effect is one file in this folder that defines `EFFECT`, an instance of `Effect`. The registry
 finds it there; nothing else changes. It says the same thing twice: `apply` mutates a network of
-the frequency domain (`Network`), `in_time` a line of the time domain
-(`rippletwin.line.time_domain.line_elements.Line`): its pipes, elements, flow or sensors.
+the frequency domain (`FrequencyDomainLine`), `apply_in_time` a line of the time domain
+(`rippletwin.line.time_domain.line_elements.TimeDomainLine`): its pipes, elements, flow or sensors.
 
 For `apply`, values may be floats or arrays of shape (B, 1) for B parameter sets at once:
 everything there is elementwise, so that a network with leading batch dimension is mutated by the
-same lines. `in_time` gets floats and a `LineState` of one operating point.
+same lines. `apply_in_time` gets floats and a `LineState` of one operating point.
 """
 
 from __future__ import annotations
@@ -18,23 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri
 
-from rippletwin.twin.priors import Prior, uniform
+from rippletwin.twin.parameters import Parameter
+from rippletwin.twin.priors import uniform
 
 ATMOSPHERE = 1.01325e5  # Pa; pressures of a case are above it
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A parameter of an effect: name, unit (SI), proper prior.
-
-    `scan` holds the prior's coordinates that a fit should set out from, each of them, because the
-    likelihood has several valleys along this parameter.
-    """
-
-    name: str
-    unit: str
-    prior: Prior
-    scan: tuple[float, ...] = (0.0,)
 
 
 @dataclass(frozen=True)
@@ -120,8 +107,9 @@ class Effect:
     source      author, year and equation or section
     parameters  (rig, place) -> tuple of Parameter
     places      rig -> tuple of Place
-    apply       (network, line: LineState, values: name -> value, place) mutates the network
-    in_time     (line: parts.Line, state: LineState, values, place) mutates the line
+    apply       (network: FrequencyDomainLine, state: LineState, values: name -> value, place)
+                mutates the network
+    apply_in_time   (line: TimeDomainLine, state: LineState, values, place) mutates the line
     named       False for a passive network that stands in for physics without a name
     certain     no real line is without it: where something is missing at all, it is taken in
                 unless the data speak against it
@@ -136,7 +124,7 @@ class Effect:
     parameters: Callable[[object, Place], tuple[Parameter, ...]]
     places: Callable[[object], tuple[Place, ...]]
     apply: Callable[[object, LineState, Mapping[str, object], Place], None]
-    in_time: Callable[[object, LineState, Mapping[str, float], Place], None]
+    apply_in_time: Callable[[object, LineState, Mapping[str, float], Place], None]
     certain: bool = False
     named: bool = True
     friction: str | None = None
@@ -192,7 +180,7 @@ def segment_at(lengths: np.ndarray, position) -> int:
 def on_line(network, position):
     """`position` (m), held on the line, which a fit may have made a little shorter.
 
-    `network` is a `Network` or a `Line`.
+    `network` is a `FrequencyDomainLine` or a `TimeDomainLine`.
     """
     return np.clip(position, 0.0, network.length)
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from rippletwin.line.time_domain.line_elements import Element
-from rippletwin.twin.effects.base import Effect, Parameter, load_place
+from rippletwin.twin.effects.base import Effect, load_place
+from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import normal
 
 
@@ -22,20 +23,20 @@ def radiation_impedance(s, diameter, wave_speed, density, end_correction):
     return characteristic * (1.0 + reflection) / (1.0 - reflection)
 
 
-def _apply(network, line, values, place):
+def _apply(network, state, values, place):
     network.load = (
         "impedance",
         radiation_impedance(
             network.s,
-            line.diameters[-1],
-            line.wave_speeds[-1],
-            line.density,
+            state.diameters[-1],
+            state.wave_speeds[-1],
+            state.density,
             values["end_correction"],
         ),
     )
 
 
-def _in_time(line, state, values, place):
+def _apply_in_time(line, state, values, place):
     line.load.append(radiation_element(state, values["end_correction"]))
 
 
@@ -67,6 +68,6 @@ EFFECT = Effect(
     parameters=lambda rig, place: (Parameter("end_correction", "1", normal(0.7, 0.1)),),
     places=lambda rig: load_place(rig) if rig.load.kind == "open" else (),
     apply=_apply,
-    in_time=_in_time,
+    apply_in_time=_apply_in_time,
     certain=True,
 )

@@ -11,11 +11,11 @@ from rippletwin.line.time_domain.line_elements import Element
 from rippletwin.twin.effects.base import (
     ATMOSPHERE,
     Effect,
-    Parameter,
     on_line,
     position_parameter,
     position_place,
 )
+from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal, uniform
 
 MOST_DRAWN = 0.5  # of the mean flow: more is no leak
@@ -48,16 +48,16 @@ def drawn_share(values, state):
     return np.minimum(slope * pressure / (1.0 - exponent) / state.mean_flow, MOST_DRAWN)
 
 
-def _apply(network, line, values, place):
+def _apply(network, state, values, place):
     conductance = leak_conductance(
-        values["conductance"], values["pressure_exponent"], _across(line)
+        values["conductance"], values["pressure_exponent"], _across(state)
     )
     network.inserts.append(
         Insert(on_line(network, values["position"]), "shunt", conductance + 0.0 * network.s)
     )
     kind, value = network.load
     if kind == "admittance":
-        network.load = kind, value * (1.0 - drawn_share(values, line))
+        network.load = kind, value * (1.0 - drawn_share(values, state))
 
 
 def _parameters(rig, place):
@@ -72,7 +72,7 @@ def _parameters(rig, place):
     )
 
 
-def _in_time(line, state, values, place):
+def _apply_in_time(line, state, values, place):
     conductance = leak_conductance(
         values["conductance"], values["pressure_exponent"], _across(state)
     )
@@ -94,5 +94,5 @@ EFFECT = Effect(
     parameters=_parameters,
     places=position_place,
     apply=_apply,
-    in_time=_in_time,
+    apply_in_time=_apply_in_time,
 )

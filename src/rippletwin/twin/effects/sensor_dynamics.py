@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from rippletwin.twin.effects.base import Effect, Parameter, scale_sensor, sensor_places
+from rippletwin.twin.effects.base import Effect, scale_sensor, sensor_places
 from rippletwin.twin.effects.lumped_elements import second_order_lag
+from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal
 
 
-def _apply(network, line, values, place):
+def _apply(network, state, values, place):
     scale_sensor(network, place.index, second_order_lag(network.s, **values))
 
 
-def _in_time(line, state, values, place):
+def _apply_in_time(line, state, values, place):
     line.sensors.append((place.index, lambda s: second_order_lag(s, **values)))
 
 
@@ -27,5 +28,5 @@ EFFECT = Effect(
     ),
     places=sensor_places,
     apply=_apply,
-    in_time=_in_time,
+    apply_in_time=_apply_in_time,
 )
