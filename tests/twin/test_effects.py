@@ -221,17 +221,6 @@ def test_thermal_layer_goes_from_isothermal_to_adiabatic():
     np.testing.assert_allclose(wide, 1.0, rtol=1e-3)
 
 
-def test_radiation_lengthens_the_tube_and_loses_power():
-    """Low frequency: Z_r/Zc -> j kR delta + (kR)^2/4 (Levine & Schwinger 1948)."""
-    from rippletwin.twin.effects.end_radiation import radiation_impedance
-
-    s = 2j * np.pi * np.array([200.0])
-    z = radiation_impedance(s, 0.004, 343.0, 1.2, 0.6133) / (1.2 * 343.0 / (np.pi * 0.002**2))
-    kr = s.imag * 0.002 / 343.0
-    np.testing.assert_allclose(z.imag, 0.6133 * kr, rtol=1e-3)
-    np.testing.assert_allclose(z.real, kr**2 / 4, rtol=1e-2)
-
-
 def test_creep_compliance_fades_with_frequency():
     """A hose is 1 + kappa times softer at rest and as soft as its elastic wall far above 1/tau."""
     net, state = network(rig())
