@@ -23,6 +23,7 @@ recorded = store.load(snakemake.input.recordings)
 first = rig.line[0]
 pipe = Segment(params.pipe_length, first.diameter, first.wave_speed)
 positions = tuple(sensor.position for sensor in rig.sensors)
+behind = rig.load.back_pressure
 
 
 def ripple(outlet, fault=None):
@@ -37,9 +38,11 @@ fault = [
     if name in kinds
 ]
 # A faulty pump meets the orifice that the healthy one left.
-result = healthy = ripple(Pipe(pipe, positions, load_pressure=recorded.load_pressure))
+result = healthy = ripple(
+    Pipe(pipe, positions, load_pressure=recorded.load_pressure, back_pressure=behind)
+)
 if fault:
-    result = ripple(Pipe(pipe, positions, orifice=healthy.orifice), fault)
+    result = ripple(Pipe(pipe, positions, orifice=healthy.orifice, back_pressure=behind), fault)
 # What any line can be driven with: the flow into a constant pressure, and the chambers beside it.
 source = ripple(ConstantPressure(recorded.load_pressure), fault)
 pumping_hz = rig.pump["pistons"] * recorded.speed_hz

@@ -19,7 +19,7 @@ from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.line.frequency_domain.nonlinear_compliance import NonlinearComplianceSolver
 from rippletwin.line.frequency_domain.orifice_load import OrificeLoad
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
-from rippletwin.twin.effects.base import ATMOSPHERE, LineState
+from rippletwin.twin.effects.base import LineState
 from rippletwin.twin.flow_source import FlowSource
 
 if TYPE_CHECKING:
@@ -162,7 +162,7 @@ class ForwardModel:
             diameters=v.diameters,
             wave_speeds=v.wave_speeds,
             lengths=v.lengths,
-            mean_pressure=np.nan_to_num(self.load_pressure) + ATMOSPHERE,
+            mean_pressure=np.nan_to_num(self.load_pressure),
             load_resistance=resistance,
             heat_capacity_ratio=fluid.heat_capacity_ratio,
             prandtl=fluid.prandtl,

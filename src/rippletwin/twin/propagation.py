@@ -11,7 +11,7 @@ from rippletwin.errors import InputError
 from rippletwin.harmonics import one_period
 from rippletwin.line.time_domain import method_of_characteristics
 from rippletwin.line.time_domain.line_elements import End, Pipe, TimeDomainLine, capacitance
-from rippletwin.twin.effects.base import ATMOSPHERE, LineState
+from rippletwin.twin.effects.base import LineState
 
 PERIODS = 200  # at most, until the line repeats itself
 
@@ -92,7 +92,7 @@ def line_in_time(
         diameters=np.array([s.diameter for s in rig.line]),
         wave_speeds=np.array([s.wave_speed for s in rig.line]),
         lengths=np.array([s.length for s in rig.line]),
-        mean_pressure=load_pressure + ATMOSPHERE,
+        mean_pressure=load_pressure,
         load_resistance=resistance,
         heat_capacity_ratio=rig.fluid.heat_capacity_ratio,
         prandtl=rig.fluid.prandtl,

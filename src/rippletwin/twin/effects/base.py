@@ -18,10 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri
 
+from rippletwin.case.model import absolute
 from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import uniform
-
-ATMOSPHERE = 1.01325e5  # Pa; pressures of a case are above it
 
 
 @dataclass(frozen=True)
@@ -50,8 +49,7 @@ class LineState:
     viscosity        kinematic, m2/s
     friction         law of the line with all its effects, as in `segment.series_impedance`
     diameters, lengths   (n,) of m, wave_speeds (n,) of m/s: one entry a segment, pump first
-    mean_pressure    Pa absolute at the load, (F,) or scalar: of the operating point each frequency
-                     belongs to
+    mean_pressure    Pa at the load, (F,) or scalar: each frequency's own operating point's
     load_resistance  static dp/dq of the load in Pa s/m3, (F,) or scalar; None where it has none
     heat_capacity_ratio, prandtl   of a gas, else None
     orders, recording, mean_flow   shaft order, recording's number and mean flow (m3/s) of each
@@ -65,7 +63,7 @@ class LineState:
     diameters: np.ndarray
     wave_speeds: np.ndarray
     lengths: np.ndarray
-    mean_pressure: np.ndarray | float = ATMOSPHERE
+    mean_pressure: np.ndarray | float = 0.0
     load_resistance: np.ndarray | float | None = None
     heat_capacity_ratio: float | None = None
     prandtl: float | None = None
@@ -79,16 +77,16 @@ class LineState:
         """Cross section of segment k, m2."""
         return 0.25 * np.pi * self.diameters[k] ** 2
 
-    def pressure_in(self, k: int):
+    def absolute_pressure_in(self, k: int):
         """Mean pressure in the middle of segment k, Pa absolute.
 
         Steady laminar friction of the mean flow lifts it above that at the load (Hagen-Poiseuille).
         """
         if self.mean_flow is None or self.friction == "none":
-            return self.mean_pressure
+            return absolute(self.mean_pressure)
         behind = sum(self._fall(j) for j in range(k + 1, len(self.lengths)))
         rise = (0.5 * self._fall(k) + behind) * np.nan_to_num(self.mean_flow)
-        return self.mean_pressure + rise
+        return absolute(self.mean_pressure) + rise
 
     def _fall(self, k: int):
         """Pressure that a flow loses in segment k, over the flow, Pa s/m3."""

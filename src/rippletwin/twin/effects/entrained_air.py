@@ -12,8 +12,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import binom
 
+from rippletwin.case.model import ATMOSPHERE
 from rippletwin.line.frequency_domain.nonlinear_compliance import Storage
-from rippletwin.twin.effects.base import ATMOSPHERE, Effect, line_place
+from rippletwin.twin.effects.base import Effect, line_place
 from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal, normal
 
@@ -33,7 +34,7 @@ def gas_series(gas_fraction, exponent, mean_pressure):
 
 def _apply(network, state, values, place):
     for k in range(len(state.diameters)):
-        mean = np.broadcast_to(state.pressure_in(k), np.shape(network.shunt[k]))
+        mean = np.broadcast_to(state.absolute_pressure_in(k), np.shape(network.shunt[k]))
         first, *beyond = gas_series(values["gas_fraction"], values["polytropic_exponent"], mean)
         network.shunt[k] = network.shunt[k] + state.area(k) * network.s * first / mean
         network.nonlinear_compliances.append(Storage(k, state.area(k), mean, np.array(beyond)))
@@ -41,7 +42,7 @@ def _apply(network, state, values, place):
 
 def _apply_in_time(line, state, values, place):
     for k, pipe in enumerate(line.pipes):
-        mean = float(state.pressure_in(k))
+        mean = float(state.absolute_pressure_in(k))
         series = gas_series(values["gas_fraction"], values["polytropic_exponent"], mean)
         line.pipes[k] = replace(pipe, law=(mean, *series))
 

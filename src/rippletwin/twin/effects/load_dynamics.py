@@ -8,7 +8,7 @@ import numpy as np
 
 from rippletwin.line.frequency_domain.line_network import Insert
 from rippletwin.line.time_domain.line_elements import Element, inertance
-from rippletwin.twin.effects.base import ATMOSPHERE, Effect, Place
+from rippletwin.twin.effects.base import Effect, Place
 from rippletwin.twin.effects.lumped_elements import second_order_lag
 from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal, normal
@@ -51,7 +51,7 @@ def _apply_in_time(line, state, values, place):
         line.inserts.append(inertance(line.length, values["inertance"]))
         return
     w = 2.0 * np.pi * values["natural_frequency"]
-    drop = state.mean_pressure - ATMOSPHERE - line.end.pressure
+    drop = state.mean_pressure - line.end.pressure
     gain = values["gain"] / (
         2.0 * drop
     )  # of the share that opens: see `rippletwin.line.frequency_domain.orifice_load`
