@@ -18,7 +18,7 @@ from torch import nn
 
 from rippletwin.learning.architectures import ARCHITECTURES
 from rippletwin.learning.networks import build
-from rippletwin.learning.training import MALLOC_ENVIRONMENT
+from rippletwin.learning.malloc_settings import MALLOC_ENVIRONMENT
 
 
 def main() -> None:
