@@ -1,5 +1,5 @@
 # The DAG's front door: config, its schema, the stages, the targets.
-from snakemake.utils import min_version, validate
+from snakemake.utils import min_version
 
 min_version("9.0")
 
@@ -9,9 +9,6 @@ configfile: "config/config.yaml"
 
 # Used with --sdm apptainer only: apptainer build rippletwin.sif workflow/rippletwin.def
 container: "rippletwin.sif"
-
-
-validate(config, "workflow/schemas/config.schema.yaml")
 
 
 # Its limit of jobs a second makes snakemake 9 look for work once a second for every job that it
@@ -28,28 +25,43 @@ include: "workflow/rules/explain.smk"
 include: "workflow/rules/faults.smk"
 include: "workflow/rules/propagate.smk"
 include: "workflow/rules/flow_sensor.smk"
-include: "workflow/rules/augment.smk"
-include: "workflow/rules/image.smk"
+include: "workflow/rules/samples.smk"
+include: "workflow/rules/images.smk"
 include: "workflow/rules/train.smk"
 include: "workflow/rules/evaluate.smk"
 include: "workflow/rules/compound.smk"
 include: "workflow/rules/report.smk"
-include: "workflow/rules/concealed.smk"
 include: "workflow/rules/attention.smk"
+include: "workflow/rules/claims.smk"
+include: "workflow/rules/figures.smk"
+include: "workflow/rules/concealed.smk"
+
+
+def get_final_output():
+    """What a whole run makes with the configured datasets, networks and compound faults."""
+    wanted = [
+        rules.accuracy_table.output,
+        rules.claims.output,
+        rules.plot_accuracy.output,
+        rules.plot_calibration.output,
+        expand(rules.plot_confusion.output, dataset=CHOSEN),
+        expand(rules.plot_seeds.output, dataset=SIMULATED),
+    ]
+    if PRESSURES:
+        wanted.append(rules.compare_sst.output)
+    if corrected_pairs():
+        wanted.append(rules.report_cost.output)
+    if SIMULATED:
+        wanted += [rules.attention_table.output, rules.plot_ranks.output]
+        domains = [name for name in ("time", "image") if of_domain(name)]
+        wanted += expand(rules.plot_attention.output, dataset=SIMULATED, domain=domains)
+    if SIMULATED and STATES["compound"]:
+        wanted.append(rules.report_compound.output)
+        wanted += expand(rules.plot_compound_seeds.output, dataset=SIMULATED)
+    return wanted
 
 
 rule all:
     default_target: True
     input:
-        rules.report.output,
-        rules.plot_accuracy.output,
-        rules.plot_calibration.output,
-        attention_targets(),
-        expand(rules.plot_confusion.output, dataset=config["datasets"]),
-        expand(rules.plot_seeds.output, dataset=simulated()),
-        rules.report_cost.output if corrected() else [],
-        rules.report_compound.output if COMPOUND else [],
-        expand(
-            rules.plot_seeds.output,
-            dataset=[ASIDE + dataset for dataset in simulated() if COMPOUND],
-        ),
+        get_final_output(),

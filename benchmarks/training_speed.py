@@ -17,8 +17,8 @@ import torch
 from torch import nn
 
 from rippletwin.learning.architectures import ARCHITECTURES
-from rippletwin.learning.networks import build
 from rippletwin.learning.malloc_settings import MALLOC_ENVIRONMENT
+from rippletwin.learning.networks import build
 
 
 def main() -> None:

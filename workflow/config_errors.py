@@ -1,4 +1,4 @@
-"""What is wrong with a configuration, one short line an error.
+"""What is wrong with a configuration or with the case that it names, one short line an error.
 
 snakemake.utils.validate prints the whole schema and the whole configuration with the first error;
 a person needs the key, and what it should be.
@@ -11,14 +11,18 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import jsonschema
+import pandas as pd
 import yaml
 from snakemake.exceptions import WorkflowError
+
+from rippletwin.case.rig_yaml import read_sheet
+from rippletwin.errors import InputError
 
 MAX_VALUE_CHARACTERS = 60  # of a wrong value that a message shows
 
 
 def check_config(config: dict, schema: Path) -> None:
-    """Raise WorkflowError with a line for each key of `config` that violates the schema (a file)."""
+    """Raise WorkflowError with a line for each key that violates the schema, a YAML file."""
     validator = jsonschema.Draft202012Validator(yaml.safe_load(schema.read_text("utf-8")))
     errors = sorted(validator.iter_errors(config), key=lambda error: list(map(str, error.path)))
     lines = [line for error in errors for line in _lines(error)]
@@ -38,6 +42,25 @@ def check_names(key: str, names: Sequence[str], known: Sequence[str], remedy: st
     ]
     if lines:
         raise WorkflowError("\n".join(lines))
+
+
+def check_datasets(table: pd.DataFrame) -> None:
+    """Raise WorkflowError where two rows of config/datasets.tsv have one name or are the same."""
+    for columns in (["name"], ["signal", "line", "twin"]):
+        twice = table[table.duplicated(columns, keep=False)]
+        if len(twice):
+            names = ", ".join(twice["name"])
+            raise WorkflowError(f"config/datasets.tsv: {names}: the same {', '.join(columns)}")
+    compared = [name for name in table["uncorrected"] if name != "none"]
+    check_names("datasets.tsv: uncorrected", compared, list(table["name"]))
+
+
+def read_rig(path: Path) -> dict:
+    """The sheet of the configured case; raises WorkflowError with what is wrong with it."""
+    try:
+        return read_sheet(path)
+    except InputError as error:
+        raise WorkflowError(f"config: case: {error}") from None
 
 
 def _lines(error: jsonschema.ValidationError) -> Iterator[str]:

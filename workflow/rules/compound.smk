@@ -1,9 +1,18 @@
-# Compound faults, which no network learnt -> what the networks make of them.
+# Compound faults, which no network learnt -> what the networks say of them.
+def compound_samples_of(wildcards):
+    """Samples of compound faults for a network of a dataset, of the first seed."""
+    return for_network(
+        wildcards,
+        f"{RESULTS}/samples/{{dataset}}/compound/0x1.zarr",
+        f"{RESULTS}/images/{{dataset}}/compound/0.zarr",
+    )
+
+
 rule evaluate_compound:
     input:
         samples=compound_samples_of,
         weights=rules.train.output.weights,
-        source=library("evaluate_compound.py"),
+        source=scripts_sources("evaluate_compound.py"),
     output:
         f"{RESULTS}/compound/{{dataset}}/{{architecture}}.csv",
     log:
@@ -11,7 +20,6 @@ rule evaluate_compound:
     benchmark:
         f"{RESULTS}/benchmarks/evaluate_compound/{{dataset}}/{{architecture}}.tsv"
     priority: 30
-    threads: 1
     resources:
         mem_mb=2000,
     script:
@@ -21,11 +29,11 @@ rule evaluate_compound:
 rule report_compound:
     input:
         answers=expand(
-            f"{RESULTS}/compound/{{dataset}}/{{architecture}}.csv",
-            dataset=simulated(),
+            rules.evaluate_compound.output,
+            dataset=SIMULATED,
             architecture=config["architectures"],
         ),
-        source=library("report_compound.py"),
+        source=scripts_sources("report_compound.py"),
     output:
         report(
             f"{RESULTS}/compound.md",
@@ -36,14 +44,7 @@ rule report_compound:
         f"{RESULTS}/logs/report_compound.log",
     benchmark:
         f"{RESULTS}/benchmarks/report_compound.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
     params:
-        cells=[
-            (dataset, architecture)
-            for dataset in simulated()
-            for architecture in config["architectures"]
-        ],
+        cells=cells(SIMULATED),
     script:
         "../scripts/report_compound.py"

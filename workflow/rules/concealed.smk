@@ -1,6 +1,8 @@
 # How often `explain` is right when the effect is hidden: snakemake --cores 2 concealed
+import subprocess
+
 CONCEALED = f"{RESULTS}/concealed"
-TOOL = SOURCE / "concealed" / "tool.py"
+TOOL = ROOT / "src/concealed/tool.py"
 HIDDEN = [f"{n:03d}" for n in range(config["concealed"]["cases"])]
 
 
@@ -8,18 +10,38 @@ wildcard_constraints:
     hidden="[0-9]{3}",
 
 
+def git(*arguments):
+    """What git says of the tool that is tried."""
+    command = ["git", "-C", str(ROOT), *arguments]
+    try:
+        return subprocess.run(
+            command, check=True, capture_output=True, text=True
+        ).stdout.strip()
+    except (OSError, subprocess.CalledProcessError) as error:
+        raise WorkflowError(
+            "concealed: its cases follow from the tool's commit; run it in a git checkout"
+        ) from error
+
+
+def tool_commit(wildcards):
+    """Hash of the tool's source in the commit: nobody can pick the cases that follow from it."""
+    return git("rev-parse", "HEAD:src/rippletwin")
+
+
+def not_committed(wildcards):
+    """Whether the tool that runs differs from that commit, which the page then says."""
+    return git("status", "--porcelain", "src/rippletwin") != ""
+
+
 rule concealed_numerics:
     input:
-        source=virtualrig(),
+        source=relative(package_files("virtualrig")),
     output:
         f"{CONCEALED}/numerics.json",
     log:
         f"{RESULTS}/logs/concealed_numerics.log",
     benchmark:
         f"{RESULTS}/benchmarks/concealed_numerics.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
     params:
         commit=tool_commit,
         number=config["concealed"]["number"],
@@ -32,7 +54,7 @@ rule concealed_numerics:
 rule conceal:
     input:
         numerics=rules.concealed_numerics.output,
-        source=virtualrig(),
+        source=relative(package_files("virtualrig")),
     output:
         case=directory(f"{CONCEALED}/cases/{{hidden}}"),
         seal=f"{CONCEALED}/seals/{{hidden}}.json",
@@ -41,9 +63,6 @@ rule conceal:
         f"{RESULTS}/logs/conceal/{{hidden}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/conceal/{{hidden}}.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
     params:
         commit=tool_commit,
         number=config["concealed"]["number"],
@@ -59,9 +78,8 @@ rule conceal:
 rule explain_concealed:
     input:
         case=rules.conceal.output.case,
-        tool=os.path.relpath(TOOL),
-        jail=os.path.relpath(TOOL.with_name("jail.py")),
-        source=library(TOOL),
+        tool=relative([TOOL, TOOL.with_name("jail.py")]),
+        source=relative(source_files_of(TOOL)),
     output:
         verdict=f"{CONCEALED}/explained/{{hidden}}/verdict.json",
         baselines=f"{CONCEALED}/explained/{{hidden}}/baselines.json",
@@ -69,7 +87,6 @@ rule explain_concealed:
         f"{RESULTS}/logs/explain_concealed/{{hidden}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/explain_concealed/{{hidden}}.tsv"
-    threads: 1
     resources:
         mem_mb=2000,
     params:
@@ -87,16 +104,13 @@ rule commit_verdicts:
         seals=expand(rules.conceal.output.seal, hidden=HIDDEN),
         verdicts=expand(rules.explain_concealed.output.verdict, hidden=HIDDEN),
         baselines=expand(rules.explain_concealed.output.baselines, hidden=HIDDEN),
-        source=library("commit_verdicts.py"),
+        source=scripts_sources("commit_verdicts.py"),
     output:
         f"{CONCEALED}/commitments.json",
     log:
         f"{RESULTS}/logs/commit_verdicts.log",
     benchmark:
         f"{RESULTS}/benchmarks/commit_verdicts.tsv"
-    threads: 1
-    resources:
-        mem_mb=500,
     script:
         "../scripts/commit_verdicts.py"
 
@@ -107,14 +121,13 @@ rule oracle_concealed:
         case=rules.conceal.output.case,
         seal=rules.conceal.output.seal,
         key=rules.conceal.output.key,
-        source=library("oracle_concealed.py"),
+        source=scripts_sources("oracle_concealed.py"),
     output:
         f"{CONCEALED}/oracle/{{hidden}}.json",
     log:
         f"{RESULTS}/logs/oracle_concealed/{{hidden}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/oracle_concealed/{{hidden}}.tsv"
-    threads: 1
     resources:
         mem_mb=2000,
     script:
@@ -129,16 +142,13 @@ rule score_concealed:
         seal_keys=expand(rules.conceal.output.key, hidden=HIDDEN),
         verdicts=expand(rules.explain_concealed.output.verdict, hidden=HIDDEN),
         baselines=expand(rules.explain_concealed.output.baselines, hidden=HIDDEN),
-        source=library("score_concealed.py"),
+        source=scripts_sources("score_concealed.py"),
     output:
         rows=f"{CONCEALED}/rows.json",
     log:
         f"{RESULTS}/logs/score_concealed.log",
     benchmark:
         f"{RESULTS}/benchmarks/score_concealed.tsv"
-    threads: 1
-    resources:
-        mem_mb=500,
     script:
         "../scripts/score_concealed.py"
 
@@ -147,7 +157,7 @@ rule report_concealed:
     input:
         rows=rules.score_concealed.output.rows,
         numerics=rules.concealed_numerics.output,
-        source=library("report_concealed.py"),
+        source=scripts_sources("report_concealed.py"),
     output:
         page=report(
             f"{CONCEALED}/report.md",
@@ -164,9 +174,6 @@ rule report_concealed:
         f"{RESULTS}/logs/report_concealed.log",
     benchmark:
         f"{RESULTS}/benchmarks/report_concealed.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
     params:
         commit=tool_commit,
         not_committed=not_committed,

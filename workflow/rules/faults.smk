@@ -1,21 +1,25 @@
-# The pump, healthy and faulty -> outlet flow, and pressure in a pipe nobody calibrated.
-rule fault:
+# The pump, healthy and faulty -> outlet flow, and pressure in a pipe that nobody calibrated.
+def leak_area_of(wildcards):
+    """Fault -> its leak, m2, for every fault of the state."""
+    areas = config["faults"]["leak_area"]
+    faults = wildcards.state.split("+")
+    return {fault: areas[fault] for fault in faults if fault in areas}
+
+
+rule simulate_fault:
     input:
         rig=rig_sheet(),
-        recordings=rules.ingest.output.windows,
-        source=library("fault.py"),
+        recordings=rules.cut_windows.output.windows,
+        source=scripts_sources("simulate_fault.py"),
     output:
         directory(f"{RESULTS}/faults/{{state}}.zarr"),
     log:
-        f"{RESULTS}/logs/fault/{{state}}.log",
+        f"{RESULTS}/logs/simulate_fault/{{state}}.log",
     benchmark:
-        f"{RESULTS}/benchmarks/fault/{{state}}.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
+        f"{RESULTS}/benchmarks/simulate_fault/{{state}}.tsv"
     params:
         rig=rig_sections("fluid", "pump", "line", "sensors"),
         leak_area=leak_area_of,
         pipe_length=config["faults"]["pipe_length"],
     script:
-        "../scripts/fault.py"
+        "../scripts/simulate_fault.py"

@@ -1,8 +1,34 @@
 # One job trains one network on all seeds of a dataset: importing torch costs seconds a job.
+from rippletwin.learning.architectures import LONGEST_TRAININGS
+
+
+def samples_of(wildcards):
+    """What a network learns from: a store a seed, or the recordings."""
+    if DATASETS[wildcards.dataset].line == "rig":
+        return recorded_of(wildcards)
+    return for_network(
+        wildcards,
+        every_seed("samples/{dataset}/single/{seed}x1.zarr"),
+        every_seed("images/{dataset}/single/{seed}.zarr"),
+    )
+
+
+def priority_of(wildcards):
+    """Start the longest trainings first."""
+    name = wildcards.architecture
+    return 20 - LONGEST_TRAININGS.index(name) if name in LONGEST_TRAININGS else 10
+
+
+def cylinder_class_of(wildcards):
+    """Class of a recorded cylinder fault where networks learn from recordings, as in scoring."""
+    dataset = DATASETS[wildcards.dataset]
+    return config["scoring"][dataset.signal] if dataset.line == "rig" else None
+
+
 rule train:
     input:
         samples=samples_of,
-        source=library("train.py"),
+        source=scripts_sources("train.py"),
     output:
         weights=temp(f"{RESULTS}/models/{{dataset}}/{{architecture}}.pt"),
         history=f"{RESULTS}/models/{{dataset}}/{{architecture}}.json",
@@ -10,14 +36,15 @@ rule train:
         f"{RESULTS}/logs/train/{{dataset}}/{{architecture}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/train/{{dataset}}/{{architecture}}.tsv"
-    priority: urgency_of
-    threads: 1
+    priority: priority_of
     resources:
         mem_mb=4000,
     params:
         seeds=config["seeds"],
-        settings=lambda wildcards: config["training"][family_of(wildcards.architecture)],
-        share=config["experimental"]["training_share"],
-        cylinder=config["scoring"]["pressure"],
+        settings=lambda wildcards: config["training"][
+            ARCHITECTURES[wildcards.architecture].family
+        ],
+        learnt_share=learnt_share_of,
+        cylinder=cylinder_class_of,
     script:
         "../scripts/train.py"

@@ -1,0 +1,39 @@
+# Windows of two revolutions, simulated or recorded -> synchrosqueezed images.
+# Recordings are scaled as the simulation that learns from them, or as themselves.
+def reference_of(wildcards):
+    """What the images of a dataset are scaled by."""
+    if DATASETS[wildcards.dataset].line == "rig":
+        return recorded_signal_of(wildcards)
+    return f"{RESULTS}/seeds/{wildcards.dataset}/single.zarr"
+
+
+rule synchrosqueeze:
+    input:
+        samples=[f"{RESULTS}/samples/{{dataset}}/{{windows}}x2.zarr"],
+        reference=reference_of,
+        source=scripts_sources("synchrosqueeze.py"),
+    output:
+        temp(directory(f"{RESULTS}/images/{{dataset}}/{{windows}}.zarr")),
+    log:
+        f"{RESULTS}/logs/synchrosqueeze/{{dataset}}/{{windows}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/synchrosqueeze/{{dataset}}/{{windows}}.tsv"
+    resources:
+        mem_mb=4000,
+    params:
+        sst=config["sst"],
+    script:
+        "../scripts/synchrosqueeze.py"
+
+
+use rule synchrosqueeze as synchrosqueeze_seeds with:
+    input:
+        samples=every_seed("samples/{dataset}/{faults}/{seed}x2.zarr"),
+        reference=reference_of,
+        source=scripts_sources("synchrosqueeze.py"),
+    output:
+        temp(directory(every_seed("images/{dataset}/{faults}/{seed}.zarr"))),
+    log:
+        f"{RESULTS}/logs/synchrosqueeze/{{dataset}}/{{faults}}_seeds.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/synchrosqueeze/{{dataset}}/{{faults}}_seeds.tsv"
