@@ -25,7 +25,7 @@ def one_thread():
 @pytest.fixture
 def cells(tmp_path):
     """Seeds whose faults are pulses at known places, recordings, and untrained networks of two
-    training seeds, all through `noise_free_probes` and `attention`: paths of the stores, a network each."""
+    training seeds, through `noise_free_probes` and `attention`: paths of stores, one a network."""
     signal = np.tile(np.sin(2 * np.pi * 9 * np.arange(POINTS) / POINTS), (4, 1, 1))
     for k in range(1, 4):
         signal[k, 0, 100 * k : 100 * k + 40] += k
