@@ -107,8 +107,8 @@ def test_datasets_differ_and_are_compared_with_known_ones():
 @pytest.mark.parametrize(
     ("sheet", "said"),
     [
-        ("", ["empty"]),
-        ("fluid:\n\tdensity: 870\n", ["line 2", "tab"]),
+        ("", ["the whole file"]),
+        ("fluid:\n\tdensity: 870\n", ["line 2"]),
         (RIG.replace("state: healthy", "state: Healthy"), ["recordings[0].state", "'Healthy'"]),
         (RIG.replace("recordings:", "recording:"), ["recording"]),
     ],
