@@ -19,6 +19,7 @@ onstart:
 
 
 include: "workflow/rules/common.smk"
+include: "workflow/rules/inputs.smk"
 include: "workflow/rules/recordings.smk"
 include: "workflow/rules/calibrate.smk"
 include: "workflow/rules/explain.smk"
@@ -35,30 +36,6 @@ include: "workflow/rules/attention.smk"
 include: "workflow/rules/claims.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/concealed.smk"
-
-
-def get_final_output():
-    """What a whole run makes with the configured datasets, networks and compound faults."""
-    wanted = [
-        rules.accuracy_table.output,
-        rules.claims.output,
-        rules.plot_accuracy.output,
-        rules.plot_calibration.output,
-        expand(rules.plot_confusion.output, dataset=CHOSEN),
-        expand(rules.plot_seeds.output, dataset=SIMULATED),
-    ]
-    if PRESSURES:
-        wanted.append(rules.compare_sst.output)
-    if corrected_pairs():
-        wanted.append(rules.report_cost.output)
-    if SIMULATED:
-        wanted += [rules.attention_table.output, rules.plot_ranks.output]
-        domains = [name for name in ("time", "image") if of_domain(name)]
-        wanted += expand(rules.plot_attention.output, dataset=SIMULATED, domain=domains)
-    if SIMULATED and STATES["compound"]:
-        wanted.append(rules.report_compound.output)
-        wanted += expand(rules.plot_compound_seeds.output, dataset=SIMULATED)
-    return wanted
 
 
 rule all:

@@ -1,13 +1,4 @@
 # Trained networks -> what they look at, and whether that tells which network to choose.
-def probes_of(wildcards):
-    """Simulated states without noise, as a network takes them."""
-    return for_network(
-        wildcards,
-        f"{RESULTS}/samples/{{dataset}}/probex1.zarr",
-        f"{RESULTS}/images/{{dataset}}/probe.zarr",
-    )
-
-
 rule attention:
     input:
         probes=probes_of,

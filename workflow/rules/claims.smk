@@ -1,7 +1,4 @@
 # Accuracies and simulated signals -> the paper's claims, and how alike the images are.
-PRESSURES = [name for name in SIMULATED if DATASETS[name].signal == "pressure"]
-
-
 rule claims:
     input:
         table=rules.accuracy_table.output.table,

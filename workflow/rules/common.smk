@@ -70,6 +70,7 @@ check_names("datasets", config["datasets"], list(table["name"]))
 DATASETS = {row.name: row for row in table.itertuples(index=False)}
 CHOSEN = [name for name in DATASETS if name in config["datasets"]]
 SIMULATED = [name for name in CHOSEN if DATASETS[name].line != "rig"]
+PRESSURES = [name for name in SIMULATED if DATASETS[name].signal == "pressure"]
 STATES = {  # what a dataset's networks learn, and what they are shown besides
     "single": list(CLASSES),
     "compound": ["+".join(faults) for faults in config["faults"]["compound"]],
@@ -96,43 +97,6 @@ def of_domain(domain):
     """The configured networks on time windows, or on images."""
     names = config["architectures"]
     return [name for name in names if ARCHITECTURES[name].domain == domain]
-
-
-def every_seed(path):
-    """A pattern of stores with one for each {seed}; other wildcards stay."""
-    seeds = range(config["seeds"])
-    return [f"{RESULTS}/{path}".replace("{seed}", str(seed)) for seed in seeds]
-
-
-def for_network(wildcards, time, image):
-    """The one of two paths that has the input of the wildcards' network."""
-    is_image = ARCHITECTURES[wildcards.architecture].domain == "image"
-    return image if is_image else time
-
-
-def twin_of(wildcards):
-    """The calibrated twin, or the one that `explain` corrected."""
-    made_by = {"calibrated": rules.calibrate, "corrected": rules.explain}
-    return made_by[wildcards.twin].output.twin
-
-
-def recorded_signal_of(wildcards):
-    """Recorded windows of a dataset's signal; flow is estimated through the line of its twin."""
-    dataset = DATASETS[wildcards.dataset]
-    kind = f"flow_{dataset.twin}" if dataset.signal == "flow" else "pressure"
-    return f"{RESULTS}/recordings/{kind}.zarr"
-
-
-def recorded_of(wildcards):
-    """What a network is tested on."""
-    images = f"{RESULTS}/images/{{dataset}}/recorded.zarr"
-    return for_network(wildcards, recorded_signal_of(wildcards), images)
-
-
-def learnt_share_of(wildcards):
-    """Early share of every recording that a network learns from: none of it from simulations."""
-    from_recordings = DATASETS[wildcards.dataset].line == "rig"
-    return config["experimental"]["training_share"] if from_recordings else 0.0
 
 
 def scripts_sources(script):

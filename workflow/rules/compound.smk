@@ -1,13 +1,4 @@
 # Compound faults, which no network learnt -> what the networks say of them.
-def compound_samples_of(wildcards):
-    """Samples of compound faults for a network of a dataset, of the first seed."""
-    return for_network(
-        wildcards,
-        f"{RESULTS}/samples/{{dataset}}/compound/0x1.zarr",
-        f"{RESULTS}/images/{{dataset}}/compound/0.zarr",
-    )
-
-
 rule evaluate_compound:
     input:
         samples=compound_samples_of,

@@ -1,5 +1,5 @@
 # How often `explain` is right when the effect is hidden: snakemake --cores 2 concealed
-import subprocess
+from tool_commit import not_committed, tool_commit
 
 CONCEALED = f"{RESULTS}/concealed"
 TOOL = ROOT / "src/concealed/tool.py"
@@ -8,29 +8,6 @@ HIDDEN = [f"{n:03d}" for n in range(config["concealed"]["cases"])]
 
 wildcard_constraints:
     hidden="[0-9]{3}",
-
-
-def git(*arguments):
-    """What git says of the tool that is tried."""
-    command = ["git", "-C", str(ROOT), *arguments]
-    try:
-        return subprocess.run(
-            command, check=True, capture_output=True, text=True
-        ).stdout.strip()
-    except (OSError, subprocess.CalledProcessError) as error:
-        raise WorkflowError(
-            "concealed: its cases follow from the tool's commit; run it in a git checkout"
-        ) from error
-
-
-def tool_commit(wildcards):
-    """Hash of the tool's source in the commit: nobody can pick the cases that follow from it."""
-    return git("rev-parse", "HEAD:src/rippletwin")
-
-
-def not_committed(wildcards):
-    """Whether the tool that runs differs from that commit, which the page then says."""
-    return git("status", "--porcelain", "src/rippletwin") != ""
 
 
 rule concealed_numerics:
@@ -43,7 +20,7 @@ rule concealed_numerics:
     benchmark:
         f"{RESULTS}/benchmarks/concealed_numerics.tsv"
     params:
-        commit=tool_commit,
+        commit=lambda wildcards: tool_commit(ROOT),
         number=config["concealed"]["number"],
         cases=config["concealed"]["cases"],
     shell:
@@ -64,7 +41,7 @@ rule conceal:
     benchmark:
         f"{RESULTS}/benchmarks/conceal/{{hidden}}.tsv"
     params:
-        commit=tool_commit,
+        commit=lambda wildcards: tool_commit(ROOT),
         number=config["concealed"]["number"],
         cases=config["concealed"]["cases"],
         case=lambda wildcards: int(wildcards.hidden),
@@ -175,8 +152,8 @@ rule report_concealed:
     benchmark:
         f"{RESULTS}/benchmarks/report_concealed.tsv"
     params:
-        commit=tool_commit,
-        not_committed=not_committed,
+        commit=lambda wildcards: tool_commit(ROOT),
+        not_committed=lambda wildcards: not_committed(ROOT),
         number=config["concealed"]["number"],
     script:
         "../scripts/report_concealed.py"

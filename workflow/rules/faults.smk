@@ -1,11 +1,4 @@
 # The pump, healthy and faulty -> outlet flow, and pressure in a pipe that nobody calibrated.
-def leak_area_of(wildcards):
-    """Fault -> its leak, m2, for every fault of the state."""
-    areas = config["faults"]["leak_area"]
-    faults = wildcards.state.split("+")
-    return {fault: areas[fault] for fault in faults if fault in areas}
-
-
 rule simulate_fault:
     input:
         rig=rig_sheet(),

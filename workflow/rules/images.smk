@@ -1,12 +1,5 @@
 # Windows of two revolutions, simulated or recorded -> synchrosqueezed images.
 # Recordings are scaled as the simulation that learns from them, or as themselves.
-def reference_of(wildcards):
-    """What the images of a dataset are scaled by."""
-    if DATASETS[wildcards.dataset].line == "rig":
-        return recorded_signal_of(wildcards)
-    return f"{RESULTS}/seeds/{wildcards.dataset}/single.zarr"
-
-
 rule synchrosqueeze:
     input:
         samples=[f"{RESULTS}/samples/{{dataset}}/{{windows}}x2.zarr"],

@@ -1,17 +1,4 @@
 # One noise-free revolution a state: the seed signals of each simulated dataset.
-def states_of(wildcards):
-    """A store for each simulated state, of the line that carries the dataset's ripple."""
-    dataset = DATASETS[wildcards.dataset]
-    folder = f"propagated/{dataset.twin}" if dataset.line == "twin" else "faults"
-    return expand(f"{RESULTS}/{folder}/{{state}}.zarr", state=STATES[wildcards.faults])
-
-
-def seed_variable_of(wildcards):
-    """Variable of these stores; a flow sensor sees the flow that any line can be driven with."""
-    by_signal = {"pressure": "pressure", "flow": "source_flow"}
-    return by_signal[DATASETS[wildcards.dataset].signal]
-
-
 rule propagate:
     input:
         flow=f"{RESULTS}/faults/{{state}}.zarr",

@@ -1,16 +1,4 @@
 # Predictions -> the accuracy table beside the paper's, and what missing physics costs.
-def table_columns():
-    """Datasets of the accuracy table from left to right: the configured ones and the paper's."""
-    paper = set(pd.read_csv(PAPER)["dataset"])
-    return [name for name in DATASETS if name in CHOSEN or name in paper]
-
-
-def corrected_pairs():
-    """(dataset with the calibrated twin, the same with the corrected one), both configured."""
-    pairs = [(DATASETS[name].uncorrected, name) for name in CHOSEN]
-    return [pair for pair in pairs if pair[0] in CHOSEN]
-
-
 rule accuracy_table:
     input:
         predictions=expand(

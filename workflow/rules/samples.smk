@@ -1,10 +1,5 @@
 # Signals -> samples as the networks take them: seeds shifted and noisy, recordings as they are.
 # One job makes all seeds of a dataset: starting Python costs more than a seed does.
-def samples_per_class_of(wildcards):
-    counts = config["samples_per_class"]
-    return counts["time" if wildcards.revolutions == "1" else "image"]
-
-
 rule augment:
     input:
         signals=f"{RESULTS}/seeds/{{dataset}}/{{faults}}.zarr",
