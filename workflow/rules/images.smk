@@ -27,6 +27,6 @@ use rule synchrosqueeze as synchrosqueeze_seeds with:
     output:
         temp(directory(every_seed("images/{dataset}/{faults}/{seed}.zarr"))),
     log:
-        f"{RESULTS}/logs/synchrosqueeze/{{dataset}}/{{faults}}_seeds.log",
+        f"{RESULTS}/logs/synchrosqueeze_seeds/{{dataset}}/{{faults}}.log",
     benchmark:
-        f"{RESULTS}/benchmarks/synchrosqueeze/{{dataset}}/{{faults}}_seeds.tsv"
+        f"{RESULTS}/benchmarks/synchrosqueeze_seeds/{{dataset}}/{{faults}}.tsv"
