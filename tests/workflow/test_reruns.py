@@ -148,13 +148,10 @@ def test_a_compound_fault_adds_jobs_of_its_own(workflow):
 
 
 def test_a_row_of_datasets_that_nobody_uses_reruns_nothing(workflow):
-    """Edited, added or moved: the rows of the configured datasets decide, each for itself."""
+    """Edited or added: the rows of the configured datasets decide, each for itself."""
     table = workflow / "config/datasets.tsv"
     edit(table, "experimental\tpressure\trig\tnone", "experimental\tflow\trig\tcalibrated")
-    header, *rows = table.read_text().splitlines()
-    rows.append("mine\tflow\ttwin\tcalibrated\tnone")
-    table.write_text("\n".join([header, *sorted(rows, key=len)]) + "\n")
-    assert table.read_text().splitlines()[1].startswith("mine")
+    edit(table, "CFD-P\t", "mine\tflow\ttwin\tcalibrated\tnone\nCFD-P\t")
     assert planned(workflow)[0] == set()
 
 
