@@ -17,7 +17,7 @@ IMPORT_ROOTS = (ROOT / "src", ROOT / "workflow" / "scripts")
 
 PLUGIN_FOLDERS = {
     "src/rippletwin/twin/effects/library.py": "src/rippletwin/twin/effects",
-    "src/rippletwin/case/readers/__init__.py": "src/rippletwin/case/readers",
+    "src/rippletwin/case/readers/registry.py": "src/rippletwin/case/readers",
 }
 """Modules that import by a computed name -> the folder whose modules they import."""
 
@@ -56,8 +56,12 @@ def _imported_files(file: Path) -> frozenset[Path]:
 
 
 def _imported_names(file: Path) -> Iterator[str]:
-    """Dotted names in the import statements of a file, wherever they stand."""
-    for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+    """Dotted names in a file's import statements, wherever they are but for type checkers only."""
+    tree = ast.parse(file.read_text("utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
+            node.body = []
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):

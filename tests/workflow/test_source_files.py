@@ -71,6 +71,17 @@ def test_late_and_relative_imports_count(project):
     assert "src/library/far.py" in found
 
 
+def test_an_import_for_type_checkers_does_not_count(project):
+    """It never runs; what stands beside it does."""
+    write, names = project
+    write(
+        "scripts/run.py", "if TYPE_CHECKING:\n    import library.a\nelse:\n    import library.b\n"
+    )
+    for name in ("a", "b"):
+        write(f"src/library/{name}.py")
+    assert names("scripts/run.py") == ["src/library/__init__.py", "src/library/b.py"]
+
+
 def test_modules_that_import_each_other_end(project):
     """A circle of imports is walked once; the script is in the result where another imports it."""
     write, names = project

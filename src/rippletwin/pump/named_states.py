@@ -33,8 +33,9 @@ def simulate_state(
 
     The pipe is as wide as the rig's first segment, `pipe_length` (m) long and carries the rig's
     sensors; the orifice at its end holds the healthy pump at `load_pressure` (Pa, gauge) against
-    the rig's back pressure. A faulty pump meets this orifice, so its mean pressure is lower. The second ripple is the flow into a
-    constant pressure, which with the capacitance of the chambers can drive any line.
+    the rig's back pressure. A faulty pump meets this orifice, so its mean pressure is lower. The
+    second ripple is the flow into a constant pressure, which with the capacitance of the chambers
+    can drive any line.
     Raises ValueError for a sensor beyond the pipe's end.
     """
 
