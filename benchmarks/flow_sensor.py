@@ -1,9 +1,12 @@
-"""Both flow sensors on the paper's line, by band: the table of docs/explanation/flow_sensor.md.
+"""Errors of both virtual flow sensors on the paper's line, by frequency band.
 
-The truth is the lumped pump with a worn slipper, its pressure by the twin with the full-amplitude
-orifice; the sensors know the line with a linear one. `python benchmarks/flow_sensor.py`
+    python benchmarks/flow_sensor.py
+
+The true flow is that of the lumped pump with a worn slipper. The true pressure is the twin's with
+the orifice at full amplitude; the sensors use a line with a linear orifice.
 """
 
+import argparse
 import sys
 import time
 from dataclasses import replace
@@ -30,6 +33,7 @@ SENSORS = {
 
 
 def rig(sensors, wave_speed_factor=1.0):
+    """The paper's calibrated line with two or three sensors."""
     line = (
         Segment(5.953, 0.01971, 1022.9),
         Segment(1.144, 0.02307, 982.7),
@@ -39,7 +43,8 @@ def rig(sensors, wave_speed_factor=1.0):
     return Rig(Fluid(870.0, 3.2e-5), {"pistons": 9}, line, SENSORS[sensors], Load("orifice"))
 
 
-def main():
+def main() -> None:
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     torch.set_num_threads(1)
     rng = np.random.default_rng(0)
     fluid = Fluid(870.0, 3.2e-5)
@@ -65,14 +70,15 @@ def main():
                 for name, arguments in (("spectral", ()), ("PINN", (trunk,))):
                     run = pinn.estimate_flow if arguments else estimate_flow
                     started = time.perf_counter()
-                    found = run(windows, SPEED, network, *arguments, max(noise, 50.0), BAND)
+                    estimate = run(windows, SPEED, network, *arguments, max(noise, 50.0), BAND)
                     spent = (time.perf_counter() - started) / WINDOWS
-                    cells = row(sensors, noise, factor, name, found.flow, truth)
+                    cells = row(sensors, noise, factor, name, estimate.flow, truth)
                     print(f"{cells} {1e3 * spent:.1f} |")
             print(f"trunk trained in {trained:.0f} s", file=sys.stderr)
 
 
 def row(sensors, noise, factor, name, flow, truth):
+    """Cells of one method: errors of the flow in each band, relative rms."""
     wrong, right = np.fft.rfft(flow - truth), np.fft.rfft(truth)
     cells = []
     for low, high in ((1, 31), (31, 61), (61, 91), (1, 91)):

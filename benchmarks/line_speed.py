@@ -1,13 +1,14 @@
-"""How fast the line is solved, in one run on one thread: exact periodic solution against MOC.
+"""Costs of solving the line: exact periodic solution against the method of characteristics.
 
     python benchmarks/line_speed.py
 
-Times are processor seconds, the best of several. Only ratios within one run mean anything on a
-shared machine.
+Times are processor seconds of one thread, the best of several. On a shared machine only ratios
+within one run are meaningful.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 from pathlib import Path
@@ -62,7 +63,7 @@ def network(orders: np.ndarray, friction: str = "unsteady") -> FrequencyDomainLi
 
 
 def solve(orders: np.ndarray) -> None:
-    """Friction, orifice and sensors from scratch."""
+    """Solve the whole line: friction, orifice and sensors."""
     net = network(orders)
     balance_orifice(net, mean_pressure=MEAN_PRESSURE, mean_flow=MEAN_FLOW, orders=orders)
     net.readings()
@@ -85,6 +86,7 @@ def revolution(friction: str, steps: int, periods: int = 1):
 
 
 def main() -> None:
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     piston, shaft = PISTONS * np.arange(1, 35), np.arange(1, STEPS // 2 + 1)
     eighty = network(np.arange(1, 81) * PISTONS)
     print("frequency domain, ms")
