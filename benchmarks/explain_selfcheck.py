@@ -184,7 +184,7 @@ def run_case(number: int, kind: str, geometry: bool = False) -> dict:
     known = refine(base, truth.effects, observations, [theta])
     measured = np.concatenate([o.values for o in observations], axis=1)
     floor = relative_misfit(measured, np.concatenate(truth.predict(observations), axis=1))
-    accepted, told = e.judgement.accepted, {x["name"] for x in v["effects"]}
+    accepted, told = e.decision.accepted, {x["name"] for x in v["effects"]}
     actual = [(effect.name, str(place)) for effect, place in truth.effects]
     classes = [set(names) for names in v["equivalents"]]
     right = {n for n, _ in actual if n in told or any(n in c and c & told for c in classes)}
@@ -201,10 +201,10 @@ def run_case(number: int, kind: str, geometry: bool = False) -> dict:
         "right": sorted(right),
         "wrong": sorted(told - {n for n, _ in actual} - {x for c in classes for x in c}),
         "placed": placed(rig, truth, e),
-        "gain": e.search.gain(e.search.best),
+        "gain": e.search.log_bayes_factor(e.search.best),
         "missed": known.evidence - e.search.best.evidence,
-        "top_single": e.search.gain(e.search.singles[0]),
-        "alarms": list(e.alarms.ringing),
+        "top_single": e.search.log_bayes_factor(e.search.single_effect_fits[0]),
+        "alarms": list(e.alarms.raised),
         "pull": e.alarms.pull[0],
         "disagreement": e.alarms.disagreement[0],
         "base_floor": e.search.base.model_error,
@@ -225,7 +225,7 @@ def placed(rig, truth, e) -> bool | None:
     for effect, place, values in truth.effect_values(truth.theta):
         own[effect.name] = (place, values)
     results = []
-    for entry in effect_intervals(e.judgement.accepted):
+    for entry in effect_intervals(e.decision.accepted):
         name = entry["effect"].name
         if name not in own:
             continue

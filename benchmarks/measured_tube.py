@@ -110,7 +110,7 @@ def main() -> None:
     row("... without the sheet's tolerances", fitted(loose, data, ()))
     row("unsteady friction, without the sheet's tolerances", fitted(loose, data, ACOUSTICS[:1]))
     explanation = explain(cases[0], processes=1)
-    accepted = explanation.judgement.accepted
+    accepted = explanation.decision.accepted
     row("**explained**: " + ", ".join(accepted.names).replace("_", " "), accepted)
     warmer, ratio = another_day(accepted, whole[1])
     row(f"... with the wave speed {ratio - 1:+.2%}, that of run 2", warmer)

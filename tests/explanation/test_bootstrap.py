@@ -13,6 +13,7 @@ from rippletwin.explanation.checks.bootstrap import (
     draw_without_effects,
 )
 from rippletwin.explanation.search import stepwise_search
+from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
 from rippletwin.twin.twin import Twin
 from synthetic_observations import POINTS, make
 
@@ -76,8 +77,8 @@ def test_chance_gives_no_effect_what_an_effect_must_have(fitted, monkeypatch):
     ]
     monkeypatch.setattr(bootstrap, "applicable_candidates", lambda *_: few)
     found = bootstrap_null(fit, observations, 12, processes=1)
-    assert len(found.gains) == 12
-    assert max(found.gains) < stepwise_search.ACCEPT
+    assert len(found.log_bayes_factors) == 12
+    assert max(found.log_bayes_factors) < MIN_LOG_BAYES_FACTOR
     with pytest.raises(ValueError, match="10"):
         bootstrap_null(fit, observations, 9)
 

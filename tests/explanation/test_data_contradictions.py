@@ -46,13 +46,13 @@ def test_dead_sensor(healthy):
     """A sensor that reads noise alone is named."""
     bench, (o, other) = healthy
     noise = np.sqrt(o.covariance[:, 2, 2].real) * np.exp(1j * np.arange(o.values.shape[1]))
-    assert "p3 reads no ripple" in find_contradictions(bench, (), [row(o, 2, noise), other])
+    assert "p3 measures no ripple" in find_contradictions(bench, (), [row(o, 2, noise), other])
 
 
 def test_duplicated_sensor(healthy):
     """Two sensors two metres apart with one signal, scaled, are found."""
     bench, (o, other) = healthy
-    assert "p1 and p2 read the same" in find_contradictions(
+    assert "p1 and p2 measure the same" in find_contradictions(
         bench, (), [row(o, 1, 1.03 * o.values[0]), other]
     )
 
@@ -101,7 +101,7 @@ def test_odd_one_of_an_operating_point(healthy):
     odd = replace(o, label="third", values=0.5 * o.values)
     assert find_contradictions(bench, (), [o, same, other]) == ""
     assert find_contradictions(bench, (), [o, same, odd, other]).startswith(
-        "third is unlike every other"
+        "third differs from every other"
     )
 
 
@@ -128,7 +128,7 @@ def test_wiring(what):
     base = Twin(bench, observations)
     fit = fit_hypothesis(base, (), observations)
     words = find_swapped_sensors(base, observations, Search(fit, [], fit))
-    expected = {"sound": "", "exchanged": "p1 and p2 are exchanged", "sign": "sign turned"}[what]
+    expected = {"sound": "", "exchanged": "p1 and p2 are exchanged", "sign": "is inverted"}[what]
     assert (words == "") if not expected else (expected in words)
 
 
@@ -137,5 +137,5 @@ def test_every_reason_is_told(healthy):
     bench, (o, other) = healthy
     bad = replace(row(o, 1, o.values[0]), covariance=0 * o.covariance)
     words = find_contradictions(bench, (), [bad, other])
-    assert words.count(";") == 1 and "read the same" in words and "no noise" in words
+    assert words.count(";") == 1 and "measure the same" in words and "no noise" in words
     assert data_contradictions.find_contradictions(bench) == ""

@@ -48,7 +48,7 @@ def explained(tmp_path_factory):
 def test_it_arrives_at_the_known_acoustics(explained):
     """From steady friction on run 1: viscous and thermal boundary layers, then radiation."""
     explanation, unseen, folder = explained
-    best = explanation.judgement.accepted
+    best = explanation.decision.accepted
     assert best.names == ("unsteady_friction", "thermal_boundary_layer", "end_radiation")
     result = write_verdict(explanation, folder / "out")
     assert result["verdict"] == "named"
@@ -58,13 +58,13 @@ def test_it_arrives_at_the_known_acoustics(explained):
     # A smaller bore does the thermal layer's work; the gauge that measured it is what says no.
     (thermal,) = (w for w in result["without"] if w["effect"] == "thermal_boundary_layer")
     assert thermal["rivals"] and thermal["parameter"] == "diameter[1]" and thermal["pull"] > 10
-    assert "which is what rejects it" in result["sentence"]
+    assert "only the data sheet rejects it" in result["sentence"]
 
 
 def test_nothing_fitted_each_effect_brings_run_2_closer(explained):
     """With measured geometry and textbook air, nothing fitted: 107 -> 33 -> 8 -> 5 % on run 2."""
     explanation, unseen, _ = explained
-    effects = explanation.judgement.accepted.hypothesis
+    effects = explanation.decision.accepted.hypothesis
     base = Twin(explanation.rig, [unseen])
     posterior_errors = []
     for count in range(4):

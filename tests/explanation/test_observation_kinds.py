@@ -8,7 +8,7 @@ import pytest
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor, Uncertainty
 from rippletwin.explanation.explain import explain_observations
 from rippletwin.explanation.verdict.verdict_file import verdict_dict
-from rippletwin.figures.explanation import overlay
+from rippletwin.figures.explanation import plot_ripple
 from rippletwin.spectra.observation import Observation
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
@@ -83,16 +83,16 @@ def made(kind, source, fluid, load, effect):
 )
 def test_each_kind_is_explained_end_to_end(case, monkeypatch):
     """The effect put in is named, against one that competes, and the misfit falls; the verdict and
-    the overlay are made whatever the kind of observation."""
+    the plot_ripple are made whatever the kind of observation."""
     *kind, effect, rival = CASES[case]
     library = [effect, rival]
     monkeypatch.setattr(
         "rippletwin.explanation.search.stepwise_search.applicable_candidates", lambda *_: library
     )
-    monkeypatch.setattr("rippletwin.explanation.explain.candidates", lambda *_, **__: [])
+    monkeypatch.setattr("rippletwin.explanation.explain.fit_passive_networks", lambda *_: [])
     explanation = explain_observations(*made(*kind, effect), processes=1)
     result = verdict_dict(explanation)
     named = {e["name"] for e in result["effects"]}
     assert effect[0].name in named, (result["verdict"], result["sentence"])
     assert result["fit"]["after"]["in_sample"] < 0.5 * result["fit"]["before"]["in_sample"]
-    assert overlay(explanation) is not None
+    assert plot_ripple(explanation) is not None

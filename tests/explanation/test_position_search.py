@@ -8,14 +8,14 @@ import pytest
 
 from rippletwin.calibration.frequency_continuation import refine
 from rippletwin.case.model import Sensor
-from rippletwin.explanation.fit_jobs import Workers
+from rippletwin.explanation.fit_jobs import FitJob, FromTheta, Workers
 from rippletwin.explanation.search.position_search import (
     equivalent_positions,
     fit_other_positions,
     move_to_best_position,
     positions_of_effects,
 )
-from rippletwin.explanation.thresholds import ACCEPT, EQUIVALENT
+from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR, MIN_LOG_BAYES_FACTOR
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
@@ -44,8 +44,8 @@ def test_from_a_wrong_seat_the_true_one_is_found(place):
     theta = known.twin.theta.copy()
     k = known.twin.index["leak@position.position"]
     theta[k] = known.twin.parameters[k].prior.coordinate(place)
-    (wrong,) = pool.fit([{"hypothesis": LEAK, "theta": theta}])
-    assert wrong.evidence < known.evidence - EQUIVALENT
+    (wrong,) = pool.fit([FitJob(LEAK, FromTheta(theta))])
+    assert wrong.evidence < known.evidence - EQUIVALENT_LOG_BAYES_FACTOR
     assert abs(positions_of_effects(wrong)["leak"] - 1.7) > 0.1
     best, others = move_to_best_position(pool, wrong)
     assert best.evidence == pytest.approx(known.evidence, abs=0.5)
@@ -62,10 +62,10 @@ def test_a_weak_leak_is_said_to_be_wherever_it_may_be(monkeypatch, seed):
         "synthetic_observations.rig", lambda count: replace(rig(count), sensors=apart)
     )
     pool, known = recorded(0.6, 6e-12, seed)
-    base, best = pool.fit([{"hypothesis": ()}, {"hypothesis": LEAK}])
-    assert known.evidence > base.evidence + ACCEPT
+    base, best = pool.fit([FitJob(()), FitJob(LEAK)])
+    assert known.evidence > base.evidence + MIN_LOG_BAYES_FACTOR
     best, others = move_to_best_position(pool, best)
-    assert known.evidence - 0.5 < best.evidence < known.evidence + EQUIVALENT
+    assert known.evidence - 0.5 < best.evidence < known.evidence + EQUIVALENT_LOG_BAYES_FACTOR
     places = [positions_of_effects(f)["leak"] for f in (best, *others)]
     assert abs(places[0] - 0.6) > 1.0 and min(abs(x - 0.6) for x in places) < 0.03
     (names,) = equivalent_positions(best, others)

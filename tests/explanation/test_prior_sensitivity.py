@@ -12,8 +12,8 @@ from rippletwin.explanation.checks.prior_sensitivity import (
     refit_with_wide_priors,
     widen_priors,
 )
-from rippletwin.explanation.fit_jobs import Workers
-from rippletwin.explanation.verdict.decision import Judgement, withdraw_refuted_name
+from rippletwin.explanation.fit_jobs import FitJob, Workers
+from rippletwin.explanation.verdict.decision import Decision, withdraw_refuted_name
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
@@ -41,7 +41,7 @@ def test_air_at_one_pressure_is_a_slower_wave():
     values = {"gas_fraction": 0.02, "polytropic_exponent": 1.2}
     small = {"points": ((1000, PRESSURE),), "depth": 0.002, "noise": 0.1}
     fit, pool = accepted(EFFECTS["entrained_air"], values, **small)
-    (base,) = pool.fit([{"hypothesis": ()}])
+    (base,) = pool.fit([FitJob(())])
     (found,) = compare_without_each_effect(pool, base, fit)
     assert found.effect == "entrained_air" and found.rivals and not found.refutes
     free = refit_with_wide_priors(pool, [base], fit)[0][1].twin.values()
@@ -64,7 +64,7 @@ def test_no_sheet_stands_in_for_friction_that_grows_with_frequency():
     """Attenuation by steady friction is the same at all frequencies: whatever the line's numbers,
     unsteady friction's root of frequency is not to be had."""
     fit, pool = accepted(EFFECTS["unsteady_friction"], {})
-    (base,) = pool.fit([{"hypothesis": ()}])
+    (base,) = pool.fit([FitJob(())])
     (found,) = compare_without_each_effect(pool, base, fit)
     assert not found.rivals and not found.refutes
     assert found.evidence == fit.evidence - base.evidence > 100.0
@@ -79,15 +79,15 @@ def test_what_one_number_of_the_line_accounts_for_refutes_an_effect():
     bench, recorded, _ = make(np.random.default_rng(5), values={"viscosity": 2.9e-4}, **points)
     data = select_fitted_frequencies(recorded, bench)
     pool = Workers(Twin(bench, data), data)
-    base, wall = pool.fit([{"hypothesis": ()}, {"hypothesis": hypothesis}])
+    base, wall = pool.fit([FitJob(()), FitJob(hypothesis)])
     (found,) = compare_without_each_effect(pool, base, wall)
     assert wall.evidence > base.evidence
     assert found.refutes and found.parameter == "viscosity"
     assert found.value == pytest.approx(2.9e-4, rel=0.02)
-    named = Judgement("ambiguous", wall, (("viscoelastic_wall", "side_branch"),))
-    assert withdraw_refuted_name(named, [found]) == Judgement("unexplained", wall)
+    named = Decision("ambiguous", wall, (("viscoelastic_wall", "side_branch"),))
+    assert withdraw_refuted_name(named, [found]) == Decision("unexplained", wall)
     assert withdraw_refuted_name(named, [replace(found, refutes=False)]) == named
-    assert withdraw_refuted_name(Judgement("consistent", base), [found]).verdict == "consistent"
+    assert withdraw_refuted_name(Decision("consistent", base), [found]).verdict == "consistent"
 
 
 def test_loosened_is_never_tighter_than_stated():

@@ -12,6 +12,7 @@ from rippletwin.explanation.checks.profile_intervals import (
     INTERVAL_RISE,
     MAX_RISE,
     PROFILE_DISTANCES,
+    ProfileJob,
     ProfileTrace,
     add_profile_intervals,
     effect_intervals,
@@ -58,7 +59,7 @@ def test_at_the_end_the_posterior_has_fallen_by_what_it_should(hose, side):
     posterior is RISE above the mode's: straight lines between a few places are good enough."""
     pool, fit = hose
     k = fit.twin.index["viscoelastic_wall@segment 2.compliance_ratio"]
-    end = trace_profile(pool.base, pool.observations, {"fit": fit, "held": k, "side": side}).end
+    end = trace_profile(pool.base, pool.observations, ProfileJob(fit, k, side)).end
     theta = fit.twin.theta.copy()
     theta[k] = end
     posterior = Posterior(fit.twin, pool.observations)
@@ -89,13 +90,13 @@ def test_a_better_mode_on_the_way_takes_over(hose):
 
     class Pool:
         def map(self, function, jobs):
-            left = [job["fit"].objective for job in jobs]
+            left = [job.fit.objective for job in jobs]
             new = left[0] == better.objective
             value = better.objective if new else better.objective + MAX_RISE
-            return [ProfileTrace(job["side"] * (2.0 if new else 1.0), value, far) for job in jobs]
+            return [ProfileTrace(job.side * (2.0 if new else 1.0), value, far) for job in jobs]
 
         def fit(self, jobs):
-            assert np.array_equal(jobs[0]["theta"], far)
+            assert np.array_equal(jobs[0].start.theta, far)
             return [better]
 
     found = add_profile_intervals(Pool(), fit)

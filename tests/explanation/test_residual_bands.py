@@ -15,7 +15,7 @@ def test_one_band_is_one_band(low, high):
     size = rng.exponential(1.0, len(frequency))
     inside = (frequency >= low) & (frequency <= high)
     size[inside] = 200.0 * rng.exponential(1.0, inside.sum())
-    (found,) = residual_bands.frequency_stretches(frequency, size, 225.0)
+    (found,) = residual_bands.find_frequency_bands(frequency, size, 225.0)
     assert abs(found[0] - low) < 450 and abs(found[1] - high) < 450
 
 
@@ -25,7 +25,7 @@ def test_two_bands_stay_two():
     size = np.ones(26)
     size[1:4] = 100.0
     size[19:24] = 100.0
-    found = residual_bands.frequency_stretches(frequency, size, 150.0)
+    found = residual_bands.find_frequency_bands(frequency, size, 150.0)
     assert len(found) == 2
     assert found[0][1] < 1000 < 2500 < found[1][0]
 
@@ -34,7 +34,7 @@ def test_scattered_excess_gives_few_bands_that_hold_most_of_it():
     """Every second harmonic in excess: at most four bands, with 85 % of it inside."""
     frequency = 150.0 * np.arange(1, 27)
     size = np.where(np.arange(26) % 2, 100.0, 1.0)
-    found = residual_bands.frequency_stretches(frequency, size, 150.0)
+    found = residual_bands.find_frequency_bands(frequency, size, 150.0)
     assert len(found) <= residual_bands.MAX_STRETCHES
     inside = np.any([(frequency >= a) & (frequency <= b) for a, b in found], axis=0)
     assert np.sum(size[inside] - 1) > 0.85 * np.sum(size - 1)
@@ -42,7 +42,7 @@ def test_scattered_excess_gives_few_bands_that_hold_most_of_it():
 
 def test_no_excess_no_band():
     """A residual as small as believed has no band."""
-    assert residual_bands.frequency_stretches(np.arange(1.0, 20.0), np.full(19, 0.5), 1.0) == []
+    assert residual_bands.find_frequency_bands(np.arange(1.0, 20.0), np.full(19, 0.5), 1.0) == []
 
 
 def burst(at_deg, width_deg, pitch_deg=40.0, harmonics=26, samples=360):
@@ -59,14 +59,14 @@ def test_a_burst_is_found_at_its_angle(at):
     most though its wave changes sign many times."""
     rng = np.random.default_rng(2)
     noise = rng.normal(size=(2, 360)) * 0.05
-    (found,) = residual_bands.angle_stretches(burst(at, 1.0) + noise[0] + 1j * noise[1], 40.0)
+    (found,) = residual_bands.find_angle_intervals(burst(at, 1.0) + noise[0] + 1j * noise[1], 40.0)
     assert found[0] < at < found[1]
     assert found[1] - found[0] < 10.0
 
 
 def test_a_burst_at_the_seam_is_cut_there_only():
     """About angle 0 the stretch comes as its two parts, together as short."""
-    first, last = residual_bands.angle_stretches(burst(0.0, 1.0), 40.0)
+    first, last = residual_bands.find_angle_intervals(burst(0.0, 1.0), 40.0)
     assert first[0] == 0.0 and last[1] == 40.0
     assert first[1] + 40.0 - last[0] < 10.0
 
@@ -74,4 +74,4 @@ def test_a_burst_at_the_seam_is_cut_there_only():
 def test_a_steady_tone_has_no_angle():
     """A residual of one harmonic has the same envelope at all angles: no stretch."""
     wave = np.exp(2j * np.pi * 5 * np.arange(360) / 360)
-    assert residual_bands.angle_stretches(wave, 40.0) == []
+    assert residual_bands.find_angle_intervals(wave, 40.0) == []

@@ -8,12 +8,9 @@ from scipy.special import jv
 
 from rippletwin.case.model import FlowRipple, Load
 from rippletwin.explanation.explain import explain_observations
-from rippletwin.explanation.localise.shaft_orders import (
-    ROUGH_MODULATION_SHARE,
-    analyse_shaft_orders,
-    modulate_ripple,
-    with_phase_modulation,
-)
+from rippletwin.explanation.localise.phase_modulation import modulate_ripple, with_phase_modulation
+from rippletwin.explanation.localise.shaft_orders import analyse_shaft_orders
+from rippletwin.explanation.thresholds import ROUGH_MODULATION_SHARE
 from rippletwin.harmonics import flow_harmonics
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
@@ -128,6 +125,6 @@ def test_a_swing_is_told_anew_by_the_line_as_explained():
     bench, stated, _ = recorded(lambda r: modulate_ripple(r, 6e-3), friction, values)
     found = explain_observations(bench, [stated], processes=1)
     assert found.search.best.names == ("unsteady_friction",)
-    assert found.shaft.name == "speed_fluctuation"
-    assert found.shaft.value == pytest.approx(6e-3, rel=0.01)
+    assert found.shaft_orders.name == "speed_fluctuation"
+    assert found.shaft_orders.value == pytest.approx(6e-3, rel=0.01)
     assert abs(found.observations[0].flow_ripple.swing) == pytest.approx(6e-3, rel=0.01)

@@ -81,7 +81,17 @@ class ForwardModel:
             )
 
     def __call__(self, theta: np.ndarray) -> list[np.ndarray]:
-        network = self.network(theta)
+        return self._observed(self.network(theta), theta)
+
+    def unit_response(self, theta: np.ndarray) -> list[np.ndarray]:
+        """Predictions for a unit flow at every frequency, in the shaft's frame, and a ripple so
+        small that load and line are linear."""
+        network = self._linear(theta)
+        network.source_flow = self.source.turn(theta)
+        return self._observed(network, theta)
+
+    def _observed(self, network: Network, theta: np.ndarray) -> list[np.ndarray]:
+        """What each observation reads of `network`, (S, F)."""
         pressure = network.readings() if len(network.sensor_positions) else None
         impedance = None
         predicted = []
@@ -131,12 +141,13 @@ class ForwardModel:
             sensor_positions=v.positions,
         )
         if twin.effects:
-            line = self._line_state(v)
+            line = self.line_state(v)
             for effect, place, values in twin.effect_values(theta):
                 effect.apply(network, line, values, place)
         return network
 
-    def _line_state(self, v) -> LineState:
+    def line_state(self, v) -> LineState:
+        """The numbers of the line that effects need, with `v` of `Twin.arrays`."""
         fluid = self.twin.rig.fluid
         resistance = None
         if self.twin.rig.load.kind == "orifice":
