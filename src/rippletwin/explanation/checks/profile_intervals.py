@@ -83,8 +83,8 @@ def trace_profile(base: Twin, observations: Sequence, job: dict) -> ProfileTrace
         start = theta + side * (distance - last) * along
         # First with the errors of the last place: judged by where it starts, a descent would take
         # what the others have yet to make good for an error of the source, and rest there.
-        theta, _ = descend(posterior, start, PROFILE_STEPS, held=[k], errors=False)
-        theta, value = descend(posterior, theta, PROFILE_STEPS, held=[k])
+        theta, _ = descend(posterior, start, PROFILE_STEPS, fixed=[k], errors=False)
+        theta, value = descend(posterior, theta, PROFILE_STEPS, fixed=[k])
         if not np.isfinite(value):
             break
         last = distance
