@@ -1,9 +1,14 @@
 """Stretches of frequency and shaft angle of residuals that were made to lie there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from rippletwin.calibration.frequency_continuation import refine
 from rippletwin.explanation.localise import residual_bands
+from rippletwin.twin.twin import Twin
+from synthetic_observations import make
 
 
 @pytest.mark.parametrize("low, high", [(900.0, 1500.0), (2200.0, 3900.0), (150.0, 700.0)])
@@ -75,3 +80,11 @@ def test_a_steady_tone_has_no_angle():
     """A residual of one harmonic has the same envelope at all angles: no stretch."""
     wave = np.exp(2j * np.pi * 5 * np.arange(360) / 360)
     assert residual_bands.angle_stretches(wave, 40.0) == []
+
+
+def test_interior_relation_needs_no_source_or_load():
+    """Without noise p2 follows from p1 and p3 whatever the source and the load are."""
+    bench, observations, truth = make(np.random.default_rng(8), source=0.5, noise=0.0)
+    fit = refine(Twin(bench, observations), (), observations, [truth.theta])
+    for error in residual_bands.interior_test(observations, replace(fit, twin=truth)):
+        assert np.max(error) < 1e-6
