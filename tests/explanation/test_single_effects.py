@@ -6,7 +6,7 @@ import pytest
 from rippletwin.calibration.frequency_continuation import refine
 from rippletwin.explanation.fit_jobs import Workers
 from rippletwin.explanation.search.single_effects import fit_single_effects
-from rippletwin.explanation.thresholds import ACCEPT
+from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
 from rippletwin.twin.twin import Twin
 from synthetic_effects import AIR, TRUTH
 from synthetic_observations import POINTS, make
@@ -20,8 +20,8 @@ def test_a_little_air_gets_the_evidence_of_the_truth(seed):
     values = TRUTH | {"entrained_air@line.gas_fraction": 1.5e-3}
     one = {"sensors": 2, "points": POINTS[:1], "source": 0.005, "noise": 500.0}
     bench, data, truth = make(np.random.default_rng(seed), AIR, values, **one)
-    pool = Workers(Twin(bench, data), data)
-    known = refine(pool.base, AIR, data, [truth.theta])
-    base, (air,) = fit_single_effects(pool, AIR)
-    assert known.evidence - base.evidence > ACCEPT
+    workers = Workers(Twin(bench, data), data)
+    known = refine(workers.base, AIR, data, [truth.theta])
+    base, (air,) = fit_single_effects(workers, AIR)
+    assert known.evidence - base.evidence > MIN_LOG_BAYES_FACTOR
     assert air.evidence == pytest.approx(known.evidence, abs=0.5)
