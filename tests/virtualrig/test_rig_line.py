@@ -12,6 +12,8 @@ import pytest
 from scipy.special import ive
 
 from virtualrig.effects import EFFECTS, Draft
+from virtualrig.network import Network, Node, Pipe, node_table
+from virtualrig.node_elements import NODE_STATES, STORED, settle_node
 from virtualrig.orbit import Bench
 from virtualrig.profile import velocity_modes
 from virtualrig.pump import Pump
@@ -237,7 +239,7 @@ def test_accumulator_and_stiffening_are_their_tangents_for_small_ripple():
     gas = {"position": 1.2, "gas_volume": 2e-7, "gas_pressure": 6e6, "exponent": 1.3}
     growth = {"per_pascal": 5e-9, "reference": 0.0}
     rig, orbit = bench(flow, ("accumulator", gas), ("stiffening_liquid", growth))
-    local = np.interp(1.2, SENSORS, orbit.pressure.mean(axis=1))
+    local = np.interp(1.2, SENSORS, orbit.pressure.mean(axis=1)) + 1.01325e5  # absolute
     volume = 2e-7 * (6e6 / local) ** (1 / 1.3)
     fittings = [(1.2, S * volume / (1.3 * local))]
     softness = [1 / (1 + 5e-9 * orbit.pressure.mean())] * 3
@@ -246,6 +248,23 @@ def test_accumulator_and_stiffening_are_their_tangents_for_small_ripple():
     assert misfit(exact(harmonics, admittance, fittings), truth).min() > 0.02
     assert misfit(exact(harmonics, admittance, softness=softness), truth).min() > 0.02
     assert misfit(rig, truth).max() < 5e-3
+
+
+def test_gas_has_the_stiffness_of_its_absolute_pressure():
+    """One time step of a node with gas alone, at a gauge pressure of 5 bar: a small flow raises the
+    pressure as the polytropic law at 6 bar says, which the same law at 5 bar misses by a sixth."""
+    gauge, volume, exponent, lead, flow = 5e5, 1e-6, 1.3, 1e5, 1e-9
+    absolute = gauge + 1.01325e5
+    network = Network(
+        (Pipe(1.0, 0.02, 1000.0, 0, 1),),
+        (Node(), Node(gas_volume=volume, gas_pressure=absolute, gas_exponent=exponent)),
+        (), RHO, NU,
+    )  # fmt: skip
+    table = node_table(network)[1]
+    history, state = np.zeros(NODE_STATES), np.zeros(NODE_STATES)
+    history[STORED] = -lead * volume  # at rest: all steps before have the same gas volume
+    pressure = settle_node(table, history, state, lead, flow, 0.0, gauge)
+    assert pressure - gauge == pytest.approx(flow * exponent * absolute / (lead * volume), rel=1e-3)
 
 
 def test_full_amplitude_orifice_is_harmonic_balance():
