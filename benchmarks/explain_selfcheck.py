@@ -53,7 +53,7 @@ def run_case(number: int, kind: str, geometry: bool = False) -> dict:
     known = refine(base, truth.effects, observations, [theta])
     measured = np.concatenate([o.values for o in observations], axis=1)
     truth_misfit = relative_misfit(measured, np.concatenate(truth.predict(observations), axis=1))
-    accepted = e.judgement.accepted
+    accepted = e.decision.accepted
     actual = [{"name": effect.name, "element": place.element} for effect, place in truth.effects]
     claims = assign_claims(actual, v["effects"], [set(names) for names in v["equivalents"]])
     right = [true["name"] for true, claim in zip(actual, claims) if claim is not None]
@@ -71,10 +71,10 @@ def run_case(number: int, kind: str, geometry: bool = False) -> dict:
         "right": right,
         "wrong": wrong,
         "place_right": is_place_right(rig, truth, e),
-        "gain": e.search.gain(e.search.best),
+        "gain": e.search.log_bayes_factor(e.search.best),
         "behind_oracle": known.evidence - e.search.best.evidence,
-        "top_single": e.search.gain(e.search.singles[0]),
-        "alarms": list(e.alarms.ringing),
+        "top_single": e.search.log_bayes_factor(e.search.single_effect_fits[0]),
+        "alarms": list(e.alarms.raised),
         "pull": e.alarms.pull[0],
         "disagreement": e.alarms.disagreement[0],
         "model_error_base": e.search.base.model_error,
@@ -95,7 +95,7 @@ def is_place_right(rig, truth, e) -> bool | None:
     for effect, place, values in truth.effect_values(truth.theta):
         own[effect.name] = (place, values)
     results = []
-    for entry in effect_intervals(e.judgement.accepted):
+    for entry in effect_intervals(e.decision.accepted):
         name = entry["effect"].name
         if name not in own:
             continue

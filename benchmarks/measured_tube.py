@@ -112,7 +112,7 @@ def main() -> None:
     row("... with wide priors", fit_effects(loose, data, ()))
     row("unsteady friction, calibrated with wide priors", fit_effects(loose, data, ACOUSTICS[:1]))
     explanation = explain(cases[0], processes=1)
-    accepted = explanation.judgement.accepted
+    accepted = explanation.decision.accepted
     row("**explained**: " + ", ".join(accepted.names).replace("_", " "), accepted)
     warmer, ratio = with_wave_speed_of(accepted, whole[1])
     row(f"... with the wave speed {ratio - 1:+.2%}, that of run 2", warmer)

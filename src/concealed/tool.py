@@ -72,7 +72,7 @@ def compute_baselines(explanation) -> dict:
     bic        name and element of the effect that `pick_by_bic` picks, or None
     sparse     the same of `pick_by_matching_pursuit`
     """
-    base, accepted = explanation.search.base, explanation.judgement.accepted
+    base, accepted = explanation.search.base, explanation.decision.accepted
     observations = list(explanation.observations)
     likelihood = Likelihood(base.twin.with_(theta=np.zeros_like(base.twin.theta)), observations)
     nominal = align(likelihood, np.zeros(len(likelihood.twin.parameters)))
@@ -101,7 +101,7 @@ def pick_by_bic(explanation) -> dict | None:
         minus_log_likelihood = fit.objective - 0.5 * float(np.sum(fit.twin.theta[proper] ** 2))
         return 2 * minus_log_likelihood + len(fit.twin.parameters) * np.log(count)
 
-    best = min([explanation.search.base, *explanation.search.singles], key=criterion)
+    best = min([explanation.search.base, *explanation.search.single_effect_fits], key=criterion)
     if not best.hypothesis:
         return None
     effect, place = best.hypothesis[0]

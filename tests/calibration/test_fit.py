@@ -1,24 +1,14 @@
 """Fitting hypotheses: derivatives, recovery, evidence, and what a search makes of them."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from rippletwin.calibration.frequency_continuation import fit_hypothesis, refine
 from rippletwin.calibration.levenberg_marquardt import descend
-from rippletwin.calibration.misfit import relative_misfit
 from rippletwin.calibration.multistart import MAX_FOLLOWED, select_by_score_test
 from rippletwin.calibration.posterior import MIN_MODEL_ERROR, SIZE_SD, Posterior
 from rippletwin.calibration.whitening import source_scale
-from rippletwin.explanation.checks.alarms import drift_p_value, largest_pull
-from rippletwin.explanation.checks.cross_validation import cross_validate
-from rippletwin.explanation.fit_jobs import Workers, scan_starts, transfer_theta, weak_effect_starts
-from rippletwin.explanation.localise.free_corrections import locate
-from rippletwin.explanation.localise.residual_bands import interior_test
-from rippletwin.explanation.search.single_effects import fit_single_effects
-from rippletwin.explanation.search.stepwise_search import resume_search, search_effects
-from rippletwin.explanation.thresholds import ACCEPT
+from rippletwin.explanation.fit_jobs import scan_starts, transfer_theta, weak_effect_starts
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.forward_model import ForwardModel
@@ -191,86 +181,6 @@ def test_continuation_finds_the_truth_from_nominal(hypothesis):
             assert abs(found.twin.theta[k] - truth.theta[k]) < 4 * found.sd[k]
 
 
-def test_search_takes_nothing_in_where_nothing_is_missing(monkeypatch):
-    """On a no-effect case no effect of a part of the library reaches the threshold."""
-    monkeypatch.setattr(
-        "rippletwin.explanation.search.stepwise_search.applicable_candidates",
-        lambda *_: [*HOSE, *GAIN, *VOLUME],
-    )
-    bench, observations, _ = make(np.random.default_rng(5))
-    found = search_effects(Workers(Twin(bench, observations), observations))
-    assert found.best.hypothesis == ()
-    assert found.base.model_error < 2 * MIN_MODEL_ERROR
-    assert found.gain(found.singles[0]) < ACCEPT
-
-
-def test_search_names_the_effect_and_it_holds_on_points_left_out(monkeypatch):
-    """A sensor's gain is told from a hose and a volume, and transfers to unseen points: there the
-    misfit comes within 1.25 of what the true parameters leave, noise and the source's error. Taken
-    up again on the same data the search ends where it was."""
-    monkeypatch.setattr(
-        "rippletwin.explanation.search.stepwise_search.applicable_candidates",
-        lambda *_: [*HOSE, *GAIN, *VOLUME],
-    )
-    bench, observations, truth = make(np.random.default_rng(6), GAIN, TRUTH)
-    pool = Workers(Twin(bench, observations), observations)
-    found = search_effects(pool)
-    assert found.best.names == ("sensor_gain",)
-    checked = cross_validate(pool, found.base, found.best)
-    assert checked.holds
-    measured = np.concatenate([o.values for o in observations], axis=1)
-    floor = relative_misfit(measured, np.concatenate(truth.predict(observations), axis=1))
-    assert checked.after["held_out"].misfit < 1.25 * floor < checked.before["held_out"].misfit
-    resumed = resume_search(pool, found)
-    assert resumed.best.names == ("sensor_gain",)
-    assert resumed.best.evidence == pytest.approx(found.best.evidence, abs=0.5)
-    assert resumed.gain(resumed.best) == pytest.approx(found.gain(found.best), abs=0.5)
-
-
-def test_profile_peaks_at_the_leak():
-    """The scan of free corrections about the base fit peaks within 0.3 m of the true leak."""
-    bench, observations, _ = make(np.random.default_rng(7), LEAK, TRUTH)
-    base = fit_hypothesis(Twin(bench, observations), (), observations)
-    found = locate(base, observations).profile
-    kind, low, high = found.interval()
-    assert kind == "shunt"
-    assert low - 0.3 < 5.0 < high + 0.3
-
-
-def test_interior_relation_needs_no_source_or_load():
-    """p2 follows from p1 and p3 in noise-free data of another source and another load."""
-    bench, observations, truth = make(np.random.default_rng(8), source=0.5, noise=0.0)
-    fit = refine(Twin(bench, observations), (), observations, [truth.theta])
-    fit = type(fit)(**{**fit.__dict__, "twin": truth})
-    for error in interior_test(observations, fit):
-        assert np.max(error) < 1e-6
-
-
-def test_drift_is_seen_and_noise_is_not():
-    """Two noisy halves of one state agree; halves of states 3 % apart do not."""
-    rng = np.random.default_rng(9)
-    _, early, truth = make(rng)
-    other = [o for o in early]
-    changed = truth.theta.copy()
-    changed[truth.index["wave_speed[1]"]] += 0.5
-    late = ForwardModel(truth, early)(changed)
-
-    drifted = [replace(o, values=h) for o, h in zip(early, late)]
-    delay = sum(s.delay for s in truth.rig.line)
-    assert drift_p_value(early, other, delay)[0] > 0.01
-    assert drift_p_value(early, drifted, delay)[0] < 1e-6
-
-
-def test_pull_names_the_parameter():
-    """The largest pull is that of the parameter moved farthest, effects not counted."""
-    bench, observations, truth = make(np.random.default_rng(10))
-    fit = refine(Twin(bench, observations), (), observations, [truth.theta])
-    theta = np.zeros_like(fit.twin.theta)
-    theta[fit.twin.index["diameter[2]"]] = -5.0
-    moved = type(fit)(**{**fit.__dict__, "twin": fit.twin.with_(theta=theta)})
-    assert largest_pull(moved) == (5.0, "diameter[2]")
-
-
 def test_log_likelihood_is_that_of_the_whole_covariance_matrix():
     """Squares and log determinant of the whitened residual are those of one dense Gaussian with
     noise, model error and the source's error (rough, smooth, of size) over all sensors,
@@ -333,17 +243,3 @@ def test_a_smaller_prediction_is_no_likelier():
     assert costs[1] < min(costs[0], costs[2])
     assert abs(costs[0] - costs[2]) < 0.1
     assert max(costs) - costs[1] < 1.5 * (0.01 / SIZE_SD) ** 2
-
-
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_little_air_is_worth_what_the_truth_is(seed):
-    """0.15 % of air at one operating point, of which the line alone swallows nearly all (1) or most
-    (2): the search gives it the log evidence that a fit from the truth has."""
-    values = TRUTH | {"entrained_air@line.gas_fraction": 1.5e-3}
-    one = {"sensors": 2, "points": POINTS[:1], "source": 0.005, "noise": 500.0}
-    bench, data, truth = make(np.random.default_rng(seed), AIR, values, **one)
-    pool = Workers(Twin(bench, data), data)
-    known = refine(pool.base, AIR, data, [truth.theta])
-    base, (air,) = fit_single_effects(pool, AIR)
-    assert known.evidence - base.evidence > ACCEPT
-    assert air.evidence == pytest.approx(known.evidence, abs=0.5)
