@@ -100,7 +100,10 @@ def calibrate(
         progress(f"below {limit:.0f} Hz: {fits} starts, best misfit {best:.2%}")
 
     model, theta = fit_by_continuation(
-        model, limits_hz=settings.limits_hz, progress=None if progress is None else report
+        model,
+        exact=True,
+        limits_hz=settings.limits_hz,
+        progress=None if progress is None else report,
     )
     return conclude(model, theta, settings)
 

@@ -71,5 +71,9 @@ class ErrorModel(Protocol):
         The gradient of the sum of squares is J^T r.
         """
 
+    @property
+    def needs_full_jacobian(self) -> bool:
+        """Whether the approximate derivatives end a descent too far from the mode."""
+
     def use_full_jacobian(self, theta: np.ndarray) -> None:
-        """From here on derivatives near theta include those of the nonlinear compliance."""
+        """From here on derivatives near theta are exact there, at a cost."""

@@ -62,6 +62,7 @@ def fit_by_continuation(
     model: ErrorModel,
     starts: Sequence[Mapping[str, float]] = ({},),
     draws: int = 0,
+    exact: bool = False,
     limits_hz: Sequence[float] = LIMITS_HZ,
     progress: Callable[[float, int, ErrorModel, np.ndarray], None] | None = None,
 ) -> tuple[ErrorModel, np.ndarray]:
@@ -69,6 +70,7 @@ def fit_by_continuation(
 
     starts    coordinates of parameters by name; the others are those of the data sheet
     draws     starts that are drawn around each mode below a limit for the next one
+    exact     whether the full Jacobian, slow to calculate, leads from the last mode on
     progress  is called after each limit: limit (Hz), number of descents, model and best theta
     """
     limits = continuation_limits(model.observations, limits_hz)
@@ -97,7 +99,8 @@ def fit_by_continuation(
             states = states + draw_around_modes(
                 part, states[:MODES_DRAWN_AROUND], above, draws, STARTS_FITTED[many]
             )
-    return part, _unfreeze_and_refit(part, states[0][1])
+    rounds = JACOBIAN_ROUNDS if exact else 0
+    return part, _unfreeze_and_refit(part, states[0][1], rounds)
 
 
 def fit_hypothesis(
@@ -214,12 +217,15 @@ def _objective_with_compliance(model: ErrorModel, theta: np.ndarray) -> float:
 def _unfreeze_and_refit(model: ErrorModel, theta: np.ndarray, rounds: int = 0) -> np.ndarray:
     """The mode near theta with the compliance solved at each step.
 
-    rounds   most descents that follow with the full Jacobian of the compliance
+    rounds   most descents that follow with the full Jacobian, where the error model needs it
     """
     model.forward.freeze_compliance = False
-    if not model.forward.has_nonlinear_compliance:
+    if model.forward.has_nonlinear_compliance:
+        theta, value = descend(model, theta, MAX_LAST_STEPS)
+    elif rounds and model.needs_full_jacobian:
+        value = model.objective(theta, model.predict(theta))
+    else:
         return theta
-    theta, value = descend(model, theta, MAX_LAST_STEPS)
     for _ in range(rounds if np.isfinite(value) else 0):
         model.use_full_jacobian(theta)
         last = value

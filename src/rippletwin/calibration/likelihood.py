@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -30,7 +31,8 @@ from rippletwin.spectra.frequency_selection import select_below
 from rippletwin.twin.forward_jacobian import STEP, DifferentiableForward
 from rippletwin.twin.forward_model import characteristic_impedance, reflection
 
-MODEL_ERRORS = np.geomspace(1e-4, 2.0, 40)
+MODEL_ERRORS = np.geomspace(1e-4, 2.0, 13)  # of the first search, which two finer ones follow
+FINER_MODEL_ERRORS = 7
 SOURCE_SHARES = np.array([0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0])
 """Of the largest source error, `twin.source_sd`: the values tried for sigma."""
 
@@ -71,22 +73,30 @@ class Likelihood:
         self.max_model_error = np.inf
         self.prior = np.array([not p.flat for p in twin.parameters])
         data = [comparable(o, twin.rig) for o in self.observations]
-        self._data = [_Observed(o, evenness) for o in data]
-        self._pressures = all(o.kind != "input_impedance" for o in data)
-        free = sum(d.values.shape[1] for d in self._data if d.source == "free")
-        self.count = 2 * (sum(d.values.size for d in self._data) - free)
+        impedance = [o.kind == "input_impedance" for o in data]
+        self._members = [np.flatnonzero(np.equal(impedance, which)) for which in (False, True)]
+        self._members = [members for members in self._members if len(members)]
+        self._groups = [_Group([data[k] for k in m], evenness) for m in self._members]
+        self._pressures = not any(impedance)
+        self._use_quotients = not self._pressures
+        self.count = 2 * sum(g.values.size - int(np.sum(g.free)) for g in self._groups)
 
     def below(self, max_frequency_hz: float) -> Likelihood:
         """The same error model of the data at and below a frequency."""
         return Likelihood(self.twin, self.observations, max_frequency_hz, **self._settings)
 
     def predict(self, theta: np.ndarray) -> list[np.ndarray]:
-        """Predictions of the observations, list of (S, F)."""
-        return self.forward(theta)
+        """Predictions (S, F): pressures of all observations side by side, then reflections."""
+        predicted = self.forward(theta)
+        return [np.concatenate([predicted[k] for k in m], axis=1) for m in self._members]
 
     def by_observation(self, prediction: Sequence[np.ndarray]) -> list[ObservedRipple]:
         """Measurement and prediction, one observation at a time."""
-        return [ObservedRipple(d.values, h, d.power) for d, h in zip(self._data, prediction)]
+        parts = [None] * len(self.observations)
+        for members, group, h in zip(self._members, self._groups, prediction):
+            for k, part in zip(members, group.slices):
+                parts[k] = ObservedRipple(group.values[:, part], h[:, part], group.power[part])
+        return parts
 
     def is_valid(self, prediction: Sequence[np.ndarray]) -> bool:
         """Whether the last prediction is finite and its nonlinear equations were solved."""
@@ -97,9 +107,9 @@ class Likelihood:
         if not self.is_valid(prediction):
             return np.inf
         total = 0.5 * float(np.sum(theta[self.prior] ** 2))
-        for d, h in zip(self._data, prediction):
-            whitening = self._whitening(d, h)
-            total += float(np.sum(np.abs(whitening.apply(d.residual(h))) ** 2))
+        for group, h in zip(self._groups, prediction):
+            whitening = group.whitening(h, self.model_error, self.source_sd)
+            total += float(np.sum(np.abs(whitening.apply(group.residual(h))) ** 2))
             total += whitening.log_determinant
         return total
 
@@ -108,10 +118,10 @@ class Likelihood:
 
         Half the sum of squares is minus the log posterior but for the log determinant.
         """
-        parts = [
-            as_real(self._whitening(d, h).apply(d.residual(h))).ravel()
-            for d, h in zip(self._data, prediction)
-        ]
+        parts = []
+        for group, h in zip(self._groups, prediction):
+            whitening = group.whitening(h, self.model_error, self.source_sd)
+            parts.append(as_real(whitening.apply(group.residual(h))).ravel())
         return np.concatenate([*parts, theta[self.prior]])
 
     def linearise(
@@ -122,14 +132,18 @@ class Likelihood:
         The sum of squares is the least over the error of the source. Its gradient therefore is
         that with the source fixed at its most likely value, which multiplies every derivative.
         """
-        columns = []
-        for d, h, slopes in zip(self._data, prediction, self._slopes(theta, prediction)):
-            whitening = self._whitening(d, h)
-            slopes = slopes * self._best_source(d, h, whitening)
-            whitened = -as_real(whitening.apply(d.noise.rotate(slopes)))
-            columns.append(whitened.reshape(len(slopes), -1).T)
+        residuals, columns = [], []
+        for group, h, slopes in zip(self._groups, prediction, self._slopes(theta, prediction)):
+            whitening = group.whitening(h, self.model_error, self.source_sd)
+            whitened = whitening.apply(group.residual(h))
+            slopes = slopes * group.best_source(
+                h, whitening.adjoint(whitened), self.model_error, self.source_sd
+            )
+            changes = -as_real(whitening.apply(group.noise.rotate(slopes)))
+            residuals.append(as_real(whitened).ravel())
+            columns.append(changes.reshape(len(theta), -1).T)
         jacobian = np.concatenate([*columns, np.eye(len(theta))[self.prior]])
-        return self.residual(theta, prediction), jacobian
+        return np.concatenate([*residuals, theta[self.prior]]), jacobian
 
     def estimate_errors(self, prediction: Sequence[np.ndarray], theta: np.ndarray) -> None:
         """Set model error and source error to their most likely values given the residuals.
@@ -138,95 +152,105 @@ class Likelihood:
         """
         taken = min(len(self.prior), 0.5 * self.count)
         scale = self.count / (self.count - taken)
-        sigmas = self.twin.source_sd * SOURCE_SHARES
-        model_errors = MODEL_ERRORS
-        for _ in range(2):
-            cost = np.zeros((len(model_errors), len(sigmas)))
-            for d, h in zip(self._data, prediction):
-                cost += d.cost(h, model_errors, sigmas, scale)
+        model_errors, sigmas = MODEL_ERRORS, self.twin.source_sd * SOURCE_SHARES
+        for _ in range(3):
+            cost = sum(
+                group.cost(h, model_errors, sigmas, scale)
+                for group, h in zip(self._groups, prediction)
+            )
             best, source = np.unravel_index(np.argmin(cost), cost.shape)
             self.model_error, self.source_sd = float(model_errors[best]), float(sigmas[source])
-            # Once more, finely, around the best.
             ends = [max(best - 1, 0), min(best + 1, len(model_errors) - 1)]
-            model_errors = np.geomspace(*model_errors[ends], 12)
+            model_errors = np.geomspace(*model_errors[ends], FINER_MODEL_ERRORS)
+            sigmas = sigmas[source : source + 1]
         self.model_error = min(self.model_error, self.max_model_error)
 
+    @property
+    def needs_full_jacobian(self) -> bool:
+        """Whether derivatives with a frozen nonlinear load end a descent too far from the mode.
+
+        They are wrong by up to 2 %, and the model error may be far less.
+        """
+        return not self._use_quotients
+
     def use_full_jacobian(self, theta: np.ndarray) -> None:
-        """From here on derivatives near theta include those of the nonlinear compliance."""
+        """From here on derivatives near theta include those of nonlinear load and compliance."""
         if self._pressures and self.forward.has_nonlinear_compliance:
             self.forward.use_full_jacobian(theta)
-
-    def _whitening(self, d: _Observed, prediction: np.ndarray) -> Whitening:
-        """Whitening by the covariance that a prediction (S, F) of an observation implies."""
-        sigma = {"known": 0.0, "nominal": self.source_sd, "free": np.inf}[d.source]
-        sd = np.sqrt(d.variance(self.model_error))
-        return Whitening(d.noise.rotate(prediction), sd, np.full(len(d.power), sigma))
+        else:
+            self._use_quotients = True
 
     def _slopes(self, theta: np.ndarray, prediction: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Derivatives of the predictions, list of (P, S, F)."""
-        if self._pressures:
-            slopes = self.forward.derivatives(theta)
-            forward = self.forward
-            return [slopes[:, rows, part] for rows, part in zip(forward.rows, forward.slices)]
+        if not self._use_quotients:
+            return [self.forward.derivatives(theta)]
         moved = [self.predict(theta + STEP * unit) for unit in np.eye(len(theta))]
         return [(np.stack(hs) - h) / STEP for hs, h in zip(zip(*moved), prediction)]
 
-    def _best_source(self, d: _Observed, prediction, whitening: Whitening) -> np.ndarray:
-        """Most likely source (F,) relative to that of the prediction."""
-        if d.source == "known":
-            return np.ones(len(d.power))
-        h = d.noise.rotate(prediction)
-        if d.source == "free":
-            weight = 1.0 / d.variance(self.model_error)
-            size = np.maximum(np.sum(weight * np.abs(h) ** 2, axis=0), 1e-300)
-            return np.sum(weight * np.conj(h) * d.rotated, axis=0) / size
-        pull = whitening.adjoint(whitening.apply(d.residual(prediction)))
-        return 1.0 + self.source_sd**2 * np.sum(np.conj(h) * pull, axis=0)
 
+class _Group:
+    """Values (S, F) of observations of one quantity side by side.
 
-class _Observed:
-    """Values (S, F) of one observation, also in the eigenbasis of its noise."""
+    power       (F,) m, of each observation for itself
+    free        (F,) mask of the frequencies whose source is free; `nominal` likewise
+    """
 
-    def __init__(self, o, evenness: float):
-        self.source, self.values = o.source, o.values
-        self.noise = NoiseBasis(o.covariance)
-        self.rotated = self.noise.rotate(o.values)
-        power = np.mean(np.abs(o.values) ** 2, axis=0)  # (F,)
-        self.power = (1.0 - evenness) * power + evenness * np.mean(power)
+    def __init__(self, observations: Sequence, evenness: float):
+        sizes = np.cumsum([0, *(len(o.frequency_hz) for o in observations)])
+        self.slices = [slice(a, b) for a, b in pairwise(sizes)]
+        self.values = np.concatenate([o.values for o in observations], axis=1)
+        self.noise = NoiseBasis(np.concatenate([o.covariance for o in observations]))
+        self._rotated = self.noise.rotate(self.values)
+        self.power = np.mean(np.abs(self.values) ** 2, axis=0)
+        for part in self.slices:
+            own = self.power[part]
+            self.power[part] = (1.0 - evenness) * own + evenness * np.mean(own)
+        sources = np.repeat([o.source for o in observations], np.diff(sizes))
+        self.free, self.nominal = sources == "free", sources == "nominal"
 
     def variance(self, model_error) -> np.ndarray:
         """Variance (..., S, F) of noise and model error (...)."""
         return self.noise.variances + model_error**2 * self.power
 
     def residual(self, prediction: np.ndarray) -> np.ndarray:
-        """Residual (S, F) in the eigenbasis."""
-        return self.rotated - self.noise.rotate(prediction)
+        """Residual (S, F) in the eigenbasis of the noise."""
+        return self._rotated - self.noise.rotate(prediction)
+
+    def whitening(self, prediction: np.ndarray, model_error: float, sigma: float) -> Whitening:
+        """Whitening by the covariance that a prediction (S, F) implies."""
+        source = np.where(self.free, np.inf, np.where(self.nominal, sigma, 0.0))
+        return Whitening(self.noise.rotate(prediction), np.sqrt(self.variance(model_error)), source)
+
+    def best_source(self, prediction, pull, model_error: float, sigma: float) -> np.ndarray:
+        """Most likely source (F,) relative to that of the prediction (S, F).
+
+        pull   (S, F) residual multiplied by the inverse covariance
+        """
+        h = self.noise.rotate(prediction)
+        source = 1.0 + np.where(self.nominal, sigma**2, 0.0) * np.sum(np.conj(h) * pull, axis=0)
+        if not np.any(self.free):
+            return source
+        weight = 1.0 / self.variance(model_error)
+        size = np.maximum(np.sum(weight * np.abs(h) ** 2, axis=0), 1e-300)
+        amplitude = np.sum(weight * np.conj(h) * self._rotated, axis=0) / size
+        return np.where(self.free, amplitude, source)
 
     def cost(self, prediction, model_errors, sigmas, scale) -> np.ndarray:
         """Minus log likelihood (D, G) of model errors (D,) and source errors sigmas (G,).
 
         The squares are multiplied by `scale`.
         """
-        variance = self.variance(model_errors[:, None, None])  # (D, S, F)
-        h = self.noise.rotate(prediction)
-        e = self.rotated - h
-        square = np.sum(np.abs(e) ** 2 / variance, axis=1)
-        cross = np.abs(np.sum(np.conj(h) * e / variance, axis=1)) ** 2
-        size = np.maximum(np.sum(np.abs(h) ** 2 / variance, axis=1), 1e-300)
-        logs = np.sum(np.log(variance), axis=(1, 2))
-        if self.source == "free":
-            logs = logs + np.sum(np.log(size), axis=1)
-            cost = scale * np.sum(square - cross / size, axis=1) + logs
-            return np.repeat(cost[:, None], len(sigmas), axis=1)
-        if self.source == "known":
-            sigmas = np.zeros_like(sigmas)
-        stretch = 1.0 + sigmas[:, None] ** 2 * size[:, None, :]  # (D, G, F)
-        along = np.sum(sigmas[:, None] ** 2 * cross[:, None, :] / stretch, axis=2)
-        return (
-            scale * (np.sum(square, axis=1)[:, None] - along)
-            + logs[:, None]
-            + np.sum(np.log(stretch), axis=2)
-        )
+        weight = 1.0 / self.variance(model_errors[:, None, None])  # (D, S, F)
+        h, e = self.noise.rotate(prediction), self.residual(prediction)
+        square = np.sum(np.abs(e) ** 2 * weight, axis=1)
+        cross = np.abs(np.sum(np.conj(h) * e * weight, axis=1)) ** 2
+        size = np.maximum(np.sum(np.abs(h) ** 2 * weight, axis=1), 1e-300)
+        variances = np.where(self.nominal, sigmas[:, None] ** 2, 0.0)
+        stretch = 1.0 + variances * size[:, None]  # (D, G, F)
+        along = np.where(self.free, 1.0 / size[:, None], variances / stretch) * cross[:, None]
+        logs = np.log(np.where(self.free, size[:, None], stretch))
+        cost = np.sum(scale * (square[:, None] - along) + logs, axis=2)
+        return cost - np.sum(np.log(weight), axis=(1, 2))[:, None]
 
 
 def comparable(observation, rig):

@@ -273,9 +273,14 @@ class Posterior:
             sds, taus = sds[source : source + 1], taus[smooth : smooth + 1]
         self.model_error = min(self.model_error, self.max_model_error)
 
+    @property
+    def needs_full_jacobian(self) -> bool:
+        """Whether derivatives with a frozen compliance end a descent too far from the mode."""
+        return self._pressures and self.forward.has_nonlinear_compliance
+
     def use_full_jacobian(self, theta: np.ndarray) -> None:
         """From here on derivatives near theta include those of the nonlinear compliance."""
-        if self._pressures and self.forward.has_nonlinear_compliance:
+        if self.needs_full_jacobian:
             self.forward.use_full_jacobian(theta)
 
     def linearise(self, theta: np.ndarray, prediction: np.ndarray, besides=None):
