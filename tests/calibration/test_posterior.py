@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rippletwin.calibration.posterior import SIZE_SD, Posterior
-from rippletwin.calibration.whitening import source_scale
+from rippletwin.calibration.smooth_source import source_scale
 from synthetic_observations import POINTS, make
 
 

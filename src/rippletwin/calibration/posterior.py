@@ -50,13 +50,8 @@ import numpy as np
 
 from rippletwin.calibration.error_model import ObservedRipple
 from rippletwin.calibration.likelihood import comparable
-from rippletwin.calibration.whitening import (
-    NoiseBasis,
-    Whitening,
-    as_real,
-    smooth_basis,
-    source_scale,
-)
+from rippletwin.calibration.smooth_source import SmoothSourceError, source_scale
+from rippletwin.calibration.whitening import NoiseBasis, Whitening, as_real
 from rippletwin.spectra.frequency_selection import select_below
 from rippletwin.twin.forward_jacobian import STEP, DifferentiableForward
 
@@ -98,7 +93,6 @@ class Posterior:
         self.source_free = source_free
         self.model_error, self.source_sd, self.smooth_sd = 0.1, float(SOURCE_SDS[1]), 0.0
         self.max_model_error, self._products = np.inf, 0.0
-        self._size = SIZE_SD_OF_PUMP if twin.uncertain_pump else SIZE_SD
         self._known_for, self._known_determinant = None, 0.0
         self.prior = np.array([not p.flat for p in twin.parameters])
         data = [comparable(o, twin.rig) for o in self.observations]
@@ -106,25 +100,21 @@ class Posterior:
         self.values = np.concatenate([o.values for o in data], axis=1)  # (S, F)
         self._rotated = self._rotate(self.values)
         self.power = np.mean(np.abs(self.values) ** 2, axis=0)  # (F,)
-        known = [np.full(o.values.shape[1], o.source == "known") for o in data]
-        free = [
-            np.full(
-                o.values.shape[1], o.source == "free" or (source_free and o.source == "nominal")
-            )
-            for o in data
-        ]
-        self._known, self._free = np.concatenate(known), np.concatenate(free)
+        sources = np.repeat([o.source for o in data], [o.values.shape[1] for o in data])
+        self._known = sources == "known"
+        self._free = (sources == "free") | (source_free & (sources == "nominal"))
         nominal = ~(self._known | self._free)
-        self._nominal = np.flatnonzero(nominal)
         self._scale = np.ones(len(nominal))  # g
         for o, part in zip(data, self.forward.slices):
             if o.source == "nominal":
                 self._scale[part] = source_scale(self.forward.source.flow[part])
-        smooth = smooth_basis(self.forward.frequency_hz[nominal], self.forward.recording[nominal])
-        size = np.ones((1, smooth.shape[1]))
-        self._basis = np.concatenate([self._scale[nominal] * smooth, size])
-        pairs = self._basis[:, None] * self._basis
-        self._pairs = pairs.reshape(len(self._basis) ** 2, len(self._nominal)).T
+        self._smooth = SmoothSourceError(
+            self.forward.frequency_hz,
+            self.forward.recording,
+            nominal,
+            self._scale,
+            SIZE_SD_OF_PUMP if twin.uncertain_pump else SIZE_SD,
+        )
         self.count = 2 * (self.values.size - int(np.sum(self._free)))
         self._pressures = all(o.kind != "input_impedance" for o in data)
 
@@ -196,14 +186,9 @@ class Posterior:
             self._rotate(prediction),
             np.sqrt(self._variance(self.model_error)),
             np.where(self._known, 0.0, np.where(self._free, np.inf, self.source_sd * self._scale)),
-            self._nominal,
-            self._sds(self.smooth_sd)[:, None] * self._basis,
+            self._smooth.frequencies,
+            self._smooth.sds(self.smooth_sd)[:, None] * self._smooth.basis,
         )
-
-    def _sds(self, smooth_sd) -> np.ndarray:
-        """Standard deviations (..., J) of the amplitudes of the smooth basis for tau (...)."""
-        smooth = np.repeat(np.asarray(smooth_sd)[..., None], len(self._basis) - 1, axis=-1)
-        return np.concatenate([smooth, np.full((*smooth.shape[:-1], 1), self._size)], axis=-1)
 
     def draw(self, prediction: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Values (S, F) drawn from the error model around a prediction.
@@ -217,8 +202,8 @@ class Posterior:
         h = self.best_source(prediction)
         relative = np.where(self._known | self._free, 0.0, self.source_sd * self._scale)
         source = 1.0 + relative * normal(h.shape[1])
-        sds = self._sds(self.smooth_sd)
-        source[self._nominal] += (sds * normal(len(sds))) @ self._basis
+        sds = self._smooth.sds(self.smooth_sd)
+        source[self._smooth.frequencies] += (sds * normal(len(sds))) @ self._smooth.basis
         error = np.sqrt(self._variance(self.model_error)) * normal(*h.shape)
         return source * h + np.einsum("fsk,kf->sf", np.conj(self._noise.rotation), error)
 
@@ -236,7 +221,7 @@ class Posterior:
         squares, inner = np.abs(self._rotated - h) ** 2, np.conj(h) * (self._rotated - h)
         sizes = np.abs(h) ** 2
         model_errors = MODEL_ERRORS
-        any_nominal = len(self._nominal) > 0
+        any_nominal = len(self._smooth.frequencies) > 0
         sds = SOURCE_SDS if any_nominal else SOURCE_SDS[:1]
         taus = SMOOTH_SDS if any_nominal else np.zeros(1)
         for _ in range(2):
@@ -251,20 +236,10 @@ class Posterior:
             logs = np.log(np.where(self._free, size, stretch))
             cost = np.sum(scale * (square - along) + logs, axis=2)
             cost = cost - np.sum(np.log(weight), axis=(1, 2)) + np.zeros((len(taus), 1, 1))
-            if any_nominal:  # (T, G, D): with the smooth error, its amplitudes of unit prior
-                gain = 1.0 / stretch[..., self._nominal]
-                gram = ((size[:, self._nominal] * gain) @ self._pairs).reshape(
-                    *gain.shape[:2], len(self._basis), -1
-                )
-                share = (cross[:, self._nominal] * gain) @ self._basis.T  # (G, D, J)
-                sizes_of = self._sds(taus)[:, None, None]  # (T, 1, 1, J)
-                root = np.linalg.cholesky(
-                    np.eye(len(self._basis)) + sizes_of[..., None] * gram * sizes_of[..., None, :]
-                )
-                both = np.stack([share.real, share.imag], axis=-1)
-                solved = np.linalg.solve(root, sizes_of[..., None] * both)
-                cost -= scale * np.sum(solved**2, axis=(-2, -1))
-                cost += 2 * np.sum(np.log(np.diagonal(root, axis1=-2, axis2=-1)), axis=-1)
+            if any_nominal:
+                explained, logs = self._smooth.explained(cross, size, stretch, taus)
+                cost -= scale * explained
+                cost += 2 * logs
             smooth, source, best = np.unravel_index(np.argmin(cost), cost.shape)
             self.model_error = float(model_errors[best])
             self.source_sd, self.smooth_sd = float(sds[source]), float(taus[smooth])
@@ -315,8 +290,7 @@ class Posterior:
         """Most likely source (F,) relative to that of the prediction, given whitened residuals."""
         pull = np.sum(np.conj(self._rotate(prediction)) * whitening.adjoint(whitened), axis=0)
         error = (self.source_sd * self._scale) ** 2 * pull
-        sds = self._sds(self.smooth_sd)
-        error[self._nominal] += self._basis.T @ (sds**2 * (self._basis @ pull[self._nominal]))
+        error[self._smooth.frequencies] += self._smooth.most_likely(pull, self.smooth_sd)
         return np.where(
             self._free, self._amplitude(prediction), 1.0 + np.where(self._known, 0.0, error)
         )

@@ -6,12 +6,6 @@ from functools import cached_property
 
 import numpy as np
 
-CORRELATION_HZ = 1000.0  # l and f0 of `rippletwin.calibration.posterior`
-MIN_HARMONIC = 0.01
-"""Share of the strongest harmonic below which a harmonic of the source is uncertain by more than
-its own share."""
-MIN_EIGENVALUE = 1e-3  # share of the kernel's largest eigenvalue; smaller ones are left out
-
 
 class NoiseBasis:
     """Eigenbasis of the sensor noise at each frequency.
@@ -96,33 +90,3 @@ def as_real(r: np.ndarray) -> np.ndarray:
     The real and the imaginary part have half the variance each, hence the factor sqrt 2.
     """
     return np.sqrt(2.0) * np.stack([r.real, r.imag], axis=-3)
-
-
-def smooth_basis(frequency_hz: np.ndarray, recording: np.ndarray) -> np.ndarray:
-    """Basis (J, N) of errors smooth in frequency, basis.T @ basis = K.
-
-    frequency_hz   (N,)
-    recording      (N,) number of the recording that each frequency belongs to
-
-    K is that of `rippletwin.calibration.posterior`.
-    """
-    f = np.asarray(frequency_hz, float) / CORRELATION_HZ
-    kernel = 1.0 + (1.0 + np.outer(f, f)) * np.exp(-0.5 * np.subtract.outer(f, f) ** 2)
-    kernel = kernel * (0.5 + 0.5 * np.equal.outer(recording, recording))
-    values, vectors = np.linalg.eigh(kernel)
-    kept = values > MIN_EIGENVALUE * np.max(values, initial=0.0)
-    return np.sqrt(values[kept])[:, None] * vectors[:, kept].T
-
-
-def source_scale(source: np.ndarray) -> np.ndarray:
-    """g (F,): size of a ripple around each harmonic over that of the harmonic itself.
-
-    source   (F,) harmonics of the flow ripple in ascending order
-
-    Around means a weighted mean of the power over two neighbours on each side.
-    """
-    power = np.abs(source) ** 2
-    kernel = np.exp(-0.5 * np.arange(-2, 3) ** 2.0)
-    around = np.convolve(power, kernel / kernel.sum())[2:-2]
-    around = np.maximum(around, power) + MIN_HARMONIC**2 * np.max(power)
-    return np.sqrt(around / np.maximum(power, 1e-300))
