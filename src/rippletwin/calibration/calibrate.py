@@ -18,15 +18,10 @@ from rippletwin.calibration.frequency_continuation import (
     fit_by_continuation,
 )
 from rippletwin.calibration.laplace import laplace
-from rippletwin.calibration.likelihood import Likelihood
+from rippletwin.calibration.likelihood import EVENNESS, Likelihood
 from rippletwin.calibration.misfit import Misfit, misfit
 from rippletwin.calibration.shaft_angles import fit_shaft_angles
 from rippletwin.twin.twin import Twin
-
-EVENNESS = 0.5
-"""Evenness of the relative model error (see `likelihood`). Where physics is missing, the weak upper
-harmonics are wholly wrong. With an error relative to each harmonic they would weigh as much as the
-strong lower ones."""
 
 UNDETERMINED_SD = 0.7  # posterior over prior standard deviation above which data say little
 IMPLAUSIBLE_PULL = 3.0  # prior standard deviations

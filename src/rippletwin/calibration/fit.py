@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rippletwin.calibration.laplace import laplace
+from rippletwin.calibration.likelihood import Likelihood
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.twin.effects.base import Effect, Place
 from rippletwin.twin.twin import Twin
@@ -29,6 +30,8 @@ class Fit:
     source_sd     estimated relative error of the source, independent between harmonics
     smooth_sd     estimated relative error of the source, smooth in frequency
     source_free   whether the source was projected out
+    plain         whether the error model was that of calibration (`likelihood`), without smooth
+                  source errors, and not that of explaining (`posterior`)
     has_nonlinear_compliance   whether the line has a compliance that depends on the pressure
     interval_ends   lower and upper end of the 95 % interval of a parameter, by its index, in
                     theta's coordinates; only where a profile was traced (`profile_intervals`)
@@ -43,6 +46,7 @@ class Fit:
     source_sd: float
     smooth_sd: float
     source_free: bool = False
+    plain: bool = False
     has_nonlinear_compliance: bool = False
     interval_ends: Mapping[int, tuple[float, float]] = field(default_factory=dict, repr=False)
 
@@ -71,12 +75,12 @@ class Fit:
         return " + ".join(f"{effect.name}, {place}" for effect, place in self.hypothesis)
 
 
-def laplace_fit(posterior: Posterior, hypothesis: Hypothesis, theta: np.ndarray) -> Fit:
+def laplace_fit(model: Posterior | Likelihood, hypothesis: Hypothesis, theta: np.ndarray) -> Fit:
     """The fit at a mode theta (P,), with its evidence and covariance.
 
     Where no start leads to a valid prediction, the evidence is minus infinity.
     """
-    mode, twin = laplace(posterior, theta), posterior.twin.with_(theta=theta)
+    mode, twin = laplace(model, theta), model.twin.with_(theta=theta)
     if not np.isfinite(mode.evidence):
         return Fit(hypothesis, twin, np.inf, -np.inf, mode.covariance, np.inf, 0.0, 0.0)
     return Fit(
@@ -85,11 +89,12 @@ def laplace_fit(posterior: Posterior, hypothesis: Hypothesis, theta: np.ndarray)
         mode.objective,
         mode.evidence,
         mode.covariance,
-        posterior.model_error,
-        posterior.source_sd,
-        posterior.smooth_sd,
-        posterior.source_free,
-        posterior.forward.has_nonlinear_compliance,
+        model.model_error,
+        model.source_sd,
+        model.smooth_sd,
+        model.source_free,
+        isinstance(model, Likelihood),
+        model.forward.has_nonlinear_compliance,
     )
 
 

@@ -23,6 +23,7 @@ import numpy as np
 from rippletwin.calibration.error_model import ErrorModel
 from rippletwin.calibration.fit import Fit, Hypothesis, laplace_fit
 from rippletwin.calibration.levenberg_marquardt import CONVERGED, descend
+from rippletwin.calibration.likelihood import EVENNESS, Likelihood
 from rippletwin.calibration.multistart import (
     FEW_STARTS,
     MAX_MODEL_ERROR_BELOW_LIMIT,
@@ -110,6 +111,7 @@ def fit_hypothesis(
     starts: Sequence[Mapping[str, float]] = ({},),
     source_free: bool = False,
     draws: int = 0,
+    plain: bool = False,
 ) -> Fit:
     """Fit a twin with the effects of `hypothesis` by continuation from the data sheet.
 
@@ -117,11 +119,11 @@ def fit_hypothesis(
     starts       coordinates of effect parameters by name, one mapping a start
     source_free  whether the source is projected out
     draws        as in `fit_by_continuation`
+    plain        whether the error model is that of `calibrate` instead of that of explaining
     """
-    twin = base.with_(effects=hypothesis)
-    model = Posterior(twin, observations, None, source_free)
-    posterior, theta = fit_by_continuation(model, starts, draws)
-    return laplace_fit(posterior, hypothesis, theta)
+    model = _error_model(base, hypothesis, observations, source_free, plain)
+    model, theta = fit_by_continuation(model, starts, draws, exact=plain)
+    return laplace_fit(model, hypothesis, theta)
 
 
 def refine(
@@ -131,25 +133,35 @@ def refine(
     thetas: Sequence,
     source_free: bool = False,
     exact: bool = True,
+    plain: bool = False,
 ) -> Fit:
     """Fit with all frequencies from good starts `thetas`, each (P,).
 
     Of several starts, which differ in their newest effect, the most promising are followed. One
-    alone ends exactly at the mode if `exact`, even where that takes the slow derivatives of the
-    nonlinear compliance.
+    alone ends exactly at the mode if `exact`, even where that takes slow derivatives. `source_free`
+    and `plain` are as in `fit_hypothesis`; several starts need the error model of explaining.
     """
-    twin = base.with_(effects=hypothesis)
-    posterior = Posterior(twin, observations, None, source_free)
+    model = _error_model(base, hypothesis, observations, source_free, plain)
     thetas = [np.asarray(theta, dtype=float) for theta in thetas]
     if len(thetas) > 1:
-        thetas = select_by_score_test(base, posterior, thetas)
+        thetas = select_by_score_test(base, model, thetas)
     else:
-        posterior.predict(thetas[0])
-        posterior.forward.freeze_compliance = True
-    modes = [descend(posterior, theta, MAX_LAST_STEPS) for theta in thetas]
+        model.predict(thetas[0])
+        model.forward.freeze_compliance = True
+    modes = [descend(model, theta, MAX_LAST_STEPS) for theta in thetas]
     best = min(modes, key=lambda mode: mode[1])[0]
     rounds = JACOBIAN_ROUNDS if exact and len(modes) == 1 else 0
-    return laplace_fit(posterior, hypothesis, _unfreeze_and_refit(posterior, best, rounds))
+    return laplace_fit(model, hypothesis, _unfreeze_and_refit(model, best, rounds))
+
+
+def _error_model(
+    base: Twin, hypothesis: Hypothesis, observations: Sequence, source_free: bool, plain: bool
+) -> Posterior | Likelihood:
+    """The error model of explaining, or the plain one of calibration."""
+    twin = base.with_(effects=hypothesis)
+    if plain:
+        return Likelihood(twin, observations, evenness=EVENNESS)
+    return Posterior(twin, observations, None, source_free)
 
 
 def _kept(modes: Sequence[State], stage: int, last: bool, many: bool) -> list[State]:

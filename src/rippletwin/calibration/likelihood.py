@@ -31,6 +31,11 @@ from rippletwin.spectra.frequency_selection import select_below
 from rippletwin.twin.forward_jacobian import STEP, DifferentiableForward
 from rippletwin.twin.forward_model import characteristic_impedance, reflection
 
+EVENNESS = 0.5
+"""Evenness g with which `calibrate` works. Where physics is missing, the weak upper harmonics are
+wholly wrong. With an error relative to each harmonic they would weigh as much as the strong lower
+ones."""
+
 MODEL_ERRORS = np.geomspace(1e-4, 2.0, 13)  # of the first search, which two finer ones follow
 FINER_MODEL_ERRORS = 7
 SOURCE_SHARES = np.array([0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0])
@@ -53,7 +58,7 @@ class Likelihood:
     `estimate_errors`; `count` is the number of real data; `observations` are those used.
     """
 
-    source_free = False
+    source_free, smooth_sd = False, 0.0
 
     def __init__(
         self,

@@ -18,13 +18,12 @@ import numpy as np
 
 from rippletwin.calibration.calibrate import (
     DEFAULTS,
-    EVENNESS,
     Calibration,
     Settings,
     conclude,
 )
 from rippletwin.calibration.frequency_continuation import continuation_limits
-from rippletwin.calibration.likelihood import Likelihood
+from rippletwin.calibration.likelihood import EVENNESS, Likelihood
 from rippletwin.calibration.shaft_angles import align_shaft_angles
 from rippletwin.twin.twin import Twin
 
