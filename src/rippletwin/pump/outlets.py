@@ -57,9 +57,9 @@ class Pipe:
 def choose_steps(pistons, period, outlet, least):
     """Steps a revolution and cells of the pipe.
 
-    A multiple of the pistons, so that all of them see the same angles, and such that a wave needs
-    a whole number of steps for the pipe: the method of characteristics then needs neither
-    interpolation nor an altered wave speed.
+    The steps are a multiple of the pistons, so that all of these have the same angles, and such
+    that a wave takes a whole number of steps through the pipe: the method of characteristics then
+    needs neither interpolation nor an altered wave speed.
     """
     first = -(-least // pistons) * pistons
     if not isinstance(outlet, Pipe):

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import binom
 
 from rippletwin.case.model import ATMOSPHERE
-from rippletwin.line.frequency_domain.nonlinear_compliance import Storage
+from rippletwin.line.frequency_domain.nonlinear_compliance import NonlinearCompliance
 from rippletwin.twin.effects.base import Effect, line_place
 from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal, normal
@@ -37,7 +37,9 @@ def _apply(network, state, values, place):
         mean = np.broadcast_to(state.absolute_pressure_in(k), np.shape(network.shunt[k]))
         first, *beyond = gas_series(values["gas_fraction"], values["polytropic_exponent"], mean)
         network.shunt[k] = network.shunt[k] + state.area(k) * network.s * first / mean
-        network.nonlinear_compliances.append(Storage(k, state.area(k), mean, np.array(beyond)))
+        network.nonlinear_compliances.append(
+            NonlinearCompliance(k, state.area(k), mean, np.array(beyond))
+        )
 
 
 def _apply_in_time(line, state, values, place):
