@@ -42,7 +42,7 @@ def orifice(conductance, drop, tangency):
     """Flow through a smoothed orifice, m3/s, and a slope; `conductance` = Cd A sqrt(2/rho).
 
     The slope is the tangent's for `tangency` 1 and the chord's from the origin for 0. On a square
-    root Newton's tangent jumps between +drop and -drop for ever, a slope in between contracts.
+    root Newton's method alternates between +drop and -drop; a slope in between converges.
     """
     square = drop * drop + SMOOTHING * SMOOTHING
     root = 1.0 / np.sqrt(np.sqrt(square))

@@ -16,7 +16,7 @@ from rippletwin.case.model import absolute
 @dataclass(frozen=True)
 class Geometry:
     """The keys of rig.yaml's `pump`, SI units; defaults describe a pump of 42 cm3/rev, see
-    docs/pump.md for their origin."""
+    docs/explanation/pump.md for their origin."""
 
     pistons: int = 9
     piston_diameter: float = 0.017

@@ -55,7 +55,7 @@ class PumpRipple(FlowRipple):
     density: float | None = None
 
     def source_admittance(self, s: np.ndarray) -> np.ndarray:
-        """Admittance (F,), m3/(Pa s), of the chambers, parallel to the flow into a constant pressure.
+        """Admittance (F,), m3/(Pa s), of the chambers, beside the flow into a constant pressure.
 
         Zero for a ripple coupled to a pipe, whose flow contains the response to a line.
         """

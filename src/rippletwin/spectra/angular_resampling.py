@@ -94,8 +94,8 @@ def interpolate(signal: np.ndarray, position: np.ndarray, cutoff: float = 1.0) -
 
 @lru_cache(maxsize=4)
 def _kernel(cutoff: float) -> tuple[np.ndarray, int]:
-    """Weights (KERNEL_FRACTIONS + 1, taps) of the samples around a position at each fraction of a sample,
-    and the number of taps before it.
+    """Weights (KERNEL_FRACTIONS + 1, taps) of the samples around a position at each fraction of a
+    sample, and the number of taps before it.
 
     A sinc windowed by exp(b (sqrt(1 - u^2) - 1)) (Barnett, Magland, af Klinteberg 2019, SIAM J.
     Sci. Comput. 41, C479, eq. 1.8). Linear interpolation between 4096 entries errs by 1e-7.

@@ -186,7 +186,7 @@ def _relative_scatter(residual: np.ndarray, size: np.ndarray) -> np.ndarray:
     """
     count = len(residual)
     variance = np.sum(np.abs(residual / size) ** 2, axis=0) / (count - 1) / count
-    return np.sqrt(uniform_filter1d(variance, SMOOTHED, axis=-1, mode="nearest"))
+    return np.sqrt(uniform_filter1d(variance, SMOOTHED_FREQUENCIES, axis=-1, mode="nearest"))
 
 
 def _highest(max_frequency_hz: float | None, sampling_rate_hz: float) -> float:

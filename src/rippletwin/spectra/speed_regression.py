@@ -50,10 +50,8 @@ def harmonics_at_mean_speed(
         rate = np.gradient(deviation, np.cumsum(1 / speed_hz))
         band = np.tile(np.round(BANDS_PER_OCTAVE * np.log2(orders * mean)).astype(int), sensors)
         for each in np.unique(band):
-            own, chirp = (
-                np.flatnonzero(band == each),
-                rate / (4 * np.pi * 2.0 ** (each / BANDS_PER_OCTAVE)),
-            )
+            own = np.flatnonzero(band == each)
+            chirp = rate / (4 * np.pi * 2.0 ** (each / BANDS_PER_OCTAVE))
             for which, *result in _regress(data[:, own], deviation, chirp):
                 weights[own[which]], unknown[own[which]], residual[:, own[which]] = result
     weights = weights.reshape(*spectra.shape[1:], count)
