@@ -1,4 +1,4 @@
-"""The line as the flow sensors need it: what p and q at the pump mean at the sensors."""
+"""Response of the line to waves at the pump: sensors' readings, flow and load mismatch."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NetworkFactory = Callable[[float, np.ndarray], FrequencyDomainLine]
 
 @dataclass(frozen=True)
 class LineResponse:
-    """The waves w = (f, b) at the pump, in Pa, and what is linear in them, at F frequencies.
+    """Quantities linear in the waves w = (f, b) at the pump, Pa, at F frequencies.
 
     p(0) = f + b and q(0) = (f - b)/Zc, Zc the first segment's characteristic impedance (modulus).
     to_sensors (F, S, 2)  sensors' readings, Pa
@@ -33,10 +33,10 @@ class LineResponse:
 
 
 def line_response(network: FrequencyDomainLine, of: str = "source") -> LineResponse:
-    """What `network`'s line does with a state at the pump, whatever source and load are.
+    """Response of the line of `network`, independent of its source.
 
-    `of` is the flow wanted: the ideal "source"'s, or the "outlet"'s Q(0), which lacks what the
-    source's own admittance takes; ValueError for another.
+    `of` is the flow wanted: that of the ideal "source", or Q(0) at the "outlet", which is less by
+    the flow into the source's admittance; ValueError for another.
     Upstream of a sensor [p, q](0) = T [p, q](x) with det T = 1, so p(x) = T22 p(0) - T12 q(0).
     """
     zc = np.abs(np.sqrt(network.series[0] / network.shunt[0]))
@@ -68,8 +68,8 @@ def own_admittance(network: FrequencyDomainLine, of: str) -> np.ndarray:
 def network_of(twin, load_pressure: float, ripple: FlowRipple | None = None) -> NetworkFactory:
     """Networks of a calibrated twin at one operating point, the load linearised there.
 
-    `load_pressure` in Pa; the mean of `ripple` (m3/s) sets an orifice whose coefficient the rig
-    does not give, and what admittance the ripple has is the source's. None takes the lumped pump.
+    `load_pressure` in Pa. The mean of `ripple` (m3/s) determines an orifice whose coefficient the
+    rig does not give, and the ripple's admittance is the source's. None is the lumped pump's.
     """
 
     def network(speed_hz: float, orders: np.ndarray) -> FrequencyDomainLine:

@@ -15,7 +15,7 @@ Desai et al. 2021, One-shot transfer learning of physics-informed neural network
     load      p and q at the end are in the load's ratio
 
 The trunk is trained once, at the calibrated parameters, on the sum of these losses for known states
-at the pump (whose sensor readings the twin tells). In each training step the heads are solved
+at the pump, whose sensor readings the twin predicts. In each training step the heads are solved
 exactly and only the trunk moves (variable projection; Golub & Pereyra 1973, SIAM J. Numer. Anal.
 10, 413). Each uniform piece of line has shape functions of its own (Jagtap & Karniadakis 2020,
 Commun. Comput. Phys. 28, 2002): slow envelopes on carriers of the calibrated wave length, so that
@@ -36,8 +36,8 @@ from rippletwin.flow_sensor.line_response import LineResponse, NetworkFactory, l
 from rippletwin.flow_sensor.spectral_inversion import LOAD_ERROR, MODEL_ERROR
 from rippletwin.flow_sensor.trunk import Equations, Trunk, equations, pieces_of
 
-COLLOCATION = 48  # points a piece when a window is solved
-MARGIN = 0.02  # relative, of trained frequencies beyond the orders': the speed wanders
+COLLOCATION_POINTS = 48  # of a piece when a window is solved
+FREQUENCY_MARGIN = 0.02  # relative, of trained frequencies beyond the orders': speeds vary
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def train(
     settings = settings or Settings()
     highest = bandwidth_hz / speed_hz
     orders = 1 + (highest - 1) * np.linspace(0, 1, settings.frequencies) ** 2  # denser where low
-    orders[0], orders[-1] = 1 - MARGIN, highest * (1 + MARGIN)
+    orders[0], orders[-1] = 1 - FREQUENCY_MARGIN, highest * (1 + FREQUENCY_MARGIN)
     line = network(speed_hz, orders)
     to_sensors = line_response(line).to_sensors
     places = 0.5 + 0.5 * np.polynomial.legendre.leggauss(settings.points)[0]
@@ -85,7 +85,7 @@ def train(
 
     def loss():
         matrix, target = _known_states(equations(trunk, line, places), to_sensors)
-        with torch.no_grad():  # at the best head the loss does not move with it
+        with torch.no_grad():  # at the best head the loss does not depend on it
             head = _solve(matrix, target)
         value = (matrix @ head - target).abs().square().sum(1).mean()
         optimiser.zero_grad()
@@ -114,14 +114,14 @@ def estimate_flow(
 ) -> FlowEstimate:
     """Outlet flow of each one-revolution window, by heads on a trained `trunk`.
 
-    Everything else as for `spectral.estimate_flow`; `equation_error` is how far the equations may
-    be missed (relative, over a piece of line); None is as far as the trunk does.
+    Other parameters as for `spectral_inversion.estimate_flow`. `equation_error` is the error of the
+    equations (relative, over a piece of line); None is the trunk's own.
     """
     missed = float(trunk.residual) if equation_error is None else equation_error
 
     def inversion(speed, orders, noise_power, power):
         line = network(speed, orders)
-        places = (np.arange(COLLOCATION) + 0.5) / COLLOCATION
+        places = (np.arange(COLLOCATION_POINTS) + 0.5) / COLLOCATION_POINTS
         with torch.no_grad():
             rows = equations(trunk, line, places)
         response = line_response(line, of)

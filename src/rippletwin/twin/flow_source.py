@@ -62,12 +62,12 @@ class FlowSource:
 
 def _delivered(change, ripple: FlowRipple, orders: np.ndarray, mean_flow: float) -> np.ndarray:
     """Slope and curvature (2, F) of a `RippleChange`, phase modulated as `ripple` is."""
-    if not ripple.swing:
+    if not ripple.modulation:
         return change.harmonics(orders, mean_flow)
     orders = np.asarray(orders, int)
     even = np.zeros((2, 2 * np.max(orders)), complex)
     even[:, 1:] = change.harmonics(np.arange(1, even.shape[1]), mean_flow)
     even[np.abs(even) < 1e-9 * np.max(np.abs(even))] = 0.0  # rounding
     return np.array(
-        [peak_amplitudes(phase_modulate(x, ripple.swing, 4 * len(x)))[orders] for x in even]
+        [peak_amplitudes(phase_modulate(x, ripple.modulation, 4 * len(x)))[orders] for x in even]
     )
