@@ -10,11 +10,11 @@ import argparse
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import torch
 
-from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor
 from rippletwin.flow_sensor import pinn
 from rippletwin.flow_sensor.estimate import band_limit
 from rippletwin.flow_sensor.line_response import network_of
@@ -25,31 +25,27 @@ from rippletwin.pump.outlets import ConstantPressure
 from rippletwin.pump.simulation import simulate
 from rippletwin.twin.twin import Twin
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "helpers"))
+
+from paper_rig import OIL, paper_rig
+
 SPEED, PRESSURE, BAND, SAMPLES, WINDOWS = 1000 / 60, 9.484e6, 1500.0, 3072, 40
-SENSORS = {
-    2: (Sensor("p1", 0.4167), Sensor("p2", 2.5895)),
-    3: (Sensor("p1", 0.4167), Sensor("p2", 2.5895), Sensor("p3", 4.6)),
-}
+SENSORS = (2, 3)
 
 
 def rig(sensors, wave_speed_factor=1.0):
     """The paper's calibrated line with two or three sensors."""
-    line = (
-        Segment(5.953, 0.01971, 1022.9),
-        Segment(1.144, 0.02307, 982.7),
-        Segment(1.675, 0.01486, 1308.4),
-    )
-    line = tuple(replace(s, wave_speed=s.wave_speed * wave_speed_factor) for s in line)
-    return Rig(Fluid(870.0, 3.2e-5), {"pistons": 9}, line, SENSORS[sensors], Load("orifice"))
+    nominal = paper_rig(sensors, third_sensor=4.6)
+    line = (replace(s, wave_speed=s.wave_speed * wave_speed_factor) for s in nominal.line)
+    return replace(nominal, line=tuple(line))
 
 
 def main() -> None:
     argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     torch.set_num_threads(1)
     rng = np.random.default_rng(0)
-    fluid = Fluid(870.0, 3.2e-5)
     healthy, worn = (
-        simulate({"pistons": 9}, fluid, 60 * SPEED, ConstantPressure(PRESSURE), fault)
+        simulate({"pistons": 9}, OIL, 60 * SPEED, ConstantPressure(PRESSURE), fault)
         for fault in (None, Slipper(4e-7))
     )
     truth = band_limit(worn.flow, SPEED, BAND)

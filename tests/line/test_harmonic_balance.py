@@ -4,16 +4,8 @@ import numpy as np
 import pytest
 
 from harmonic_balance import balance, balance_orifice
-from paper_line import (
-    COEFFICIENT,
-    MEAN_FLOW,
-    MEAN_PRESSURE,
-    PIPES,
-    PUMPING_HZ,
-    SENSORS,
-    network,
-    ripple,
-)
+from paper_line import COEFFICIENT, MEAN_FLOW, MEAN_PRESSURE, PIPES, PUMPING_HZ, network, ripple
+from paper_rig import SENSORS
 from rippletwin.line.time_domain.method_of_characteristics import Pipe
 
 ORDERS = np.arange(1, 35)

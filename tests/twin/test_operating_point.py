@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from paper_rig import paper_rig
 from rippletwin.case.model import Fluid
 from rippletwin.twin.operating_point import operating_point
-from synthetic_recordings import paper_rig, point
+from synthetic_recordings import point
 
 RIG = replace(paper_rig(), fluid=Fluid(870.0, 6e-5))
 

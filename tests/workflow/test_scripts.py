@@ -10,6 +10,7 @@ import torch
 import xarray as xr
 import yaml
 
+from paper_rig import paper_rig
 from rippletwin import store
 from rippletwin.case.model import Fluid
 from rippletwin.flow_sensor.estimate import band_limit
@@ -22,7 +23,7 @@ from rippletwin.twin import twin_file
 from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.twin import Twin
 from run_script import run_script
-from synthetic_recordings import flow_ripple, paper_rig
+from synthetic_recordings import flow_ripple
 from workflow_copy import RIG
 
 SPEED, PRESSURE, SAMPLES = 1000 / 60, 9.5e6, 1024

@@ -43,7 +43,7 @@ def estimate(
     noise: float | np.ndarray,
     bandwidth_hz: float,
 ) -> FlowEstimate:
-    """Invert (n, S, M) windows, those of one speed together; see `spectral_inversion.estimate_flow`."""
+    """Invert windows (n, S, M), those of one speed together, as `spectral_inversion` describes."""
     windows = np.asarray(windows, dtype=float)
     count, sensors, samples = windows.shape
     speeds = np.broadcast_to(np.asarray(speed_hz, dtype=float), (count,))
