@@ -19,7 +19,7 @@ at the pump, whose sensor readings the twin predicts. In each training step the 
 exactly and only the trunk moves (variable projection; Golub & Pereyra 1973, SIAM J. Numer. Anal.
 10, 413). Each uniform piece of line has shape functions of its own (Jagtap & Karniadakis 2020,
 Commun. Comput. Phys. 28, 2002): slow envelopes on carriers of the calibrated wave length, so that
-the network learns what losses do to a wave rather than the wave itself. Lengths are in units of the
+the network learns the effect of losses on a wave, not the wave itself. Lengths are in units of the
 piece, flows in units of pressure over its characteristic impedance.
 """
 

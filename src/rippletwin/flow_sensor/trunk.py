@@ -133,7 +133,7 @@ def equations(trunk: Trunk, network: FrequencyDomainLine, places: np.ndarray) ->
     p, r = last[-1][:, 0], _row(zc[-1]) * last[-1][:, 1]
     load = ((r_load * p - p_load * r) / scale)[:, None]
 
-    # waves on the source's side of what stands at x = 0, as in LineResponse
+    # waves on the source's side of the elements at x = 0, as in LineResponse
     source = _joint(network, 0.0) @ first[0]
     p, r = source[:, 0], _row(zc[0]) * source[:, 1]
     waves = torch.stack([p + r, p - r], dim=1) / 2
@@ -174,7 +174,7 @@ def _state(state, size: int) -> torch.Tensor:
 
 
 def _pressure_and_flow(shapes, impedance: np.ndarray) -> list[torch.Tensor]:
-    """[p, q] (F, 2, 2 D) at one point a piece, from the trunk's answer and |Zc| (D, F)."""
+    """[p, q] (F, 2, 2 D) at one point a piece, from the trunk's shapes and |Zc| (D, F)."""
     (p, r), _ = shapes
     q = r / torch.as_tensor(impedance.T)[..., None]
     return list(torch.stack([p, q], dim=2).unbind(1))

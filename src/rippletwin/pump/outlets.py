@@ -116,7 +116,7 @@ def pressure_at_steps(pressure, steps):
 
 
 def resample_periodic(values, samples):
-    """Values (K, ...) over a period to `samples` <= K, keeping the harmonics both can hold."""
+    """Values (K, ...) over a period at `samples` <= K, with the harmonics that both can have."""
     spectrum = np.fft.rfft(values, axis=0)[: samples // 2 + 1]
     if samples % 2 == 0 and samples < len(values):
         spectrum[-1] = 0.0

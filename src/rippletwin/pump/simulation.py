@@ -29,9 +29,7 @@ from rippletwin.pump.source_admittance import source_admittance
 
 MIN_STEPS = 12288  # a revolution: doubled, the ripple changes by far less than 1 %
 MAX_REVOLUTIONS = 80
-PERIODIC_CHANGE = (
-    1e-6  # largest change from one revolution to the next, relative to the ripple's rms
-)
+PERIODIC_CHANGE = 1e-6  # between revolutions, relative to the ripple's rms
 
 
 @dataclass(frozen=True)
