@@ -76,8 +76,8 @@ def rank_correlation(first: np.ndarray, second: np.ndarray) -> tuple[float, floa
 
     p : share of all orders whose rho is at least as far from zero (drawn with a fixed generator
     beyond ``MAX_EXACT_COUNT`` values). Interval: Fisher's z with variance 1.06 / (n - 3) (Fieller,
-    Hartley, Pearson 1957), the whole of [-1, 1] below four values. NaN where either has no order (all are
-    equal). Raises ValueError below three values.
+    Hartley, Pearson 1957), the whole of [-1, 1] below four values. NaN where either has no order
+    (all are equal). Raises ValueError below three values.
     """
     a, b = rankdata(first), rankdata(second)
     n = len(a)
