@@ -17,7 +17,7 @@ import torch
 
 from rippletwin.flow_sensor import pinn
 from rippletwin.flow_sensor.estimate import band_limit
-from rippletwin.flow_sensor.line_response import network_of
+from rippletwin.flow_sensor.line_response import line_factory
 from rippletwin.flow_sensor.spectral_inversion import estimate_flow
 from rippletwin.harmonics import one_period
 from rippletwin.pump.faults import Slipper
@@ -56,9 +56,9 @@ def main() -> None:
         response = Twin(rig(sensors)).respond(worn, SPEED, PRESSURE, orders)
         clean = one_period(response, SAMPLES, orders)
         for factor in (1.0, 1.01):
-            network = network_of(Twin(rig(sensors, factor)), PRESSURE, healthy)
+            line_at = line_factory(Twin(rig(sensors, factor)), PRESSURE, healthy)
             started = time.perf_counter()
-            trunk, _ = pinn.train(network, SPEED, BAND)
+            trunk, _ = pinn.train(line_at, SPEED, BAND)
             trained = time.perf_counter() - started
             for noise in (0.0, 500.0, 4000.0):
                 shape = (WINDOWS, sensors, SAMPLES)
@@ -66,7 +66,7 @@ def main() -> None:
                 for name, arguments in (("spectral", ()), ("PINN", (trunk,))):
                     run = pinn.estimate_flow if arguments else estimate_flow
                     started = time.perf_counter()
-                    estimate = run(windows, SPEED, network, *arguments, max(noise, 50.0), BAND)
+                    estimate = run(windows, SPEED, line_at, *arguments, max(noise, 50.0), BAND)
                     spent = (time.perf_counter() - started) / WINDOWS
                     cells = row(sensors, noise, factor, name, estimate.flow, truth)
                     print(f"{cells} {1e3 * spent:.1f} |")

@@ -32,7 +32,7 @@ import numpy as np
 import torch
 
 from rippletwin.flow_sensor.estimate import FlowEstimate, estimate
-from rippletwin.flow_sensor.line_response import LineResponse, NetworkFactory, line_response
+from rippletwin.flow_sensor.line_response import LineFactory, LineResponse, line_response
 from rippletwin.flow_sensor.spectral_inversion import LOAD_ERROR, MODEL_ERROR
 from rippletwin.flow_sensor.trunk import Equations, Trunk, equations, pieces_of
 
@@ -52,13 +52,13 @@ class Settings:
 
 
 def train(
-    network: NetworkFactory,
+    line_at: LineFactory,
     speed_hz: float,
     bandwidth_hz: float,
     settings: Settings | None = None,
     progress: Callable[[int, float], None] | None = None,
 ) -> tuple[Trunk, np.ndarray]:
-    """A trunk for the line that `network` describes, at orders of `speed_hz` up to `bandwidth_hz`.
+    """A trunk for the line of `line_at`, at orders of `speed_hz` up to `bandwidth_hz`.
 
     Returns it with the loss of each step: the mean square of all residuals for unit waves at the
     pump. `progress` is called with step and loss.
@@ -67,7 +67,7 @@ def train(
     highest = bandwidth_hz / speed_hz
     orders = 1 + (highest - 1) * np.linspace(0, 1, settings.frequencies) ** 2  # denser where low
     orders[0], orders[-1] = 1 - FREQUENCY_MARGIN, highest * (1 + FREQUENCY_MARGIN)
-    line = network(speed_hz, orders)
+    line = line_at(speed_hz, orders)
     to_sensors = line_response(line).to_sensors
     places = 0.5 + 0.5 * np.polynomial.legendre.leggauss(settings.points)[0]
     omega = line.s.imag
@@ -103,7 +103,7 @@ def train(
 def estimate_flow(
     windows: np.ndarray,
     speed_hz: float | np.ndarray,
-    network: NetworkFactory,
+    line_at: LineFactory,
     trunk: Trunk,
     noise: float | np.ndarray,
     bandwidth_hz: float,
@@ -120,7 +120,7 @@ def estimate_flow(
     missed = float(trunk.residual) if equation_error is None else equation_error
 
     def inversion(speed, orders, noise_power, power):
-        line = network(speed, orders)
+        line = line_at(speed, orders)
         places = (np.arange(COLLOCATION_POINTS) + 0.5) / COLLOCATION_POINTS
         with torch.no_grad():
             rows = equations(trunk, line, places)

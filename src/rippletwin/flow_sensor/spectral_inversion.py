@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from rippletwin.flow_sensor.estimate import FlowEstimate, band_limit, estimate
-from rippletwin.flow_sensor.line_response import LineResponse, NetworkFactory, line_response
+from rippletwin.flow_sensor.line_response import LineFactory, LineResponse, line_response
 
 __all__ = ["band_limit", "estimate_flow", "flow_operator"]
 
@@ -30,7 +30,7 @@ LOAD_ERROR = 0.1  # of the load's reflection coefficient
 def estimate_flow(
     windows: np.ndarray,
     speed_hz: float | np.ndarray,
-    network: NetworkFactory,
+    line_at: LineFactory,
     noise: float | np.ndarray,
     bandwidth_hz: float,
     model_error: float = MODEL_ERROR,
@@ -43,19 +43,19 @@ def estimate_flow(
     ----------
     windows : (n, S, M) pressure in Pa at M equal steps of the shaft's angle.
     speed_hz : revolutions per second, one for all or (n,).
-    network : the calibrated line, see `line_response.NetworkFactory` and `network_of`.
+    line_at : the calibrated line, see `line_response.LineFactory` and `line_factory`.
     noise : standard deviation of a sample, Pa, one for all sensors or (S,).
     bandwidth_hz : shaft orders up to this frequency are estimated, the others are zero.
     model_error : error of a predicted pressure relative to the wave amplitude.
     load_error : error of the load's reflection coefficient; None leaves the load out.
-    of : "source", the ideal flow source in the network, or "outlet", Q(0): they differ by what
+    of : "source", the ideal flow source of the line, or "outlet", Q(0): they differ by what
         the source's own admittance takes.
 
     Raises ValueError for a bandwidth below the speed or above half the sampling rate.
     """
 
     def inversion(speed, orders, noise_power, power):
-        response = line_response(network(speed, orders), of)
+        response = line_response(line_at(speed, orders), of)
         return flow_operator(response, noise_power, power, model_error, load_error)
 
     return estimate(windows, speed_hz, inversion, noise, bandwidth_hz)
