@@ -168,7 +168,7 @@ def test_energy_is_conserved_over_a_period():
     assert np.allclose(ripple_power, ripple_power[0], rtol=1e-6)
 
 
-def test_what_has_not_settled_says_so():
+def test_unfinished_run_is_not_converged():
     """Stopped after two periods the run is not converged and names a place on the line."""
     flow = samples(ripple([1]), [1], MEAN_FLOW, 512)
     moc = simulate(
