@@ -28,7 +28,7 @@ def build(name: str, channels: int, classes: int = len(CLASSES)) -> Classifier:
     return Classifier(architecture, channels, classes).to(memory_format=torch.channels_last)
 
 
-def restored(name: str, channels: int, weights: Iterable[dict]) -> Iterator[Classifier]:
+def restore_networks(name: str, channels: int, weights: Iterable[dict]) -> Iterator[Classifier]:
     """Trained networks of an architecture, one for each of `weights` (their state dictionaries).
 
     name, channels : as for ``build``. Raises KeyError for an unknown name, RuntimeError for weights

@@ -70,7 +70,9 @@ def ripple_change(
 
     def run(**changed) -> PumpRipple:
         numbers = {k: v for k, v in {**pump, **changed}.items() if v is not None}
-        return _simulated(tuple(sorted(numbers.items())), fluid, float(speed_rpm), float(pressure))
+        return _simulate_cached(
+            tuple(sorted(numbers.items())), fluid, float(speed_rpm), float(pressure)
+        )
 
     above, below = (run(**{KEYS[name]: float(end)}) for end in ends)
     turn = 0.5 * np.radians(ends[0] - ends[1]) if name == "port_timing" else 0.0
@@ -78,7 +80,7 @@ def ripple_change(
 
 
 @cache
-def _simulated(pump: tuple, fluid: Fluid, speed_rpm: float, pressure: float) -> PumpRipple:
+def _simulate_cached(pump: tuple, fluid: Fluid, speed_rpm: float, pressure: float) -> PumpRipple:
     return simulate(
         dict(pump), fluid, speed_rpm, ConstantPressure(pressure), min_steps=STEPS_PER_REVOLUTION
     )

@@ -38,7 +38,7 @@ class FlowSource:
                 flow, own = changes.setdefault(
                     k, (np.zeros((2, count), complex), np.zeros(count, complex))
                 )
-                flow[:, part] = _delivered(change, point.ripple, o.orders, mean)
+                flow[:, part] = _modulate_change(change, point.ripple, o.orders, mean)
                 if np.any(self.admittance[part]):  # a ripple given is an ideal source
                     own[part] = change.source_admittance(s)
         self.changes = [(k, *each) for k, each in changes.items()]
@@ -60,7 +60,9 @@ class FlowSource:
         return turn
 
 
-def _delivered(change, ripple: FlowRipple, orders: np.ndarray, mean_flow: float) -> np.ndarray:
+def _modulate_change(
+    change, ripple: FlowRipple, orders: np.ndarray, mean_flow: float
+) -> np.ndarray:
     """Slope and curvature (2, F) of a `RippleChange`, phase modulated as `ripple` is."""
     if not ripple.modulation:
         return change.harmonics(orders, mean_flow)

@@ -89,16 +89,16 @@ class ForwardModel:
             )
 
     def __call__(self, theta: np.ndarray) -> list[np.ndarray]:
-        return self._observed(self.network(theta), theta)
+        return self._read(self.network(theta), theta)
 
     def unit_response(self, theta: np.ndarray) -> list[np.ndarray]:
         """Predictions for a unit flow at every frequency, in the shaft's frame, and a ripple so
         small that load and line are linear."""
         network = self._linear(theta)
         network.source_flow = self.source.turn(theta)
-        return self._observed(network, theta)
+        return self._read(network, theta)
 
-    def _observed(self, network: FrequencyDomainLine, theta: np.ndarray) -> list[np.ndarray]:
+    def _read(self, network: FrequencyDomainLine, theta: np.ndarray) -> list[np.ndarray]:
         """What each observation reads of `network`, (S, F)."""
         pressure = network.readings() if len(network.sensor_positions) else None
         impedance = None
@@ -209,7 +209,7 @@ class ForwardModel:
         Both are solved in a model with harmonics above those observed.
         """
         if network.nonlinear_compliances:
-            wide, seen, whole = self._widened(network, theta, self._extended_for_compliance)
+            wide, seen, whole = self._extend_line(network, theta, self._extended_for_compliance)
             solver = wide.compliance_solver
             tolerance = min(COUPLED_ORIFICE_TOLERANCE, solver.tolerance)
             solve_load = wide._load_solver(whole, theta, tolerance=tolerance)
@@ -220,7 +220,7 @@ class ForwardModel:
             if self._orifice is not None:
                 network.load = "state", tuple(state)
         elif self._orifice is not None:
-            wide, seen, whole = self._widened(network, theta, self._extended_for_orifice)
+            wide, seen, whole = self._extend_line(network, theta, self._extended_for_orifice)
             state = wide._load_solver(whole, theta)(*whole.load_relation())
             network.load = "state", tuple(x[seen] for x in state)
 
@@ -247,7 +247,7 @@ class ForwardModel:
         return solve_load
 
     @staticmethod
-    def _widened(network: FrequencyDomainLine, theta: np.ndarray, extended: tuple) -> tuple:
+    def _extend_line(network: FrequencyDomainLine, theta: np.ndarray, extended: tuple) -> tuple:
         """The extended model, the columns of `network` in it, and its line at `theta`."""
         wide, seen = extended
         whole = wide._linear(theta)
@@ -256,13 +256,13 @@ class ForwardModel:
 
     @cached_property
     def _extended_for_compliance(self) -> tuple[ForwardModel, np.ndarray]:
-        return self._extended(lambda top, step: COMPLIANCE_BAND * top)
+        return self._extend(lambda top, step: COMPLIANCE_BAND * top)
 
     @cached_property
     def _extended_for_orifice(self) -> tuple[ForwardModel, np.ndarray]:
-        return self._extended(lambda top, step: top + (ORIFICE_HARMONICS + 0.5) * step)
+        return self._extend(lambda top, step: top + (ORIFICE_HARMONICS + 0.5) * step)
 
-    def _extended(self, highest) -> tuple[ForwardModel, np.ndarray]:
+    def _extend(self, highest) -> tuple[ForwardModel, np.ndarray]:
         """The model with more harmonics of every recording, up to the order `highest` (top order
         observed, step), and the columns of those observed in it."""
         wide = list(self.observations)
