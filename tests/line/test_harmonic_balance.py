@@ -1,4 +1,4 @@
-"""Harmonic balance of the orifice; against the time domain see test_method_of_characteristics.py."""
+"""Harmonic balance of the orifice; test_method_of_characteristics.py compares it in time."""
 
 import numpy as np
 import pytest
