@@ -1,34 +1,14 @@
 """Bad input is an InputError that names file, field and remedy; each test spoils a good case once.
 
-`test_case_load.py` shows that the unspoilt case is read, so it is the spoiling that is refused.
+`test_load.py` shows that the unspoilt case is read, so it is the spoiling that is refused.
 """
 
 import numpy as np
 import pytest
 
-from case_folders import RATE, ripple, sheet, write_case, write_hdf5
+from case_folders import RATE, refused, ripple, sheet, spoilt, write_case, write_hdf5
 from rippletwin.case.load import load_case
 from rippletwin.errors import InputError
-
-
-def refused(folder, file, field, *words):
-    """Load `folder`; the error must name `file` and `field` and say `words`, with a remedy."""
-    with pytest.raises(InputError) as caught:
-        load_case(folder)
-    error = caught.value
-    assert error.file.endswith(file), error
-    assert error.field == field, error
-    assert error.remedy, error
-    for word in words:
-        assert word in str(error), error
-
-
-def spoilt(folder, spoil, pressure="ripple"):
-    """A case whose sheet `spoil` has changed."""
-    content = sheet()
-    spoil(content)
-    write_case(folder, content, pressure)
-
 
 # the sheet
 
