@@ -60,6 +60,9 @@ def _columns(path: Path, sensors: list[str]) -> list[str]:
     """The columns to be read: `time_s` where there is one, and the sensors."""
     lines = first_lines(path)
     present = fields(lines[0])
+    if not any(present):
+        remedy = f"Begin with the columns' names: time_s,{','.join(sensors)}"
+        raise InputError(path, "line 1", "empty", remedy)
     missing = [sensor for sensor in sensors if sensor not in present]
     if missing:
         error = separator_error(path, lines, sensors)
@@ -83,7 +86,8 @@ def _floats(path: Path, name: str, column: pd.Series, before: int) -> np.ndarray
             cut = ", the last one: it may be cut short" if _is_last(path, row) else ""
             problem = f"no number (empty or NaN) in data row {row}{cut}"
         else:
-            problem = f"{cell!r} in data row {row} is not a finite number"
+            shown = repr(cell) if isinstance(cell, str) else f"{cell:g}"
+            problem = f"{shown} in data row {row} is not a finite number"
         raise InputError(
             path,
             name,

@@ -29,6 +29,8 @@ def read(path: Path, sensors: list[str]) -> Signals:
     try:
         with TdmsFile.open(path) as file:
             channels = [channel for group in file.groups() for channel in group.channels()]
+            if not channels:
+                raise ValueError("no channels")
             chosen = _choose(path, sensors, channels)
             rows = {name: _numbers(path, name, channel) for name, channel in chosen.items()}
             steps = {chosen[sensor].properties.get("wf_increment") for sensor in sensors}
