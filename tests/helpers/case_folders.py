@@ -67,13 +67,24 @@ def spoilt(folder, spoil, pressure="ripple"):
 
 
 def refused(folder, file, field, *words):
-    """Load `folder`; one error must name `file` and `field` and say `words`, with a remedy.
+    """Load `folder`; the only error must name `file` and `field` and say `words`, with a remedy.
 
     Returns the error.
     """
+    error, *others = errors_of(folder)
+    assert not others, others
+    return told(error, file, field, *words)
+
+
+def errors_of(folder):
+    """What is told of a case that is refused."""
     with pytest.raises(InputError) as caught:
         load_case(folder)
-    (error,) = caught.value.errors
+    return caught.value.errors
+
+
+def told(error, file, field, *words):
+    """`error`, which must name `file` and `field` and say `words`, with a remedy."""
     assert error.file.endswith(file), error
     assert error.field == field, error
     assert error.remedy, error

@@ -71,15 +71,14 @@ def _load_errors(path: Path, sheet: dict) -> Iterator[InputError]:
 def _sensor_errors(path: Path, sheet: dict) -> Iterator[InputError]:
     sensors, length = entries(sheet, "sensors"), line_length(sheet)
     placed: list[tuple[object, float]] = []
-    names = set()
+    names: dict[str, int] = {}
     for index, sensor in enumerate(sensors):
         name, position = sensor.get("name"), number(sensor, "position")
         if isinstance(name, str):
             if name in names:
-                yield InputError(
-                    path, f"sensors[{index}].name", f"{name} twice", "Give each its own name"
-                )
-            names.add(name)
+                problem = f"{name} is the name of sensors[{names[name]}] too"
+                yield InputError(path, f"sensors[{index}].name", problem, "Give each its own name")
+            names.setdefault(name, index)
         if position is None:
             continue
         field = f"sensors[{index}].position"

@@ -1,0 +1,7 @@
+"""python -m rippletwin: the command line."""
+
+import sys
+
+from rippletwin.cli import main
+
+sys.exit(main())
