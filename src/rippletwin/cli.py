@@ -19,6 +19,7 @@ from rippletwin.errors import InputError
 
 BAD_INPUT, INTERRUPTED, CLOSED_PIPE = 2, 130, 141  # exit codes; 128 and the signal's number
 MAX_PROCESSES = 1024
+EFFECTIVE = os.access in os.supports_effective_ids
 
 
 def check(commands) -> None:
@@ -223,10 +224,10 @@ def _check_out(out: str) -> None:
             place = place.parent
         if problem is None and not place.is_dir():
             problem = f"{place} is a file, not a folder"
-        elif problem is None and not os.access(place, os.W_OK | os.X_OK):
+        elif problem is None and not os.access(place, os.W_OK | os.X_OK, effective_ids=EFFECTIVE):
             problem = f"you are not allowed to write to {place}"
     except (OSError, ValueError) as error:
-        problem = f"{out} cannot be opened ({error})"
+        problem = f"cannot be opened ({getattr(error, 'strerror', None) or error})"
     if problem is not None:
         raise InputError("command line", "--out", problem, "name a folder that you may write to")
 
@@ -243,7 +244,8 @@ def main(argv: list[str] | None = None) -> int:
     """Run one command.
 
     Returns the exit code: 0; 2 for bad input, which is reported on standard error with one line
-    for each fault; 130 after Ctrl-C and 141 where the reader of standard output has gone, both in silence.
+    for each fault; 130 after Ctrl-C and 141 where the reader of standard output has gone, both
+    without a word.
     """
     parser = argparse.ArgumentParser(prog="rippletwin", description=__doc__.splitlines()[0])
     parser.add_argument("--version", action="version", version=__version__)
