@@ -1,5 +1,5 @@
 # The DAG's front door: config, its schema, the stages, the targets.
-from snakemake.utils import min_version, validate
+from snakemake.utils import min_version
 
 min_version("9.0")
 
@@ -11,9 +11,6 @@ configfile: "config/config.yaml"
 container: "rippletwin.sif"
 
 
-validate(config, "workflow/schemas/config.schema.yaml")
-
-
 # Its limit of jobs a second makes snakemake 9 look for work once a second for every job that it
 # ever started or finished: half a core after a hundred jobs (snakemake pull request 3744).
 onstart:
@@ -22,34 +19,26 @@ onstart:
 
 
 include: "workflow/rules/common.smk"
+include: "workflow/rules/inputs.smk"
 include: "workflow/rules/recordings.smk"
 include: "workflow/rules/calibrate.smk"
 include: "workflow/rules/explain.smk"
 include: "workflow/rules/faults.smk"
 include: "workflow/rules/propagate.smk"
 include: "workflow/rules/flow_sensor.smk"
-include: "workflow/rules/augment.smk"
-include: "workflow/rules/image.smk"
+include: "workflow/rules/samples.smk"
+include: "workflow/rules/images.smk"
 include: "workflow/rules/train.smk"
 include: "workflow/rules/evaluate.smk"
 include: "workflow/rules/compound.smk"
 include: "workflow/rules/report.smk"
-include: "workflow/rules/concealed.smk"
 include: "workflow/rules/attention.smk"
+include: "workflow/rules/claims.smk"
+include: "workflow/rules/figures.smk"
+include: "workflow/rules/concealed.smk"
 
 
 rule all:
     default_target: True
     input:
-        rules.report.output,
-        rules.plot_accuracy.output,
-        rules.plot_calibration.output,
-        attention_targets(),
-        expand(rules.plot_confusion.output, dataset=config["datasets"]),
-        expand(rules.plot_seeds.output, dataset=simulated()),
-        rules.report_cost.output if corrected() else [],
-        rules.report_compound.output if COMPOUND else [],
-        expand(
-            rules.plot_seeds.output,
-            dataset=[ASIDE + dataset for dataset in simulated() if COMPOUND],
-        ),
+        get_final_output(),

@@ -1,18 +1,17 @@
-"""Which effects can be told apart on a rig: the confusion matrix, and what it costs to take one for
-another.
+"""Confusion matrix of the effects on a rig: which can be told apart, and by how much evidence.
 
     python benchmarks/explain_confusion.py CASE [--strength -2] [--out FILE.md] [--processes 2]
 
-For every effect of the library in turn, the healthy recordings of CASE are replaced by what a twin
-with that effect would give: line and load off by their stated uncertainty, the effect's parameters
-`strength` deviations of their priors from the medians (those that are centred on nothing,
-exp(strength) deviations from it, and places at the middle), sensor noise as recorded, and a ripple
-that is wrong by SOURCE smoothly in frequency. Every effect at every place is then fitted, the line
-refitted with each. A cell is the log evidence of the best place of the column's effect less that of
-the true effect at its best place: at 0 the two cannot be told apart, below -3 the true one is
+For every effect of the library in turn, the healthy recordings of CASE are replaced by predictions
+of a twin with that effect. Line and load are off by their stated uncertainty. The effect's
+parameters are `strength` prior standard deviations from their medians; those with a prior centred
+on zero are exp(strength) deviations from it, and positions are at the middle. Sensor noise is as
+recorded, and the ripple is wrong by SOURCE_ERROR, smoothly in frequency. Every effect at every
+place is then fitted. A cell is the log evidence of the column's effect at its best place less that
+of the true effect at its best place: at 0 the two cannot be told apart, at -3 the true one is
 twenty times as probable.
 
-The recordings come from the same equations as the twin: this shows what the data can tell, not
+The predictions come from the twin's own equations. The benchmark shows what the data can tell, not
 whether the equations are right.
 """
 
@@ -26,7 +25,7 @@ import numpy as np
 from tqdm import tqdm
 
 from rippletwin.calibration.misfit import relative_misfit
-from rippletwin.calibration.whitening import smooth_basis
+from rippletwin.calibration.smooth_source import smooth_basis
 from rippletwin.case.load import load_case
 from rippletwin.explanation.explain import HIGHEST_HZ
 from rippletwin.explanation.fit_jobs import open_workers
@@ -36,11 +35,12 @@ from rippletwin.spectra.frequency_selection import select_fitted_frequencies
 from rippletwin.spectra.observation import observe
 from rippletwin.twin.twin import Twin
 
-SOURCE = 0.02
+SOURCE_ERROR = 0.02
 ALIKE = 3.0  # log evidence: twenty to one
+SHOWN = 30.0  # log evidence: cells further below the true effect stay empty
 
 
-def truths(rig, observations) -> list:
+def effects_to_try(rig, observations) -> list:
     """Each effect once: in the line's second segment or at its first place."""
     chosen = {}
     for effect, place in applicable_candidates(rig, observations):
@@ -50,15 +50,15 @@ def truths(rig, observations) -> list:
 
 
 def coordinate(parameter, strength: float) -> float:
-    """Of an effect's parameter at `strength`."""
+    """Coordinate of an effect's parameter at `strength`."""
     if parameter.prior.kind == "lognormal":
         return strength
     centred = parameter.prior.kind == "normal" and parameter.prior.centre == 0.0
     return float(np.exp(strength)) if centred else 0.0
 
 
-def recorded(rig, observations, effect, strength, rng):
-    """(observations of a twin with the effect, its share of the ripple)."""
+def synthetic_recordings(rig, observations, effect, strength, rng):
+    """(observations of a twin with the effect, relative change that the effect makes)."""
     twin = Twin(rig, observations, effects=(effect,))
     own = f"{effect[0].name}@{effect[1]}."
     theta = rng.normal(size=len(twin.theta)).clip(-2, 2)
@@ -66,13 +66,13 @@ def recorded(rig, observations, effect, strength, rng):
         if p.flat or p.name.startswith(own):
             theta[k] = 0.0 if p.flat else coordinate(p, strength)
     with_effect = twin.with_(theta=theta).predict(observations)
-    bare = Twin(rig, observations)
-    kept = [theta[twin.index[p.name]] for p in bare.parameters]
-    without = bare.with_(theta=np.array(kept)).predict(observations)
+    base = Twin(rig, observations)
+    common = [theta[twin.index[p.name]] for p in base.parameters]
+    without = base.with_(theta=np.array(common)).predict(observations)
     made = []
     for o, h in zip(observations, with_effect):
         basis = smooth_basis(o.frequency_hz, np.zeros(len(o.frequency_hz)))
-        wrong = 1.0 + SOURCE * (_complex(rng, len(basis)) @ basis)
+        wrong = 1.0 + SOURCE_ERROR * (_complex(rng, len(basis)) @ basis)
         root = np.linalg.cholesky(o.covariance + 1e-12 * np.eye(len(h)))
         noise = np.einsum("fst,tf->sf", root, _complex(rng, *h.shape))
         made.append(replace(o, values=wrong * h + noise))
@@ -85,7 +85,7 @@ def _complex(rng, *shape) -> np.ndarray:
 
 
 def best_of_each(rig, observations, processes: int) -> dict[str, tuple[float, str]]:
-    """Name -> (log evidence over the paper's line, place) of each effect at its best place."""
+    """Name -> (log evidence that it adds to the line, place) of each effect at its best place."""
     with open_workers(Twin(rig, observations), observations, processes) as pool:
         base, singles = fit_single_effects(pool, applicable_candidates(rig, observations))
     best = {}
@@ -95,22 +95,24 @@ def best_of_each(rig, observations, processes: int) -> dict[str, tuple[float, st
 
 
 def table(rows: list[tuple]) -> str:
-    """Markdown: truths down, the effects that come within 30 of any of them across."""
+    """Markdown: true effects down, fitted effects across; cells within SHOWN of the true effect."""
     names = [effect.name for (effect, _), _, _ in rows]
     heads = " | ".join(str(k + 1) for k in range(len(names)))
     lines = [
-        f"| true effect | share of the ripple | evidence | place found | {heads} |",
+        f"| true effect | change of the ripple | log evidence | fitted place | {heads} |",
         "|---|---|---|---|" + "---|" * len(names),
     ]
     for k, ((effect, place), share, best) in enumerate(rows):
-        gain, found = best[effect.name]
+        gain, fitted_place = best[effect.name]
         cells = []
         for name in names:
             less = best[name][0] - gain if name in best else -np.inf
-            text = f"{less:.0f}" if less > -30 else ""
+            text = f"{less:.0f}" if less > -SHOWN else ""
             cells.append(f"**{text}**" if less > -ALIKE and name != effect.name else text)
         title = f"{k + 1} {effect.name.replace('_', ' ')}, {place}"
-        lines.append(f"| {title} | {share:.1%} | {gain:.0f} | {found} | {' | '.join(cells)} |")
+        lines.append(
+            f"| {title} | {share:.1%} | {gain:.0f} | {fitted_place} | {' | '.join(cells)} |"
+        )
     return "\n".join(lines) + "\n"
 
 
@@ -126,9 +128,9 @@ def main() -> None:
         [observe(r, case.rig, HIGHEST_HZ) for r in case.healthy], case.rig, HIGHEST_HZ
     )
     rows = []
-    for k, effect in enumerate(tqdm(truths(case.rig, observations), unit="effect")):
+    for k, effect in enumerate(tqdm(effects_to_try(case.rig, observations), unit="effect")):
         rng = np.random.default_rng(k)
-        made, share = recorded(case.rig, observations, effect, options.strength, rng)
+        made, share = synthetic_recordings(case.rig, observations, effect, options.strength, rng)
         rows.append((effect, share, best_of_each(case.rig, made, options.processes)))
         page = table(rows)
         if options.out:

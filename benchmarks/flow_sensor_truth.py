@@ -1,12 +1,12 @@
-"""Virtual flow sensors against the virtual rig's true flow (docs/explanation/flow_sensor.md).
+"""Errors of the virtual flow sensors against the virtual rig's true outlet flow.
 
     python benchmarks/flow_sensor_truth.py FOLDER [--steps 300] [--seconds 3]
 
-Records healthy, slipper and cylinder with three sensors into FOLDER (truth beside the case),
-calibrates with the paper's physics and explains, once with the first two sensors and once with all,
-and scores the flow found at the pump outlet. What FOLDER already holds is not made again: a line
-known from elsewhere is FOLDER/2/calibrated.json or FOLDER/2/corrected.json. Times are processor
-time of one thread, a window at a time in batches of all windows.
+Records healthy, slipper and cylinder states with three sensors into FOLDER, the truth beside the
+case. Calibrates a twin with the paper's physics and explains the case, with the first two sensors
+and with all. Then scores the flow that each sensor estimates at the pump's outlet. Results that
+FOLDER already holds are used again; FOLDER/2/calibrated.json and FOLDER/2/corrected.json may be
+twins from elsewhere. Times are processor times of one thread for one window, in batches of all.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from rippletwin.flow_sensor import pinn
 from rippletwin.flow_sensor.estimate import band_limit
 from rippletwin.flow_sensor.line_response import network_of
 from rippletwin.flow_sensor.spectral_inversion import estimate_flow
+from rippletwin.harmonics import peak_amplitudes
 from rippletwin.learning.dataset import augment
 from rippletwin.learning.networks import build
 from rippletwin.learning.training import TrainingSettings, predict, train
@@ -47,18 +48,18 @@ from rippletwin.twin.twin import Twin
 from rippletwin.twin.twin_file import load_twin
 
 RIG = Path(__file__).resolve().parent.parent / "src" / "virtualrig"
-THIRD, THIRD_ERROR = 4.6, 0.012  # m: where the sheet has the third sensor, and how far off that is
-BAND, SAMPLES, WINDOWS = 1510.0, 3072, 40  # Hz: the tenth pumping harmonic, whatever the speed
+THIRD_POSITION, THIRD_ERROR = 4.6, 0.012  # m: the third sensor on the data sheet, its error
+BAND, SAMPLES, WINDOWS = 1510.0, 3072, 40  # Hz: includes the tenth pumping harmonic
 EDGES = (0.0, 500.0, 1000.0, BAND)  # Hz
 EXTRA_NOISE = 4000.0  # Pa
 FAULTS = {"H": None, "S": Slipper(2e-7), "C1": Cylinder(2e-7), "C2": Cylinder(6e-7)}
 
 
 def record(folder: Path, seconds: float) -> None:
-    """The built-in rig with one sensor more, as a case with its truth outside."""
+    """Record the built-in rig with a third sensor; the truth goes beside the case."""
     for name, entry in (
-        ("sheet", {"name": "p3", "position": THIRD}),
-        ("sealed", THIRD + THIRD_ERROR),
+        ("sheet", {"name": "p3", "position": THIRD_POSITION}),
+        ("sealed", THIRD_POSITION + THIRD_ERROR),
     ):
         data = yaml.safe_load((RIG / f"{name}.yaml").read_text())
         data["sensors"] = [*data["sensors"], entry]
@@ -74,20 +75,20 @@ def record(folder: Path, seconds: float) -> None:
 
 
 def with_sensors(case: Case, count: int) -> Case:
-    """The case as a rig with only the first `count` sensors would have recorded it."""
+    """The case with only the first `count` sensors."""
     rig = replace(case.rig, sensors=case.rig.sensors[:count])
     kept = [replace(r, pressure=r.pressure[:count]) for r in case.recordings]
     return replace(case, rig=rig, recordings=tuple(kept))
 
 
 def lines(case: Case, folder: Path) -> dict[str, Twin]:
-    """The calibrated and the corrected twin, and that one with all wave speeds 1 % high."""
+    """The calibrated twin, the corrected twin, and the latter with all wave speeds 1 % high."""
     folder.mkdir(exist_ok=True)
 
-    def kept(name, make):
+    def load_or_make(name, make):
         path = folder / f"{name}.json"
         if not path.exists():
-            print(f"{path}: making", file=sys.stderr, flush=True)
+            print(f"making {path}", file=sys.stderr, flush=True)
             path.write_text(json.dumps(twin_file.to_dict(make())))
         return load_twin(path)
 
@@ -95,8 +96,8 @@ def lines(case: Case, folder: Path) -> dict[str, Twin]:
         observations = [observe(r, case.rig, piston_harmonics_only=True) for r in case.healthy]
         return calibrate(Twin(case.rig, observations), observations, Settings()).twin
 
-    paper = kept("calibrated", calibrated)
-    corrected = kept("corrected", lambda: explain(case, 2).twin)
+    paper = load_or_make("calibrated", calibrated)
+    corrected = load_or_make("corrected", lambda: explain(case, 2).twin)
     theta = corrected.theta.copy()
     for k, parameter in enumerate(corrected.parameters):
         if parameter.name.startswith("wave_speed"):
@@ -112,7 +113,7 @@ def windows_of(recording, pistons: int, truth: Path):
     """Pressure (n, S, M), speeds (n,), and the true outlet flow's harmonics (n, orders)."""
     with h5py.File(truth) as file:
         turns, flow = file["turns"][:], file["outlet_flow"][:]
-    # The crank rides along as two more channels, too small to be taken for ripple.
+    # The crank angle is resampled as two more channels, too small to affect the search for angles.
     crank = 1e-6 * np.array([np.cos(2 * np.pi * turns), np.sin(2 * np.pi * turns)])
     cut = cut_revolutions(
         np.concatenate([recording.pressure, crank]),
@@ -124,7 +125,7 @@ def windows_of(recording, pistons: int, truth: Path):
     windows = cut.windows[:WINDOWS]
     start = np.angle(windows[:, -2, 0] + 1j * windows[:, -1, 0])
     orders = np.arange(1, int(BAND / cut.speed_hz.mean()) + 1)
-    harmonics = np.fft.rfft(flow)[orders] * 2 / len(flow)
+    harmonics = peak_amplitudes(flow)[orders]
     return (
         windows[:, :-2],
         cut.speed_hz[:WINDOWS],
@@ -132,16 +133,16 @@ def windows_of(recording, pistons: int, truth: Path):
     )
 
 
-def error(found: np.ndarray, truth: np.ndarray, speed_hz: float) -> list[float]:
+def relative_errors(estimate: np.ndarray, truth: np.ndarray, speed_hz: float) -> list[float]:
     """Relative rms error of harmonics (n, F) in each band, and in all."""
-    frequency_hz = speed_hz * np.arange(1, found.shape[1] + 1)
+    frequency_hz = speed_hz * np.arange(1, estimate.shape[1] + 1)
     bands = [(low < frequency_hz) & (frequency_hz <= high) for low, high in pairwise(EDGES)]
-    wrong, right = np.sum(np.abs(found - truth) ** 2, axis=0), np.sum(np.abs(truth) ** 2, axis=0)
+    wrong, right = np.sum(np.abs(estimate - truth) ** 2, axis=0), np.sum(np.abs(truth) ** 2, axis=0)
     return [float(np.sqrt(wrong[b].sum() / right[b].sum())) for b in (*bands, frequency_hz > 0)]
 
 
 def classifiers(rig, speed_hz: float, load_pressure: float, noise: float, seeds: int = 2):
-    """Networks (the paper's CNN1D 341@100) that learnt the simulated source flow."""
+    """Networks (the paper's CNN1D 341@100), trained on the simulated source flow."""
     outlet = ConstantPressure(load_pressure)
     states = np.array(
         [simulate(rig.pump, rig.fluid, 60 * speed_hz, outlet, f).flow for f in FAULTS.values()]
@@ -156,13 +157,13 @@ def classifiers(rig, speed_hz: float, load_pressure: float, noise: float, seeds:
         yield train(build("cnn1d_341_100", channels=1), x, y, settings, seed)[0]
 
 
-def right(networks, flows: dict[str, np.ndarray]) -> float:
-    """Share of windows given to the right state, C of either severity."""
+def accuracy_of(networks, flows: dict[str, np.ndarray]) -> float:
+    """Share of windows that are given the right state, a cylinder fault of either severity."""
     hits = []
     for state, flow in flows.items():
         for network in networks:
-            said = np.array(list(FAULTS))[predict(network, flow[:, None].astype(np.float32))[0]]
-            hits += [name[0] == state for name in said]
+            states = np.array(list(FAULTS))[predict(network, flow[:, None].astype(np.float32))[0]]
+            hits += [name[0] == state for name in states]
     return float(np.mean(hits))
 
 
@@ -199,26 +200,28 @@ def main() -> None:
             trunk, _ = pinn.train(network, speed.mean(), BAND, pinn.Settings(steps=options.steps))
             for noise in (0.0, EXTRA_NOISE):
                 extra = noise * np.random.default_rng(0).standard_normal(pressure.shape)
-                told = np.hypot(own, noise)
-                for method, run, learnt in (
+                noise_level = np.hypot(own, noise)
+                for method, run, trained in (
                     ("spectral", estimate_flow, ()),
                     ("PINN", pinn.estimate_flow, (trunk,)),
                 ):
-                    given = (pressure + extra, speed, network, *learnt, told, BAND)
+                    given = (pressure + extra, speed, network, *trained, noise_level, BAND)
                     started = time.process_time()
-                    found = run(*given, of="outlet").harmonics
+                    estimate = run(*given, of="outlet").harmonics
                     spent = 1e3 * (time.process_time() - started) / len(pressure)
                     accuracy = "–"
                     if not noise:
                         source = run(*given, of="source").flow
                         flows = {s: source[states == s] for s in taken}
                         scatter = noise_cycle_scatter(flows["H"][:, None])[0]
-                        told_by = classifiers(case.rig, speed.mean(), point.load_pressure, scatter)
-                        accuracy = f"{100 * right(list(told_by), flows):.0f} %"
-                    errors = [f"{100 * e:.1f} %" for e in error(found, truth, speed.mean())]
+                        networks = classifiers(case.rig, speed.mean(), point.load_pressure, scatter)
+                        accuracy = f"{100 * accuracy_of(list(networks), flows):.0f} %"
+                    errors = [
+                        f"{100 * e:.1f} %" for e in relative_errors(estimate, truth, speed.mean())
+                    ]
                     cells = [
                         str(count), name, "the rig's" if not noise else f"+ {noise / 1e3:g} kPa",
-                        method, *errors, f"{spent:.1f}", accuracy,
+                        method, *(f"{100 * e:.1f} %" for e in errors), f"{spent:.1f}", accuracy,
                     ]  # fmt: skip
                     print("| " + " | ".join(cells) + " |", flush=True)
 

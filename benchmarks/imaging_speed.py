@@ -1,4 +1,4 @@
-"""Milliseconds of one core for one synchrosqueezed image, and for ssqueezepy's transform.
+"""Processor time of one synchrosqueezed image, and of ssqueezepy's transform.
 
 OMP_NUM_THREADS=1 python benchmarks/imaging_speed.py [--ssqueezepy]
 """
@@ -43,7 +43,7 @@ def main() -> None:
 
 
 def report(what: str, run, count: int) -> None:
-    """Best of three, the first call (compilation) not counted."""
+    """Print the best of three calls, after one that compiles."""
     run()
     times = []
     for _ in range(3):

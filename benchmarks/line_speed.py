@@ -1,31 +1,34 @@
-"""How fast the line is solved, in one run on one thread: exact periodic solution against MOC.
+"""Costs of solving the line: exact periodic solution against the method of characteristics.
 
     python benchmarks/line_speed.py
 
-Times are processor seconds, the best of several. Only ratios within one run mean anything on a
-shared machine.
+Times are processor seconds of one thread, the best of several. On a shared machine only ratios
+within one run are meaningful.
 """
 
 from __future__ import annotations
 
+import argparse
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 
-from harmonic_balance import balance_orifice
-from rippletwin.line.frequency_domain.line_network import Network
+from rippletwin.harmonics import one_period
+from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
-from rippletwin.line.time_domain.line_elements import End, Line, Pipe
+from rippletwin.line.time_domain.line_elements import End, TimeDomainLine
 from rippletwin.line.time_domain.method_of_characteristics import simulate
 
-DENSITY, VISCOSITY = 870.0, 3.2e-5
-PIPES = (
-    Pipe(5.953, 19.71e-3, 1022.9),
-    Pipe(1.144, 23.07e-3, 982.7),
-    Pipe(1.675, 14.86e-3, 1308.4),
-)
+TESTS = Path(__file__).resolve().parents[1] / "tests"
+sys.path[:0] = [str(TESTS / "reference"), str(TESTS / "helpers")]
+
+from harmonic_balance import balance_orifice  # noqa: E402
+from paper_line import DENSITY, MEAN_FLOW, MEAN_PRESSURE, PIPES, VISCOSITY  # noqa: E402
+
 SENSORS = (0.4167, 2.5895, 8.0)
-MEAN_PRESSURE, MEAN_FLOW, SHAFT_HZ, PISTONS = 9.484e6, 0.7e-3, 1000 / 60, 9
+SHAFT_HZ, PISTONS = 1000 / 60, 9
 STEPS = 3072  # a revolution: 51.2 kHz
 
 
@@ -40,13 +43,13 @@ def best(task, repeats: int) -> float:
     return min(times)
 
 
-def network(orders: np.ndarray, friction: str = "unsteady") -> Network:
+def network(orders: np.ndarray, friction: str = "unsteady") -> FrequencyDomainLine:
     """The paper's line with a nine-piston ripple at shaft `orders`."""
     s = 2j * np.pi * SHAFT_HZ * orders
     diameter = np.array([p.diameter for p in PIPES])[:, None]
     speed = np.array([p.wave_speed for p in PIPES])[:, None]
     flow = 0.05 * MEAN_FLOW * np.exp(1j * orders) / (1 + s / 6000) ** 2 * (orders % PISTONS == 0)
-    return Network(
+    return FrequencyDomainLine(
         s=s,
         lengths=np.array([p.length for p in PIPES]),
         series=series_impedance(
@@ -60,7 +63,7 @@ def network(orders: np.ndarray, friction: str = "unsteady") -> Network:
 
 
 def solve(orders: np.ndarray) -> None:
-    """Friction, orifice and sensors from scratch."""
+    """Solve the whole line: friction, orifice and sensors."""
     net = network(orders)
     balance_orifice(net, mean_pressure=MEAN_PRESSURE, mean_flow=MEAN_FLOW, orders=orders)
     net.readings()
@@ -69,12 +72,9 @@ def solve(orders: np.ndarray) -> None:
 def revolution(friction: str, steps: int, periods: int = 1):
     """`periods` revolutions of the method of characteristics, or until it is periodic."""
     orders = np.arange(1, STEPS // 2)
-    spectrum = np.zeros(steps // 2 + 1, complex)
-    spectrum[orders] = network(orders).source_flow * steps / 2
-    spectrum[0] = MEAN_FLOW * steps
-    line = Line(
+    line = TimeDomainLine(
         PIPES,
-        np.fft.irfft(spectrum, steps),
+        MEAN_FLOW + one_period(network(orders).source_flow, steps, orders),
         1 / SHAFT_HZ,
         End("orifice", 0.0, MEAN_FLOW / np.sqrt(MEAN_PRESSURE)),
         density=DENSITY,
@@ -86,6 +86,7 @@ def revolution(friction: str, steps: int, periods: int = 1):
 
 
 def main() -> None:
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     piston, shaft = PISTONS * np.arange(1, 35), np.arange(1, STEPS // 2 + 1)
     eighty = network(np.arange(1, 81) * PISTONS)
     print("frequency domain, ms")

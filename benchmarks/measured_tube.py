@@ -1,11 +1,9 @@
-"""What a real line lacks, found on one measurement and shown on another.
-
-The table of docs/explanation/validation.md:
+"""Missing physics of a measured air tube, found on one measurement and tested on another.
 
     python benchmarks/measured_tube.py RUN_1 RUN_2 FOLDER
 
-RUN_1 and RUN_2 are the two measured input impedances; FOLDER gets a case of each, and of the first
-verdict.json, twin.json and figures.
+RUN_1 and RUN_2 are the two measured input impedances. FOLDER gets a case of each, and verdict.json,
+twin.json and figures of the first.
 """
 
 from __future__ import annotations
@@ -34,7 +32,7 @@ from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.forward_model import reflection
 from rippletwin.twin.twin import Twin
 
-SHEET = Path(__file__).resolve().parent.parent / "resources" / "air_tube" / "rig.yaml"
+DATA_SHEET = Path(__file__).resolve().parent.parent / "resources" / "air_tube" / "rig.yaml"
 ACOUSTICS: Hypothesis = (
     (EFFECTS["unsteady_friction"], Place("line")),
     (EFFECTS["thermal_boundary_layer"], Place("line")),
@@ -45,25 +43,27 @@ ACOUSTICS: Hypothesis = (
 def case(run: Path, folder: Path) -> Case:
     """The tube's case with one of the measurements."""
     folder.mkdir(parents=True, exist_ok=True)
-    shutil.copy(SHEET, folder)
+    shutil.copy(DATA_SHEET, folder)
     shutil.copy(run, folder / "measured.txt")
     return load_case(folder)
 
 
-def fitted(rig, data, effects: Hypothesis) -> Fit:
-    """Fit from the sheet, with the sheet's uncertainties as priors."""
+def fit_effects(rig, data, effects: Hypothesis) -> Fit:
+    """Fit from the data sheet, with its uncertainties as priors."""
     base = Twin(rig, data)
     return refine(base, effects, data, [np.zeros(len(base.with_(effects=effects).parameters))])
 
 
-def nothing_fitted(fit: Fit) -> Fit:
-    """The same twin on the sheet's values."""
+def with_nominal_values(fit: Fit) -> Fit:
+    """The same twin with the values of the data sheet."""
     return replace(fit, twin=fit.twin.with_(theta=np.zeros_like(fit.twin.theta)))
 
 
-def another_day(fit: Fit, observation) -> tuple[Fit, float]:
-    """The fit with the wave speed alone that suits another run, and its ratio to the first's:
-    sound goes faster in warmer air."""
+def with_wave_speed_of(fit: Fit, observation) -> tuple[Fit, float]:
+    """The fit with the wave speed that fits another run best, and its ratio to the first run's.
+
+    The air may have another temperature then.
+    """
     parameter = fit.twin.parameters[fit.twin.index["wave_speed[1]"]]
     before = fit.twin.values()["wave_speed[1]"]
 
@@ -72,15 +72,15 @@ def another_day(fit: Fit, observation) -> tuple[Fit, float]:
         theta[fit.twin.index["wave_speed[1]"]] = parameter.prior.coordinate(ratio * before)
         return replace(fit, twin=fit.twin.with_(theta=theta))
 
-    found = minimize_scalar(
+    best = minimize_scalar(
         lambda ratio: score_fit(at(ratio), [observation]).misfit,
         bounds=(0.99, 1.01),
         method="bounded",
     )
-    return at(found.x), float(found.x)
+    return at(best.x), float(best.x)
 
 
-def difference(a, b) -> float:
+def reflection_difference(a, b) -> float:
     """Relative difference of two runs' reflection coefficients at the frequencies both have."""
     _, i, j = np.intersect1d(a.frequency_hz, b.frequency_hz, return_indices=True)
     first, second = reflection(a.values[:, i]), reflection(b.values[:, j])
@@ -95,7 +95,7 @@ def main() -> None:
     cases = [case(run, arguments.folder / f"run_{k + 1}") for k, run in enumerate(arguments.runs)]
     whole = [observe(c.recordings[0], c.rig) for c in cases]
     rig, data = cases[0].rig, select_fitted_frequencies(whole[:1], cases[0].rig)
-    print(f"the runs differ by {difference(*whole):.2%} of the reflection coefficient\n")
+    print(f"the runs differ by {reflection_difference(*whole):.2%} of the reflection coefficient\n")
     print("| | run 1 | run 2 | bore |\n|---|---|---|---|")
 
     def row(words: str, fit: Fit) -> None:
@@ -105,16 +105,16 @@ def main() -> None:
 
     for count in range(4):
         names = [effect.name.replace("_", " ") for effect, _ in ACOUSTICS[:count]]
-        words = "nothing fitted: steady friction" if not names else f"... {names[-1]}"
-        row(words, nothing_fitted(fitted(rig, data, ACOUSTICS[:count])))
-    row("steady friction, calibrated to run 1", fitted(rig, data, ()))
+        words = "nominal values, steady friction" if not names else f"... {names[-1]}"
+        row(words, with_nominal_values(fit_effects(rig, data, ACOUSTICS[:count])))
+    row("steady friction, calibrated to run 1", fit_effects(rig, data, ()))
     loose = widen_priors(rig)
-    row("... without the sheet's tolerances", fitted(loose, data, ()))
-    row("unsteady friction, without the sheet's tolerances", fitted(loose, data, ACOUSTICS[:1]))
+    row("... with wide priors", fit_effects(loose, data, ()))
+    row("unsteady friction, calibrated with wide priors", fit_effects(loose, data, ACOUSTICS[:1]))
     explanation = explain(cases[0], processes=1)
-    accepted = explanation.judgement.accepted
+    accepted = explanation.decision.accepted
     row("**explained**: " + ", ".join(accepted.names).replace("_", " "), accepted)
-    warmer, ratio = another_day(accepted, whole[1])
+    warmer, ratio = with_wave_speed_of(accepted, whole[1])
     row(f"... with the wave speed {ratio - 1:+.2%}, that of run 2", warmer)
     result = write_verdict(explanation, arguments.folder / "explained")
     draw(explanation, arguments.folder / "explained")

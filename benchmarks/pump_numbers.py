@@ -1,11 +1,11 @@
-"""How much of a nominal ripple's error is bulk modulus and port timing.
+"""Which part of a nominal flow ripple's error two numbers of the pump explain.
 
     python benchmarks/pump_numbers.py [--pumps 12]
 
-Pumps and their errors are drawn as for the sealed trial, from a seed of this benchmark's own, and
-their ripples are computed by the virtual rig. Two numbers and the shaft angles are fitted to the
-difference of true and nominal ripple at all operating points, the twin's own lumped pump saying
-what each number changes.
+Pumps and their errors are drawn as for the concealed trial, from a seed of this benchmark's own.
+The virtual rig computes their ripples. Bulk modulus, port timing and the shaft angles are then
+fitted to the difference of true and nominal ripple at all operating points. The twin's lumped pump
+gives the change that each number makes.
 """
 
 from __future__ import annotations
@@ -15,29 +15,31 @@ import argparse
 import numpy as np
 
 from rippletwin.case.model import Fluid
+from rippletwin.harmonics import peak_amplitudes
 from rippletwin.pump.ripple_sensitivity import ripple_change
-from virtualrig.draw import draw
+from virtualrig.draw import draw_case
+from virtualrig.draw_rig import HIGHEST_HZ
 from virtualrig.pump import Pump
 from virtualrig.source import constant_pressure_flow
 
-HIGHEST_HZ = 4000.0
-MODULUS, TIMING = 0.1, 1.0  # what a unit of each coordinate is: relative, deg
+MODULUS_STEP, TIMING_STEP_DEG = 0.1, 1.0  # a unit of each coordinate; the modulus is relative
 
 
 def harmonics(flow: np.ndarray, orders: np.ndarray) -> np.ndarray:
-    return 2.0 / len(flow) * np.fft.rfft(flow)[orders]
+    """Complex peak amplitudes of one revolution's flow at the shaft `orders`."""
+    return peak_amplitudes(flow)[orders]
 
 
 def aligned(true: np.ndarray, nominal: np.ndarray, orders: np.ndarray) -> np.ndarray:
-    """`true` with the shaft turned to where it is nearest to `nominal`."""
+    """`true` at the shaft angle at which it is nearest to `nominal`."""
     angles = np.linspace(-0.04, 0.04, 4001)
-    left = [np.linalg.norm(true * np.exp(1j * orders * t) - nominal) for t in angles]
-    return true * np.exp(1j * orders * angles[int(np.argmin(left))])
+    distances = [np.linalg.norm(true * np.exp(1j * orders * t) - nominal) for t in angles]
+    return true * np.exp(1j * orders * angles[int(np.argmin(distances))])
 
 
 def analyse(index: int) -> tuple[float, float, np.ndarray, np.ndarray]:
-    """Error of the nominal ripple before and after, numbers as found and as they are."""
-    drawn = draw(60, "benchmark of the pump's numbers", 0, index)
+    """Relative error of the nominal ripple before and after the fit, fitted and true numbers."""
+    drawn = draw_case(60, "benchmark of the pump's numbers", 0, index)
     sheet, wrong = drawn.sheet, drawn.seal["pump"]
     fluid = Fluid(sheet["fluid"]["density"], sheet["fluid"]["kinematic_viscosity"])
     nominal = Pump(**sheet["pump"])
@@ -53,8 +55,8 @@ def analyse(index: int) -> tuple[float, float, np.ndarray, np.ndarray]:
         a, b = (harmonics(flow, orders) for flow in flows)
         modulus = nominal.bulk_modulus
         ends = {
-            "bulk_modulus": (modulus * np.exp(MODULUS), modulus * np.exp(-MODULUS)),
-            "port_timing": (TIMING, -TIMING),
+            "bulk_modulus": (modulus * np.exp(MODULUS_STEP), modulus * np.exp(-MODULUS_STEP)),
+            "port_timing": (TIMING_STEP_DEG, -TIMING_STEP_DEG),
         }
         own = np.zeros((len(orders), 2 + len(drawn.points)), complex)
         for j, (name, pair) in enumerate(ends.items()):
@@ -69,23 +71,23 @@ def analyse(index: int) -> tuple[float, float, np.ndarray, np.ndarray]:
     matrix, error = np.concatenate(columns), np.concatenate(errors)
     matrix = np.concatenate([matrix.real, matrix.imag])
     error = np.concatenate([error.real, error.imag])
-    found = np.linalg.lstsq(matrix, error, rcond=None)[0]
-    left = np.linalg.norm(error - matrix @ found)
+    fitted = np.linalg.lstsq(matrix, error, rcond=None)[0]
+    after = np.linalg.norm(error - matrix @ fitted)
     truth = np.array([wrong["relative"]["bulk_modulus"], wrong["timing_deg"]])
     before = np.linalg.norm(error) / np.sqrt(size)
-    return before, left / np.sqrt(size), found[:2] * (MODULUS, TIMING), truth
+    return before, after / np.sqrt(size), fitted[:2] * (MODULUS_STEP, TIMING_STEP_DEG), truth
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--pumps", type=int, default=12)
     options = parser.parse_args()
-    print("ripple's error: nominal, with both numbers | bulk modulus, port timing: found, true")
+    print("ripple error: nominal, fitted | bulk modulus, port timing: fitted, true")
     for index in range(options.pumps):
-        before, after, found, truth = analyse(index)
+        before, after, fitted, true = analyse(index)
         print(
-            f"{before:7.2%} {after:7.2%} | {found[0]:+6.1%} {truth[0]:+6.1%}   "
-            f"{found[1]:+5.2f} {truth[1]:+5.2f} deg"
+            f"{before:7.2%} {after:7.2%} | {fitted[0]:+6.1%} {true[0]:+6.1%}   "
+            f"{fitted[1]:+5.2f} {true[1]:+5.2f} deg"
         )
 
 

@@ -1,21 +1,21 @@
-"""What a run of the workflow cost: time and peak memory of each rule, disk left behind.
+"""Costs of a run of the workflow: time and peak memory of each rule, disk space.
 
     python benchmarks/run_costs.py [results]
 
-Reads the benchmark files that the workflow writes. Wall seconds add up over jobs; two jobs run at a
-time, so the whole run takes about half of the sum. Resident memory is that of the largest job.
+Reads the benchmark files of the workflow. Wall seconds are summed over jobs: a run on two cores
+takes about half of the sum. Resident memory is that of the largest job.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import pandas as pd
 
 
 def costs(results: Path) -> pd.DataFrame:
-    """One row a rule: jobs, wall and processor seconds, largest resident memory (MB)."""
+    """One row for each rule: jobs, wall and processor seconds, largest resident memory (MB)."""
     rows = []
     folder = results / "benchmarks"
     for path in sorted(folder.rglob("*.tsv")):
@@ -35,7 +35,9 @@ def costs(results: Path) -> pd.DataFrame:
 
 
 def main() -> None:
-    results = Path(sys.argv[1] if len(sys.argv) > 1 else "results")
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("results", type=Path, nargs="?", default=Path("results"))
+    results = parser.parse_args().results
     table = costs(results)
     print(table.to_string())
     size = sum(path.stat().st_size for path in results.rglob("*") if path.is_file())

@@ -1,9 +1,9 @@
-"""Seconds of one core to train on 1000 samples once, for each architecture and input size.
+"""Processor time of training on 1000 samples, for each architecture and input size.
 
     OMP_NUM_THREADS=1 python benchmarks/training_speed.py [--sizes 32 48 64] [--batch 32] [--bf16]
 
-CPU time, so that a busy machine does not matter much; the best of three steps. Starts itself again
-with the memory settings that a training job should have.
+Times are processor seconds of one thread, the best of three steps. The script starts itself again
+with the memory settings of a training job.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ import torch
 from torch import nn
 
 from rippletwin.learning.architectures import ARCHITECTURES
+from rippletwin.learning.malloc_settings import MALLOC_ENVIRONMENT
 from rippletwin.learning.networks import build
-from rippletwin.learning.training import MALLOC_ENVIRONMENT
 
 
 def main() -> None:

@@ -1,12 +1,12 @@
-"""What a wandering speed does to harmonics, and what is left of it at the mean speed.
+"""Errors of harmonics at a wandering speed: mean over revolutions, and regressed to the mean speed.
 
     python benchmarks/wander.py [--wander 0.001] [--takes 4]
 
-The virtual rig records a line of steady friction that ends in a volume, marched at a wandering
-speed, and again at the even speed that is the mean; every take at another mean speed. Printed:
-norm of the difference of all piston harmonics below 4 kHz over the norm of the even ones, shaft
-angle aligned, and the same for the harmonic that differs most; for the mean over the revolutions
-and for the value at the mean speed.
+The virtual rig records a line with steady friction that ends in a volume, once at a wandering speed
+and once at the constant mean speed; every take has another mean speed. The errors are norms of the
+difference of all piston harmonics below 4 kHz, relative to those at constant speed, at the best
+shaft angle. The columns "worst" are the same for the harmonic with the largest error of the
+stronger half.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from rippletwin.harmonics import peak_amplitudes
 from rippletwin.spectra.angular_resampling import cut_revolutions
 from rippletwin.spectra.speed_regression import harmonics_at_mean_speed, mean_speed
 from virtualrig.recorder import SAMPLING_RATE_HZ, Point, record
 from virtualrig.rig import SHEET, build, read_yaml
 
 PISTONS, HIGHEST_HZ = 9, 4000.0
-FIRST_RPM, APART_RPM = 1500.0, 17.0
+FIRST_RPM, STEP_RPM = 1500.0, 17.0
 SEAL = {
     "line": {
         "segments": [
@@ -49,12 +50,11 @@ def flow() -> np.ndarray:
 
 
 def harmonics(take, speed_rpm: float):
-    """Mean speed, orders, and their values as mean of the revolutions and at the mean speed."""
+    """Mean speed (Hz), orders, their mean over revolutions and their values at the mean speed."""
     revolutions = cut_revolutions(take.pressure, SAMPLING_RATE_HZ, PISTONS, speed_rpm)
     speed = mean_speed(revolutions.speed_hz)
     orders = PISTONS * np.arange(1, int(HIGHEST_HZ / speed / PISTONS) + 1)
-    spectra = 2 * np.fft.rfft(revolutions.windows, axis=2)[:, :, orders]
-    spectra /= revolutions.windows.shape[2]
+    spectra = peak_amplitudes(revolutions.windows)[:, :, orders]
     return (
         speed,
         orders,
@@ -63,16 +63,16 @@ def harmonics(take, speed_rpm: float):
     )
 
 
-def apart(values, even, orders) -> tuple[float, float]:
-    """Difference of all harmonics and of the worst of the stronger half, shaft angle aligned."""
-    match = np.sum(np.conj(values) * even / np.abs(even) ** 2, axis=0)
+def relative_errors(values, constant, orders) -> tuple[float, float]:
+    """Error of all harmonics, and of the worst of the stronger half, at the best shaft angle."""
+    match = np.sum(np.conj(values) * constant / np.abs(constant) ** 2, axis=0)
     grid = np.linspace(-np.pi, np.pi, 40001) / PISTONS
     angle = grid[np.argmax((np.exp(-1j * np.outer(grid, orders)) @ match).real)]
-    gap = values * np.exp(1j * angle * orders) - even
-    size = np.linalg.norm(even, axis=0)
+    error = values * np.exp(1j * angle * orders) - constant
+    size = np.linalg.norm(constant, axis=0)
     strong = size > np.median(size)
-    worst = np.max((np.linalg.norm(gap, axis=0) / size)[strong])
-    return float(np.linalg.norm(gap) / np.linalg.norm(even)), float(worst)
+    worst = np.max((np.linalg.norm(error, axis=0) / size)[strong])
+    return float(np.linalg.norm(error) / np.linalg.norm(constant)), float(worst)
 
 
 def main() -> None:
@@ -91,14 +91,16 @@ def main() -> None:
     print("| r/min | mean of revolutions | worst | at the mean speed | worst |")
     print("|---|---|---|---|---|")
     for k in range(arguments.takes):
-        point = Point("a", FIRST_RPM + k * APART_RPM, 7.7e6, 3.2)
+        point = Point("a", FIRST_RPM + k * STEP_RPM, 7.7e6, 3.2)
         taken = record(rig, point, np.random.default_rng(k), driving, 20.0, 3, marched=True)
         mean_hz, orders, plain, at_mean = harmonics(taken, point.speed_rpm)
-        # the mean of the revolutions that were kept is not quite that of the recording
+        # the mean over the complete revolutions differs a little from that of the recording
         point = replace(point, speed_rpm=60 * mean_hz)
-        even = record(replace(rig, wander=0.0), point, np.random.default_rng(k), driving, 20.0, 3)
-        even = harmonics(even, point.speed_rpm)[2]
-        cells = [f"{x:.1%}" for v in (plain, at_mean) for x in apart(v, even, orders)]
+        constant = record(
+            replace(rig, wander=0.0), point, np.random.default_rng(k), driving, 20.0, 3
+        )
+        constant = harmonics(constant, point.speed_rpm)[2]
+        cells = [f"{x:.1%}" for v in (plain, at_mean) for x in relative_errors(v, constant, orders)]
         print("| " + " | ".join([f"{60 * mean_hz:.1f}", *cells]) + " |", flush=True)
 
 

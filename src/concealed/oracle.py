@@ -8,11 +8,17 @@ from itertools import product
 from pathlib import Path
 
 from rippletwin.calibration.fit import Fit, Hypothesis
-from rippletwin.calibration.multistart import align_shaft_angles
 from rippletwin.calibration.posterior import Posterior
+from rippletwin.calibration.shaft_angles import align_shaft_angles
 from rippletwin.case.load import load_case
 from rippletwin.explanation.explain import observe_whole_and_halves, prepare_base
-from rippletwin.explanation.fit_jobs import Workers, transfer_theta
+from rippletwin.explanation.fit_jobs import (
+    Continuation,
+    FitJob,
+    FromTheta,
+    Workers,
+    transfer_theta,
+)
 from rippletwin.explanation.search.stepwise_search import applicable_candidates
 from rippletwin.twin.parameters import coordinates
 from rippletwin.twin.twin import Twin
@@ -43,7 +49,7 @@ def log_evidence_of_effects(
     Both twins are fitted as `explain` fits them. The fit with the effects starts from their true
     strengths and places, once on the nominal line and once on the true `line` (parameter name ->
     value, SI units). The fit without effects also starts from the line of the better of these.
-    Below `thresholds.ACCEPT` a search cannot distinguish the effects from chance; above it, a
+    Below `MIN_LOG_BAYES_FACTOR` a search cannot distinguish the effects from chance; above it, a
     search that finds nothing has failed. None where an effect is not in the library or acts at
     shaft orders alone.
     """
@@ -60,11 +66,11 @@ def log_evidence_of_effects(
         theta = coordinates(twin.parameters, {**line, **values})
         start = {name: theta[twin.index[name]] for name in values}
         aligned = align_shaft_angles(Posterior(twin, observations), theta)[1]
-        jobs.append({"hypothesis": hypothesis, "starts": [start]})
-        jobs.append({"hypothesis": hypothesis, "theta": aligned})
+        jobs.append(FitJob(hypothesis, Continuation((start,))))
+        jobs.append(FitJob(hypothesis, FromTheta(aligned)))
     with_effects = _best(pool.fit(jobs))
-    from_same_line = {"hypothesis": (), "theta": transfer_theta(with_effects, (), base)}
-    without = _best(pool.fit([{"hypothesis": ()}, from_same_line]))
+    from_same_line = FitJob((), FromTheta(transfer_theta(with_effects, (), base)))
+    without = _best(pool.fit([FitJob(()), from_same_line]))
     return with_effects.evidence - without.evidence
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from concealed import summary
 from concealed.failures import circumstance, failure
 from concealed.score import PLAIN_CHANGE
-from rippletwin.explanation.thresholds import ACCEPT
+from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
 
 KINDS = {
     "none": "no effect, nominal values within tolerance",
@@ -105,7 +105,8 @@ def _terms() -> list[str]:
         "* *Change*: norm of the change that the effect makes in the sensors' ripple, relative. "
         f"*Plain*: a change of {100 * PLAIN_CHANGE:.0f} % or more.",
         "* *Oracle log evidence*: of the true effects, fitted from their true values. The data "
-        f"*support* an effect if it is {ACCEPT:.0f} or more, the threshold of the tool.",
+        f"*support* an effect if it is {MIN_LOG_BAYES_FACTOR:.0f} or more, the threshold of the "
+        "tool.",
         "* *Misfit*: relative, of the whole data, if not held out. *Calibrated*: the least that "
         "calibration reaches without an effect. *Absorbed*: 1 - calibrated/nominal. *Corrected*: "
         "with the effects of the verdict.",

@@ -172,7 +172,7 @@ def _holds_position(effect: dict, interval: Sequence[float], length: float) -> b
 
 
 def intervals_hold(effect: dict, claim: dict) -> list[bool]:
-    """Whether each 95 % interval of a claim by the effect's own name holds the true value.
+    """Whether each stated 95 % interval of a claim by the effect's own name holds the true value.
 
     Positions are left to `is_place_right`: they are known to the lengths' tolerance only.
     """
@@ -181,7 +181,7 @@ def intervals_hold(effect: dict, claim: dict) -> list[bool]:
     return [
         claim["parameters"][name]["ci95"][0] <= value <= claim["parameters"][name]["ci95"][1]
         for name, value in effect["parameters"].items()
-        if name in claim["parameters"] and name != "position"
+        if name != "position" and "ci95" in claim["parameters"].get(name, ())
     ]
 
 

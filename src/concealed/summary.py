@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import binomtest
 
-from rippletwin.explanation.thresholds import ACCEPT
+from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
 
 CHANGE_EDGES = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, np.inf)
 PROBABILITY_EDGES = (0.0, 0.5, 0.8, 0.95, 0.99, 1.0)
@@ -119,7 +119,7 @@ def score_table(rows: list[dict]) -> list[Score]:
 
 def data_support_effects(row: dict) -> bool:
     """Whether the oracle's log evidence reaches the tool's threshold, or the oracle has none."""
-    return row["oracle_log_evidence"] is None or row["oracle_log_evidence"] >= ACCEPT
+    return row["oracle_log_evidence"] is None or row["oracle_log_evidence"] >= MIN_LOG_BAYES_FACTOR
 
 
 def at_floor(row: dict) -> bool:

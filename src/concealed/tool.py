@@ -14,10 +14,10 @@ from types import SimpleNamespace
 import numpy as np
 
 from concealed.sparse import pick_by_matching_pursuit
-from rippletwin.calibration.calibrate import align
 from rippletwin.calibration.likelihood import Likelihood
 from rippletwin.calibration.misfit import misfit
 from rippletwin.calibration.report import segment_table
+from rippletwin.calibration.shaft_angles import fit_shaft_angles
 from rippletwin.case.load import load_case
 from rippletwin.explanation.explain import explain
 from rippletwin.explanation.search.stepwise_search import applicable_candidates
@@ -72,10 +72,11 @@ def compute_baselines(explanation) -> dict:
     bic        name and element of the effect that `pick_by_bic` picks, or None
     sparse     the same of `pick_by_matching_pursuit`
     """
-    base, accepted = explanation.search.base, explanation.judgement.accepted
+    base, accepted = explanation.search.base, explanation.decision.accepted
     observations = list(explanation.observations)
-    likelihood = Likelihood(base.twin.with_(theta=np.zeros_like(base.twin.theta)), observations)
-    nominal = align(likelihood, np.zeros(len(likelihood.twin.parameters)))
+    # Evenness 1: the angles are those of the least misfit of the whole ripple.
+    likelihood = Likelihood(base.twin, observations, evenness=1.0)
+    nominal = fit_shaft_angles(likelihood, np.zeros_like(base.twin.theta))
     candidates = applicable_candidates(explanation.rig, observations)
     return {
         "nominal": misfit(likelihood, nominal).relative,
@@ -101,7 +102,7 @@ def pick_by_bic(explanation) -> dict | None:
         minus_log_likelihood = fit.objective - 0.5 * float(np.sum(fit.twin.theta[proper] ** 2))
         return 2 * minus_log_likelihood + len(fit.twin.parameters) * np.log(count)
 
-    best = min([explanation.search.base, *explanation.search.singles], key=criterion)
+    best = min([explanation.search.base, *explanation.search.single_effect_fits], key=criterion)
     if not best.hypothesis:
         return None
     effect, place = best.hypothesis[0]

@@ -1,8 +1,9 @@
-"""Harmonics of one revolution: peak amplitudes of shaft orders, and phase modulation of a flow."""
+"""Harmonics of one period: peak amplitudes of its orders, and phase modulation of a flow."""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.fft import irfft, rfft
 
 from rippletwin.case.model import FlowRipple
 
@@ -22,11 +23,26 @@ def phase_modulate(spectrum: np.ndarray, modulation: complex, count: int) -> np.
     return flow * (1.0 - swing.imag)
 
 
-def peak_amplitudes(flow: np.ndarray) -> np.ndarray:
-    """Peak amplitudes (M // 2 + 1,) of shaft orders of a flow (M,) over one revolution."""
-    spectrum = np.fft.rfft(flow) * (2.0 / len(flow))
-    spectrum[0] /= 2.0
-    return spectrum
+def peak_amplitudes(period: np.ndarray) -> np.ndarray:
+    """Peak amplitudes (..., M // 2 + 1) of the orders 0, 1 ... of one period (..., M); that of
+    order 0 is the mean.
+
+    Of an even M the last order, of which the sine is not sampled, comes out twice as large.
+    """
+    amplitudes = rfft(period) * (2.0 / np.shape(period)[-1])
+    amplitudes[..., 0] *= 0.5
+    return amplitudes
+
+
+def one_period(
+    amplitudes: np.ndarray, count: int, orders: np.ndarray | slice = slice(None)
+) -> np.ndarray:
+    """One period (..., `count`) of a wave with peak `amplitudes` (..., F) at whole `orders` (F,),
+    by default 0, 1 ... `count` // 2: the inverse of `peak_amplitudes`."""
+    spectrum = np.zeros((*np.shape(amplitudes)[:-1], count // 2 + 1), complex)
+    spectrum[..., orders] = 0.5 * count * np.asarray(amplitudes)
+    spectrum[..., 0] *= 2.0
+    return irfft(spectrum, count)
 
 
 def flow_harmonics(ripple: FlowRipple, orders: np.ndarray) -> np.ndarray:

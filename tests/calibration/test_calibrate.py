@@ -14,7 +14,7 @@ from rippletwin.calibration.pareto import calibrate_pareto
 from rippletwin.case.model import Load
 from rippletwin.harmonics import flow_harmonics
 from rippletwin.line.time_domain import method_of_characteristics
-from rippletwin.line.time_domain.line_elements import End, Line, Pipe
+from rippletwin.line.time_domain.line_elements import End, Pipe, TimeDomainLine
 from rippletwin.twin import twin_file
 from rippletwin.twin.twin import Twin
 from synthetic_recordings import (
@@ -86,7 +86,7 @@ def test_a_recording_made_by_the_method_of_characteristics():
     turn = np.exp(2j * np.pi * np.outer(k, np.arange(768) / 768))  # one piston's turn
     flow = (flow_harmonics(o.flow_ripple, 9 * k) @ turn).real
     mean = float(np.mean(flow))
-    line = Line(
+    line = TimeDomainLine(
         [Pipe(s.length, s.diameter, s.wave_speed) for s in true_line],
         flow,
         1.0 / (9 * o.speed_hz),

@@ -3,7 +3,7 @@
 import numpy as np
 
 from concealed.oracle import log_evidence_of_effects
-from rippletwin.explanation.thresholds import ACCEPT
+from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.twin import Twin
@@ -23,6 +23,6 @@ def test_the_oracle_finds_an_effect_only_in_data_that_hold_it():
         rig, observations, twin = make(np.random.default_rng(1), effects, values)
         base, described = Twin(rig, observations), [true | {"parameters": strength}]
         log_evidence.append(log_evidence_of_effects(base, observations, described, twin.values()))
-    assert log_evidence[0] > 5 * ACCEPT and log_evidence[1] < ACCEPT
+    assert log_evidence[0] > 5 * MIN_LOG_BAYES_FACTOR and log_evidence[1] < MIN_LOG_BAYES_FACTOR
     unknown = {"name": "accumulator", "element": "position", "position": 1.0, "parameters": {}}
     assert log_evidence_of_effects(base, observations, [unknown], {}) is None

@@ -82,7 +82,7 @@ def stand_in(command: str) -> str:
         return NOT_RUN[command][1]
     if re.match(r"python benchmarks/explain_(selfcheck|confusion)\.py", command):  # HOURS
         return f"{' '.join(command.split()[:2])} --help"
-    if command.startswith("snakemake --profile profiles/slurm"):  # CLUSTER
+    if command.startswith("snakemake --workflow-profile profiles/slurm"):  # CLUSTER
         return SLURM_PROFILE_IS_READ
     if command.startswith("snakemake") and "--dry-run" not in command:  # SCHEDULED
         return f"{command} --dry-run"

@@ -1,4 +1,4 @@
-"""What chance gives an effect: draws of the line alone, and the threshold from them."""
+"""The null distribution of the evidence: draws without an effect, and their threshold."""
 
 import numpy as np
 import pytest
@@ -13,6 +13,7 @@ from rippletwin.explanation.checks.bootstrap import (
     draw_without_effects,
 )
 from rippletwin.explanation.search import stepwise_search
+from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
 from rippletwin.twin.twin import Twin
 from synthetic_observations import POINTS, make
 
@@ -25,14 +26,14 @@ def fitted():
     return refine(base, (), observations, [truth.theta]), observations
 
 
-def test_draws_scatter_as_the_likelihood_believes(fitted):
-    """Invariance: drawn data, whitened by the covariance that they were drawn from, are
-    independent and of unit variance; so their mean square is 1 to its sampling error."""
+def test_draws_have_the_covariance_of_the_error_model(fitted):
+    """Drawn data, whitened by the covariance that they were drawn from, are independent and of unit
+    variance: their mean square is 1 to its sampling error."""
     fit, observations = fitted
     posterior = Posterior(fit.twin, observations)
     prediction = posterior.predict(fit.twin.theta)
     posterior.estimate_errors(prediction, fit.twin.theta)
-    metric, rng = posterior._metric(prediction), np.random.default_rng(0)
+    metric, rng = posterior._whitening(prediction), np.random.default_rng(0)
     white = np.array(
         [
             metric.apply(posterior._rotate(posterior.draw(prediction, rng) - prediction))
@@ -44,8 +45,8 @@ def test_draws_scatter_as_the_likelihood_believes(fitted):
     assert abs(np.mean(white)) < 0.02
 
 
-def test_draws_are_recordings_of_their_own(fitted):
-    """By definition: same orders and covariance, other values, and the same ones for a seed."""
+def test_draws_differ_in_their_values_only(fitted):
+    """Two draws have the same orders and covariance and other values; a seed repeats its draw."""
     fit, observations = fitted
     one, same, other = (
         draw_without_effects(fit, observations, np.random.default_rng(k))[0] for k in (1, 1, 2)
@@ -56,18 +57,18 @@ def test_draws_are_recordings_of_their_own(fitted):
     assert 0.005 < apart < 0.3
 
 
-def test_the_threshold_is_what_chance_passes_in_two_of_a_hundred():
-    """Truth known: gains from a Gumbel distribution; its 98 % quantile comes back, and a gain that
-    no draw reached has the smallest p-value that so many draws can show."""
+def test_the_threshold_is_exceeded_in_two_of_a_hundred_cases():
+    """Of values from a known Gumbel distribution the 98 % quantile comes back. A value above all
+    draws has the smallest p-value that so many draws can show."""
     few = NullDistribution(tuple(gumbel_r.rvs(-2.0, 1.5, size=30, random_state=1)))
     assert few.threshold == pytest.approx(gumbel_r.ppf(0.98, -2.0, 1.5), abs=1.5)
     assert few.p_value(100.0) == pytest.approx(1 / 31)
     assert few.p_value(-100.0) == 1.0
 
 
-def test_chance_gives_no_effect_what_an_effect_must_have(fitted, monkeypatch):
-    """Statistics: twelve draws of a line that lacks nothing, three effects refitted to each. None
-    gets the log evidence that a name needs; fewer than ten draws are refused."""
+def test_no_draw_without_an_effect_reaches_the_threshold(fitted, monkeypatch):
+    """In twelve draws without an effect, with three effects refitted to each, none adds the log
+    evidence that a name needs. Fewer than ten draws are refused."""
     fit, observations = fitted
     few = [
         c
@@ -76,8 +77,8 @@ def test_chance_gives_no_effect_what_an_effect_must_have(fitted, monkeypatch):
     ]
     monkeypatch.setattr(bootstrap, "applicable_candidates", lambda *_: few)
     found = bootstrap_null(fit, observations, 12, processes=1)
-    assert len(found.gains) == 12
-    assert max(found.gains) < stepwise_search.ACCEPT
+    assert len(found.log_bayes_factors) == 12
+    assert max(found.log_bayes_factors) < MIN_LOG_BAYES_FACTOR
     with pytest.raises(ValueError, match="10"):
         bootstrap_null(fit, observations, 9)
 

@@ -1,4 +1,4 @@
-"""Data made to contradict themselves are found out, and healthy data are not."""
+"""Contradictions in the data: each kind is found, and sound data have none."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -21,7 +21,7 @@ POINTS = ((1000, 9.5e6), (1500, 5e6))
 
 @pytest.fixture(scope="module")
 def healthy():
-    """A bench and two observations of it without any contradiction."""
+    """A bench and two observations without a contradiction."""
     return make(np.random.default_rng(1), points=POINTS)[:2]
 
 
@@ -33,8 +33,8 @@ def row(o, k, values):
 
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("effect", [None, "sensor_gain", "leak"])
-def test_no_alarm_on_sound_data(seed, effect):
-    """Neither sound data nor those of a line with missing physics contradict themselves."""
+def test_sound_data_do_not_contradict_themselves(seed, effect):
+    """Neither data without an effect nor data with missing physics are reported."""
     place = {"sensor_gain": Place("sensor p2", 1), "leak": Place("position")}
     hypothesis = () if effect is None else ((EFFECTS[effect], place[effect]),)
     bench, observations, _ = make(np.random.default_rng(seed), hypothesis, points=POINTS)
@@ -42,32 +42,32 @@ def test_no_alarm_on_sound_data(seed, effect):
     assert find_contradictions(bench, (), observations, observations, again) == ""
 
 
-def test_dead_sensor(healthy):
-    """A sensor that reads noise alone is named."""
+def test_a_dead_sensor_is_reported(healthy):
+    """A sensor that measures noise alone is named."""
     bench, (o, other) = healthy
     noise = np.sqrt(o.covariance[:, 2, 2].real) * np.exp(1j * np.arange(o.values.shape[1]))
-    assert "p3 reads no ripple" in find_contradictions(bench, (), [row(o, 2, noise), other])
+    assert "p3 measures no ripple" in find_contradictions(bench, (), [row(o, 2, noise), other])
 
 
-def test_duplicated_sensor(healthy):
-    """Two sensors two metres apart with one signal, scaled, are found."""
+def test_two_sensors_with_one_signal_are_reported(healthy):
+    """Two sensors two metres apart with the same signal up to a factor are named."""
     bench, (o, other) = healthy
-    assert "p1 and p2 read the same" in find_contradictions(
+    assert "p1 and p2 measure the same" in find_contradictions(
         bench, (), [row(o, 1, 1.03 * o.values[0]), other]
     )
 
 
-def test_no_noise(healthy):
-    """A covariance of zeros is no measurement's."""
+def test_a_sensor_without_noise_is_reported(healthy):
+    """A covariance of zeros is not that of a measurement."""
     bench, (o, other) = healthy
     assert "no noise" in find_contradictions(
         bench, (), [replace(o, covariance=0 * o.covariance), other]
     )
 
 
-def test_mean_pressure_grows_downstream(healthy):
-    """A mean that grows by more than any gain error is found; a gain error's 15 % is not, nor are
-    sensors that are coupled without their mean."""
+def test_a_mean_pressure_that_grows_downstream_is_reported(healthy):
+    """A mean that grows by more than any gain error is reported. A gain error of 15 % is not, and
+    neither are AC-coupled sensors."""
     bench, (o, other) = healthy
     assert "grows downstream" in find_contradictions(
         bench, (), [replace(o, mean=np.array([9.5e6, 9.4e6, 13e6])), other]
@@ -76,14 +76,14 @@ def test_mean_pressure_grows_downstream(healthy):
         assert find_contradictions(bench, (), [replace(o, mean=np.array(mean)), other]) == ""
 
 
-def test_copied_recording(healthy):
-    """The same numbers under two names."""
+def test_a_copied_recording_is_reported(healthy):
+    """Two recordings with the same values under two labels are named."""
     bench, (o, _) = healthy
     assert "a copy of" in find_contradictions(bench, (), [o, replace(o, label="other")])
 
 
-def test_halves_of_two_states(healthy):
-    """Halves that differ by a third of the ripple are two states; at another angle they are not."""
+def test_two_halves_in_different_states_are_reported(healthy):
+    """Halves that differ by a third of the ripple are reported; another shaft angle is not."""
     bench, (o, other) = healthy
     turned = replace(o, values=o.values * np.exp(0.2j * o.orders))
     assert find_contradictions(bench, (), [o, other], [o], [turned]) == ""
@@ -91,23 +91,22 @@ def test_halves_of_two_states(healthy):
     assert "between its halves" in find_contradictions(bench, (), [o, other], [o], [changed])
 
 
-def test_odd_one_of_an_operating_point(healthy):
-    """Of three recordings of one point the one with half the ripple is named; one of slightly
-    warmer oil is not."""
+def test_the_recording_that_differs_from_its_repeats_is_reported(healthy):
+    """Of three recordings of one operating point the one with half the ripple is named; one with
+    slightly warmer oil is not."""
     bench, (o, other) = healthy
-    delay = sum(segment.delay for segment in bench.line)
-    warmer = o.values * np.exp(-2j * np.pi * o.frequency_hz * delay * 0.004)
+    warmer = o.values * np.exp(-2j * np.pi * o.frequency_hz * bench.delay * 0.004)
     same = replace(o, label="second", values=warmer * 1.001)
     odd = replace(o, label="third", values=0.5 * o.values)
     assert find_contradictions(bench, (), [o, same, other]) == ""
     assert find_contradictions(bench, (), [o, same, odd, other]).startswith(
-        "third is unlike every other"
+        "third differs from every other"
     )
 
 
 @pytest.mark.parametrize("clipped", [False, True])
-def test_limiter_with_noise_behind_it(clipped):
-    """A limiter whose output carries noise is found; the sinusoid before it is not."""
+def test_a_clipped_signal_is_reported_despite_noise(clipped):
+    """A sinusoid clipped before noise is added is reported; the whole sinusoid is not."""
     rng = np.random.default_rng(2)
     wave = np.sin(0.01 * np.arange(20000)) + 1e-3 * rng.normal(size=20000)
     if clipped:
@@ -118,8 +117,9 @@ def test_limiter_with_noise_behind_it(clipped):
 
 @pytest.mark.long
 @pytest.mark.parametrize("what", ["sound", "exchanged", "sign"])
-def test_wiring(what):
-    """Exchanged sensors and a turned sign are told from sound data by fits of the line alone."""
+def test_wrong_wiring_is_reported(what):
+    """Fits of the line alone recognise exchanged sensors and an inverted sign, and report nothing
+    for correctly wired data."""
     bench, observations, _ = make(np.random.default_rng(3), sensors=2, points=POINTS[:1])
     if what == "exchanged":
         observations = [replace(o, values=o.values[::-1]) for o in observations]
@@ -128,14 +128,14 @@ def test_wiring(what):
     base = Twin(bench, observations)
     fit = fit_hypothesis(base, (), observations)
     words = find_swapped_sensors(base, observations, Search(fit, [], fit))
-    expected = {"sound": "", "exchanged": "p1 and p2 are exchanged", "sign": "sign turned"}[what]
+    expected = {"sound": "", "exchanged": "p1 and p2 are exchanged", "sign": "is inverted"}[what]
     assert (words == "") if not expected else (expected in words)
 
 
-def test_every_reason_is_told(healthy):
-    """Two contradictions come as two, each once."""
+def test_every_contradiction_is_reported_once(healthy):
+    """Two contradictions in one observation give two clauses."""
     bench, (o, other) = healthy
     bad = replace(row(o, 1, o.values[0]), covariance=0 * o.covariance)
     words = find_contradictions(bench, (), [bad, other])
-    assert words.count(";") == 1 and "read the same" in words and "no noise" in words
+    assert words.count(";") == 1 and "measure the same" in words and "no noise" in words
     assert data_contradictions.find_contradictions(bench) == ""

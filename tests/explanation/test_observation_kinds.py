@@ -1,4 +1,4 @@
-"""Every kind of observation and of load, liquid and gas, from made data to the verdict."""
+"""Every kind of observation and of load, liquid and gas, from synthetic data to the verdict."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ import pytest
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor, Uncertainty
 from rippletwin.explanation.explain import explain_observations
 from rippletwin.explanation.verdict.verdict_file import verdict_dict
-from rippletwin.figures.explanation import overlay
+from rippletwin.figures.explanation import plot_ripple
 from rippletwin.spectra.observation import Observation
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
@@ -29,7 +29,7 @@ GRID = np.linspace(40.0, 2000.0, 80)
 IMPEDANCE = Load(
     "impedance", frequency_hz=np.array([0.0, 1e4]), impedance=np.array([4e9 + 0j, 4e9 + 4e9j])
 )
-# kind, source, fluid, load, effect put in, effect that competes
+# kind, source, fluid, load, true effect, competing effect
 CASES = {
     "periodic with ripple, orifice": ("periodic", "nominal", OIL, Load("orifice"), HOSE, GAIN),
     "periodic without ripple, closed": ("periodic", "free", OIL, Load("closed"), HOSE, GAIN),
@@ -43,7 +43,7 @@ CASES = {
 CHEAP = ("spectrum, open",)
 
 
-def made(kind, source, fluid, load, effect):
+def synthetic(kind, source, fluid, load, effect):
     """Rig and one observation with 0.2 % of noise, nominal values off by their uncertainty."""
     rng = np.random.default_rng(3)
     length, diameter, wave_speed = LINES[fluid]
@@ -82,17 +82,18 @@ def made(kind, source, fluid, load, effect):
     "case", [pytest.param(c, marks=() if c in CHEAP else pytest.mark.long) for c in CASES]
 )
 def test_each_kind_is_explained_end_to_end(case, monkeypatch):
-    """The effect put in is named, against one that competes, and the misfit falls; the verdict and
-    the overlay are made whatever the kind of observation."""
+    """The true effect is named against a competing one, and the misfit falls to less than half.
+
+    The verdict and the figure of the ripple are made for every kind of observation."""
     *kind, effect, rival = CASES[case]
     library = [effect, rival]
     monkeypatch.setattr(
         "rippletwin.explanation.search.stepwise_search.applicable_candidates", lambda *_: library
     )
-    monkeypatch.setattr("rippletwin.explanation.explain.candidates", lambda *_, **__: [])
-    explanation = explain_observations(*made(*kind, effect), processes=1)
+    monkeypatch.setattr("rippletwin.explanation.explain.fit_passive_networks", lambda *_: [])
+    explanation = explain_observations(*synthetic(*kind, effect), processes=1)
     result = verdict_dict(explanation)
     named = {e["name"] for e in result["effects"]}
     assert effect[0].name in named, (result["verdict"], result["sentence"])
     assert result["fit"]["after"]["in_sample"] < 0.5 * result["fit"]["before"]["in_sample"]
-    assert overlay(explanation) is not None
+    assert plot_ripple(explanation) is not None

@@ -1,4 +1,4 @@
-"""What a free data sheet would make of the data without an effect."""
+"""Prior sensitivity: fits without an effect and with wide priors."""
 
 from dataclasses import replace
 
@@ -12,8 +12,8 @@ from rippletwin.explanation.checks.prior_sensitivity import (
     refit_with_wide_priors,
     widen_priors,
 )
-from rippletwin.explanation.fit_jobs import Workers
-from rippletwin.explanation.verdict.decision import Judgement, withdraw_refuted_name
+from rippletwin.explanation.fit_jobs import FitJob, Workers
+from rippletwin.explanation.verdict.decision import Decision, withdraw_refuted_name
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
@@ -24,7 +24,7 @@ PRESSURE, ATMOSPHERE = 5e6, 101325.0  # Pa
 
 
 def accepted(effect, values, **options):
-    """(fit that knows the truth, workers without it)."""
+    """(fit from the truth, workers)."""
     hypothesis = ((effect, Place(effect.element)),)
     names = {f"{effect.name}@{effect.element}.{k}": v for k, v in values.items()}
     options = {"source": 0.0, "noise": 500.0} | options
@@ -34,17 +34,18 @@ def accepted(effect, values, **options):
     return refine(base, hypothesis, data, [truth.theta]), Workers(base, data)
 
 
-def test_air_at_one_pressure_is_a_slower_wave():
-    """To a small ripple at one mean pressure air in the oil is nothing but a slower wave: rho a^2 C
-    more compressible, so that a falls by the root of one plus that. A sheet that may move takes it
-    all up, and how far it moves is known."""
+def test_air_at_one_pressure_is_equivalent_to_a_slower_wave():
+    """For a small ripple at one mean pressure, air only makes the oil more compressible by rho a^2
+    C, so that the wave speed falls by the root of one plus that.
+
+    With wide priors the wave speeds absorb all of it, and by how much they move is known."""
     values = {"gas_fraction": 0.02, "polytropic_exponent": 1.2}
     small = {"points": ((1000, PRESSURE),), "depth": 0.002, "noise": 0.1}
-    fit, pool = accepted(EFFECTS["entrained_air"], values, **small)
-    (base,) = pool.fit([{"hypothesis": ()}])
-    (found,) = compare_without_each_effect(pool, base, fit)
-    assert found.effect == "entrained_air" and found.rivals and not found.refutes
-    free = refit_with_wide_priors(pool, [base], fit)[0][1].twin.values()
+    fit, workers = accepted(EFFECTS["entrained_air"], values, **small)
+    (base,) = workers.fit([FitJob(())])
+    (result,) = compare_without_each_effect(workers, base, fit)
+    assert result.effect == "entrained_air" and result.rivals and not result.refutes
+    wide = refit_with_wide_priors(workers, [base], fit)[0][1].twin.values()
     with_air = fit.twin.values()
     fraction, n = (v for p, v in with_air.items() if p.startswith("entrained_air"))
     pressure = PRESSURE + ATMOSPHERE
@@ -53,46 +54,50 @@ def test_air_at_one_pressure_is_a_slower_wave():
         speed = with_air[f"wave_speed[{k}]"]
         softer = fit.twin.rig.fluid.density * speed**2 * air
         delay = with_air[f"length[{k}]"] / speed * np.sqrt(1 + softer)
-        assert free[f"length[{k}]"] / free[f"wave_speed[{k}]"] == pytest.approx(delay, rel=0.002)
-    # How far the sheet is left: of its furthest parameter, in deviations as stated.
-    assert found.value == pytest.approx(free[found.parameter])
-    stated = 0.01 if found.parameter.startswith("length") else 0.05
-    assert found.pull == pytest.approx(abs(np.log(found.value / found.nominal)) / stated, rel=0.05)
+        assert wide[f"length[{k}]"] / wide[f"wave_speed[{k}]"] == pytest.approx(delay, rel=0.002)
+    # The pull is that of the furthest parameter in standard deviations as stated.
+    assert result.value == pytest.approx(wide[result.parameter])
+    stated = 0.01 if result.parameter.startswith("length") else 0.05
+    assert result.pull == pytest.approx(
+        abs(np.log(result.value / result.nominal)) / stated, rel=0.05
+    )
 
 
-def test_no_sheet_stands_in_for_friction_that_grows_with_frequency():
-    """Attenuation by steady friction is the same at all frequencies: whatever the line's numbers,
-    unsteady friction's root of frequency is not to be had."""
-    fit, pool = accepted(EFFECTS["unsteady_friction"], {})
-    (base,) = pool.fit([{"hypothesis": ()}])
-    (found,) = compare_without_each_effect(pool, base, fit)
-    assert not found.rivals and not found.refutes
-    assert found.evidence == fit.evidence - base.evidence > 100.0
+def test_no_line_parameter_absorbs_friction_that_grows_with_frequency():
+    """Steady friction attenuates all frequencies alike, so no value of any line parameter gives the
+    attenuation of unsteady friction, which grows with the root of frequency."""
+    fit, workers = accepted(EFFECTS["unsteady_friction"], {})
+    (base,) = workers.fit([FitJob(())])
+    (result,) = compare_without_each_effect(workers, base, fit)
+    assert not result.rivals and not result.refutes
+    assert result.evidence == fit.evidence - base.evidence > 100.0
 
 
-def test_what_one_number_of_the_line_accounts_for_refutes_an_effect():
-    """A liquid nine times as viscous as the sheet says takes the same share of every frequency. A
-    wall that yields with delay damps too, and a fit with it is the best that the sheet allows; with
-    the viscosity free and no wall the data are met to their noise."""
+def test_a_line_parameter_that_explains_everything_refutes_an_effect():
+    """The liquid is nine times as viscous as the data sheet says. A viscoelastic wall damps too,
+    and is the best explanation that the data sheet allows.
+
+    With wide priors and without the wall the data are fitted to their noise, so the name is
+    withdrawn."""
     hypothesis = ((EFFECTS["viscoelastic_wall"], Place("segment 1")),)
     points = {"points": ((1000, PRESSURE),), "source": 0.0, "noise": 500.0}
     bench, recorded, _ = make(np.random.default_rng(5), values={"viscosity": 2.9e-4}, **points)
     data = select_fitted_frequencies(recorded, bench)
-    pool = Workers(Twin(bench, data), data)
-    base, wall = pool.fit([{"hypothesis": ()}, {"hypothesis": hypothesis}])
-    (found,) = compare_without_each_effect(pool, base, wall)
+    workers = Workers(Twin(bench, data), data)
+    base, wall = workers.fit([FitJob(()), FitJob(hypothesis)])
+    (result,) = compare_without_each_effect(workers, base, wall)
     assert wall.evidence > base.evidence
-    assert found.refutes and found.parameter == "viscosity"
-    assert found.value == pytest.approx(2.9e-4, rel=0.02)
-    named = Judgement("ambiguous", wall, (("viscoelastic_wall", "side_branch"),))
-    assert withdraw_refuted_name(named, [found]) == Judgement("unexplained", wall)
-    assert withdraw_refuted_name(named, [replace(found, refutes=False)]) == named
-    assert withdraw_refuted_name(Judgement("consistent", base), [found]).verdict == "consistent"
+    assert result.refutes and result.parameter == "viscosity"
+    assert result.value == pytest.approx(2.9e-4, rel=0.02)
+    named = Decision("ambiguous", wall, (("viscoelastic_wall", "side_branch"),))
+    assert withdraw_refuted_name(named, [result]) == Decision("unexplained", wall)
+    assert withdraw_refuted_name(named, [replace(result, refutes=False)]) == named
+    assert withdraw_refuted_name(Decision("consistent", base), [result]).verdict == "consistent"
 
 
-def test_loosened_is_never_tighter_than_stated():
-    """Twenty times the stated, at most 30 %, and no less than stated where that is more."""
+def test_wide_priors_are_never_narrower_than_stated():
+    """Twenty times the stated uncertainty, at most 30 %, and at least as stated."""
     stated = Uncertainty(length=0.001, diameter=0.03, wave_speed=0.05, viscosity=0.4)
-    free = widen_priors(replace(rig(), uncertainty=stated)).uncertainty
-    assert (free.length, free.diameter, free.wave_speed) == (0.02, 0.3, 0.3)
-    assert free.viscosity == 0.4
+    wide = widen_priors(replace(rig(), uncertainty=stated)).uncertainty
+    assert (wide.length, wide.diameter, wide.wave_speed) == (0.02, 0.3, 0.3)
+    assert wide.viscosity == 0.4

@@ -1,4 +1,4 @@
-"""Intervals of an explanation's parameters: profiles, and what a second valley does to them."""
+"""Profile intervals of an explanation's parameters."""
 
 from dataclasses import replace
 
@@ -12,6 +12,7 @@ from rippletwin.explanation.checks.profile_intervals import (
     INTERVAL_RISE,
     MAX_RISE,
     PROFILE_DISTANCES,
+    ProfileJob,
     ProfileTrace,
     add_profile_intervals,
     effect_intervals,
@@ -34,70 +35,70 @@ AT = np.array((0.0, *PROFILE_DISTANCES))
 
 @pytest.fixture(scope="module")
 def hose():
-    """(pool in this process, fit from the truth)."""
+    """(workers in this process, fit from the truth)."""
     bench, observations, truth = make(np.random.default_rng(4), HOSE, TRUTH)
     fit = refine(Twin(bench, observations), HOSE, observations, [truth.theta])
     return Workers(Twin(bench, observations), observations), fit
 
 
-def test_a_parabola_ends_where_a_normal_distribution_does():
-    """Of a normal posterior the profile's interval is 1.96 standard deviations."""
+def test_a_parabola_gives_the_interval_of_a_normal_distribution():
+    """For a normal posterior the interval ends at 1.96 standard deviations."""
     assert interpolate_crossing(AT, AT**2 / 2) == pytest.approx(1.96, abs=1e-3)
 
 
-def test_a_second_valley_belongs_to_the_interval():
-    """What is as likely beyond a ridge is inside; the interval ends where the posterior falls for
-    good, and at the last place asked where it does not."""
+def test_the_interval_contains_a_second_local_mode():
+    """The interval ends at the last crossing, beyond a second mode, or at the last point of the
+    profile if there is no crossing."""
     assert 4.0 < interpolate_crossing(AT, np.array([0.0, 1.1, 3.0, 0.5, 9.0])) < 6.0
     assert interpolate_crossing(AT, np.array([0.0, 0.1, 0.2, 0.3, 0.4])) == PROFILE_DISTANCES[-1]
 
 
 @pytest.mark.parametrize("side", [-1, 1])
-def test_at_the_end_the_posterior_has_fallen_by_what_it_should(hose, side):
-    """Held at the interval's end, everything else fitted from the mode again, minus the log
-    posterior is RISE above the mode's: straight lines between a few places are good enough."""
-    pool, fit = hose
+def test_the_log_posterior_has_fallen_by_the_quantile_at_the_interval_end(hose, side):
+    """With one parameter fixed at the interval's end and the rest refitted from the mode, minus the
+    log posterior is INTERVAL_RISE above the mode's: a few points of the profile suffice."""
+    workers, fit = hose
     k = fit.twin.index["viscoelastic_wall@segment 2.compliance_ratio"]
-    end = trace_profile(pool.base, pool.observations, {"fit": fit, "held": k, "side": side}).end
+    end = trace_profile(workers.base, workers.observations, ProfileJob(fit, k, side)).end
     theta = fit.twin.theta.copy()
     theta[k] = end
-    posterior = Posterior(fit.twin, pool.observations)
-    value = descend(posterior, theta, 30, held=[k])[1]
+    posterior = Posterior(fit.twin, workers.observations)
+    value = descend(posterior, theta, 30, fixed=[k])[1]
     assert value - fit.objective == pytest.approx(INTERVAL_RISE, abs=0.2 * INTERVAL_RISE)
     assert side * (end - fit.twin.theta[k]) > 0
 
 
-def test_intervals_hold_the_truth_and_what_is_held_stays(hose):
-    """The interval of each parameter holds its true value, in the verdict's units; a descent does
-    not move what it is told to hold."""
-    pool, fit = hose
-    (entry,) = effect_intervals(add_profile_intervals(pool, fit))
+def test_intervals_contain_the_truth_and_a_fixed_parameter_stays(hose):
+    """The interval of each parameter contains its true value, in the verdict's units. A descent
+    does not move a fixed parameter."""
+    workers, fit = hose
+    (entry,) = effect_intervals(add_profile_intervals(workers, fit))
     for name, parameter in entry["parameters"].items():
         low, high = parameter["ci95"]
         assert low < parameter["value"] < high
         assert low < TRUTH[f"viscoelastic_wall@segment 2.{name}"] < high
     start = fit.twin.theta + 0.1
-    theta, _ = descend(Posterior(fit.twin, pool.observations), start, 3, held=[2])
+    theta, _ = descend(Posterior(fit.twin, workers.observations), start, 3, fixed=[2])
     assert theta[2] == start[2] and np.all(theta[:2] != start[:2])
 
 
-def test_a_better_mode_on_the_way_takes_over(hose):
-    """Where a walk comes to something likelier, the fit goes there and is asked again."""
+def test_a_better_mode_on_a_profile_replaces_the_fit(hose):
+    """Where a profile finds a better point, the fit is repeated from it and profiled again."""
     _, fit = hose
     better = replace(fit, objective=fit.objective - 10.0)
     far = fit.twin.theta + 1.0
 
-    class Pool:
+    class StubWorkers:
         def map(self, function, jobs):
-            left = [job["fit"].objective for job in jobs]
+            left = [job.fit.objective for job in jobs]
             new = left[0] == better.objective
             value = better.objective if new else better.objective + MAX_RISE
-            return [ProfileTrace(job["side"] * (2.0 if new else 1.0), value, far) for job in jobs]
+            return [ProfileTrace(job.side * (2.0 if new else 1.0), value, far) for job in jobs]
 
         def fit(self, jobs):
-            assert np.array_equal(jobs[0]["theta"], far)
+            assert np.array_equal(jobs[0].start.theta, far)
             return [better]
 
-    found = add_profile_intervals(Pool(), fit)
+    found = add_profile_intervals(StubWorkers(), fit)
     assert found.objective == better.objective
     assert set(found.interval_ends.values()) == {(-2.0, 2.0)}

@@ -1,4 +1,4 @@
-"""Stretches of frequency and shaft angle of residuals that were made to lie there."""
+"""Frequency bands and shaft angles of residuals that were made to lie there."""
 
 import numpy as np
 import pytest
@@ -7,42 +7,42 @@ from rippletwin.explanation.localise import residual_bands
 
 
 @pytest.mark.parametrize("low, high", [(900.0, 1500.0), (2200.0, 3900.0), (150.0, 700.0)])
-def test_one_band_is_one_band(low, high):
-    """Noisy excess in one band at the harmonics of three speeds gives one interval, its ends
-    within two harmonics of the true ones, where single harmonics would give a dozen."""
+def test_a_noisy_band_gives_one_interval(low, high):
+    """Noisy excess in one band at the harmonics of three speeds gives one interval, with its ends
+    within two harmonics of the true ones; single harmonics would give a dozen."""
     rng = np.random.default_rng(1)
     frequency = np.concatenate([f * np.arange(1, int(4000 / f) + 1) for f in (150.0, 180.0, 225.0)])
     size = rng.exponential(1.0, len(frequency))
     inside = (frequency >= low) & (frequency <= high)
     size[inside] = 200.0 * rng.exponential(1.0, inside.sum())
-    (found,) = residual_bands.frequency_stretches(frequency, size, 225.0)
+    (found,) = residual_bands.find_frequency_bands(frequency, size, 225.0)
     assert abs(found[0] - low) < 450 and abs(found[1] - high) < 450
 
 
-def test_two_bands_stay_two():
-    """Excess in two bands far apart is not joined over the gap, which holds none."""
+def test_two_distant_bands_stay_apart():
+    """Excess in two distant bands is not joined across the gap."""
     frequency = 150.0 * np.arange(1, 27)
     size = np.ones(26)
     size[1:4] = 100.0
     size[19:24] = 100.0
-    found = residual_bands.frequency_stretches(frequency, size, 150.0)
+    found = residual_bands.find_frequency_bands(frequency, size, 150.0)
     assert len(found) == 2
     assert found[0][1] < 1000 < 2500 < found[1][0]
 
 
-def test_scattered_excess_gives_few_bands_that_hold_most_of_it():
-    """Every second harmonic in excess: at most four bands, with 85 % of it inside."""
+def test_scattered_excess_gives_few_bands_with_most_of_it():
+    """If every second harmonic is in excess, at most four bands hold 85 % of it."""
     frequency = 150.0 * np.arange(1, 27)
     size = np.where(np.arange(26) % 2, 100.0, 1.0)
-    found = residual_bands.frequency_stretches(frequency, size, 150.0)
-    assert len(found) <= residual_bands.MAX_STRETCHES
+    found = residual_bands.find_frequency_bands(frequency, size, 150.0)
+    assert len(found) <= residual_bands.MAX_INTERVALS
     inside = np.any([(frequency >= a) & (frequency <= b) for a, b in found], axis=0)
     assert np.sum(size[inside] - 1) > 0.85 * np.sum(size - 1)
 
 
-def test_no_excess_no_band():
-    """A residual as small as believed has no band."""
-    assert residual_bands.frequency_stretches(np.arange(1.0, 20.0), np.full(19, 0.5), 1.0) == []
+def test_a_residual_of_the_expected_size_has_no_band():
+    """A mean square below 1 everywhere gives no band."""
+    assert residual_bands.find_frequency_bands(np.arange(1.0, 20.0), np.full(19, 0.5), 1.0) == []
 
 
 def burst(at_deg, width_deg, pitch_deg=40.0, harmonics=26, samples=360):
@@ -55,23 +55,23 @@ def burst(at_deg, width_deg, pitch_deg=40.0, harmonics=26, samples=360):
 
 @pytest.mark.parametrize("at", [5.0, 25.0, 33.0])
 def test_a_burst_is_found_at_its_angle(at):
-    """A burst of 1 degree gives one stretch with its angle inside, a quarter of the pitch long at
-    most though its wave changes sign many times."""
+    """A burst of 1 degree gives one interval that contains its angle and is at most a quarter of
+    the pitch long, though the wave changes sign many times."""
     rng = np.random.default_rng(2)
     noise = rng.normal(size=(2, 360)) * 0.05
-    (found,) = residual_bands.angle_stretches(burst(at, 1.0) + noise[0] + 1j * noise[1], 40.0)
+    (found,) = residual_bands.find_angle_intervals(burst(at, 1.0) + noise[0] + 1j * noise[1], 40.0)
     assert found[0] < at < found[1]
     assert found[1] - found[0] < 10.0
 
 
-def test_a_burst_at_the_seam_is_cut_there_only():
-    """About angle 0 the stretch comes as its two parts, together as short."""
-    first, last = residual_bands.angle_stretches(burst(0.0, 1.0), 40.0)
+def test_a_burst_at_angle_0_gives_two_parts_of_one_interval():
+    """The interval around angle 0 is returned as its two parts, together as short."""
+    first, last = residual_bands.find_angle_intervals(burst(0.0, 1.0), 40.0)
     assert first[0] == 0.0 and last[1] == 40.0
     assert first[1] + 40.0 - last[0] < 10.0
 
 
-def test_a_steady_tone_has_no_angle():
-    """A residual of one harmonic has the same envelope at all angles: no stretch."""
+def test_a_single_harmonic_has_no_angle():
+    """A residual of one harmonic has the same envelope at all angles, hence no interval."""
     wave = np.exp(2j * np.pi * 5 * np.arange(360) / 360)
-    assert residual_bands.angle_stretches(wave, 40.0) == []
+    assert residual_bands.find_angle_intervals(wave, 40.0) == []

@@ -1,77 +1,84 @@
-"""What a verdict says in words where nothing but shaft orders are amiss."""
+"""The verdict's sentence: what it says for each kind of verdict."""
 
 from types import SimpleNamespace
 
 import pytest
 
-from rippletwin.explanation.verdict.summary_text import is_air_at_one_pressure
-from rippletwin.explanation.verdict.summary_text import summary_text as sentence
+from rippletwin.explanation.localise.shaft_orders import ShaftOrders
+from rippletwin.explanation.verdict.summary_text import liquid_like_air, summary_text
+
+SPREAD = ShaftOrders(0.02, 1e-9, 0.95, "piston_spread", 0.03)
 
 
-def test_shaft_orders_alone_need_no_effect_of_the_line():
-    """A named effect that acts at shaft orders only: no fit holds it, and the words say so."""
+def summarise(verdict, shaft_orders=None, raised=(), pull=(0.1, "load"), pump=None, **decision):
+    """The sentence of a verdict without effects in the line; its misfits are 2 %."""
+    twin = SimpleNamespace(parameters=(), theta=())
     e = SimpleNamespace(
-        shaft=SimpleNamespace(name="piston_spread", relative=0.02),
-        alarms=SimpleNamespace(ringing=(), pull=(0.0, "load")),
-        judgement=SimpleNamespace(accepted=SimpleNamespace(hypothesis=())),
+        shaft_orders=shaft_orders,
+        alarms=SimpleNamespace(raised=raised, pull=pull, drift=(1e-9, "recording 1")),
+        decision=SimpleNamespace(accepted=SimpleNamespace(hypothesis=(), twin=twin), **decision),
     )
-    e.judgement.accepted.twin = SimpleNamespace(parameters=(), theta=())
-    misfits = {"before": {"held_out": 0.02}, "after": {"held_out": 0.02}}
-    result = {"verdict": "named", "fit": misfits, "next_recording": None, "pump": {}}
-    words = sentence(e, result, [], None)
-    assert "pistons' harmonics the twin lacks nothing" in words
-    assert "2.0% of the ripple show piston spread" in words
+    fit = {"before": {"held_out": 0.02}, "after": {"held_out": 0.02}}
+    result = {"verdict": verdict, "fit": fit, "next_recording": None, "pump": pump or {}}
+    return summary_text(e, result, [])
+
+
+def test_shaft_orders_alone_are_named_without_an_effect_of_the_line():
+    """A verdict that names an effect at shaft orders only says that the rest is complete."""
+    sentence = summarise("named", SPREAD)
+    assert "At the piston orders nothing is missing" in sentence
+    assert "2.0% of the ripple and indicate a spread of the pistons" in sentence
+
+
+def test_an_unexplained_verdict_mentions_the_shaft_orders():
+    """They are an observation, which holds though no effect is established."""
+    sentence = summarise("unexplained", SPREAD)
+    assert "no effect of the library explains" in sentence
+    assert "indicate a spread of the pistons" in sentence
+
+
+def test_bad_data_say_what_contradicts_what_and_nothing_of_the_pump():
+    """Nothing that a fit or the shaft orders of contradicting data indicate is repeated."""
+    sentence = summarise("bad_data", SPREAD, contradiction="sensor p3 is dead")
+    assert sentence == "The data contradict themselves: sensor p3 is dead."
+    drifting = summarise("bad_data", None, ("drift",), contradiction="sensor p3 is dead")
+    assert "recording 1 differ: the state drifted" in drifting
 
 
 @pytest.mark.parametrize(
-    ("ringing", "told"), [((), True), (("pull",), True), (("disagreement",), False)]
+    ("raised", "is_named"), [((), True), (("pull",), True), (("disagreement",), False)]
 )
-def test_calibration_only_names_the_value_that_is_off(ringing, told):
-    """The value furthest from the data sheet, unless points disagree rather than the sheet."""
-    e = SimpleNamespace(
-        shaft=None,
-        alarms=SimpleNamespace(ringing=ringing, pull=(2.9, "diameter[4]")),
-        judgement=SimpleNamespace(accepted=SimpleNamespace(hypothesis=())),
-    )
-    e.judgement.accepted.twin = SimpleNamespace(parameters=(), theta=())
-    misfits = {"before": {"held_out": 0.01}, "after": {"held_out": 0.01}}
-    result = {"verdict": "calibration_only", "fit": misfits, "next_recording": None, "pump": {}}
-    words = sentence(e, result, [], None)
-    assert words.startswith("The line's nominal values are off")
-    assert ("diameter[4] is 2.9 standard deviations from the data sheet" in words) is told
+def test_calibration_only_names_the_value_that_is_off(raised, is_named):
+    """The value furthest from the data sheet is named, unless operating points disagree instead."""
+    sentence = summarise("calibration_only", raised=raised, pull=(2.9, "diameter[4]"))
+    assert "nominal values of the line are outside their stated tolerances" in sentence
+    assert ("diameter[4] is 2.9 standard deviations from the data sheet" in sentence) is is_named
 
 
-def test_the_pump_is_told_where_it_is_not_the_sheets():
-    """Ports late by half a degree are worth a sentence; numbers within their intervals are not."""
-    e = SimpleNamespace(
-        shaft=None,
-        alarms=SimpleNamespace(ringing=(), pull=(0.1, "load")),
-        judgement=SimpleNamespace(accepted=SimpleNamespace(hypothesis=())),
-    )
-    e.judgement.accepted.twin = SimpleNamespace(parameters=(), theta=())
+def test_the_pump_is_mentioned_if_it_differs_from_the_data_sheet():
+    """Ports that open half a degree late are mentioned; a value within its interval is not."""
     modulus = {"value": 1.21e9, "sheet": 1.25e9, "ci95": [1.15e9, 1.27e9], "unit": "Pa"}
     timing = {"value": 0.5, "sheet": 0.0, "ci95": [0.4, 0.6], "unit": "deg"}
-    result = {
-        "verdict": "consistent",
-        "fit": {"before": {"held_out": 0.01}, "after": {"held_out": 0.01}},
-    }
-    result |= {"next_recording": None, "pump": {"bulk_modulus": modulus, "port_timing": timing}}
-    assert "its port plate 0.50 deg late" in sentence(e, result, [], None)
+    pump = {"bulk_modulus": modulus, "port_timing": timing}
+    assert "ports that open 0.50 deg late" in summarise("consistent", pump=pump)
     timing["ci95"] = [-0.1, 1.1]
-    assert "port plate" not in sentence(e, result, [], None)
+    assert "ports" not in summarise("consistent", pump=pump)
 
 
 @pytest.mark.parametrize(
-    ("name", "pressures", "told"),
+    ("name", "pressures", "is_warned"),
     [
         ("entrained_air", (9e6,), True),
         ("entrained_air", (9e6, 9.1e6), True),
         ("entrained_air", (9e6, 7e6), False),
+        ("entrained_air", (None,), False),
         ("unsteady_friction", (9e6,), False),
     ],
 )
-def test_air_at_one_pressure_may_be_another_liquid(name, pressures, told):
-    """A liquid that stiffens by another law was called air where one pressure was recorded (sealed
-    trials 9 and 15): the words say so there, and nowhere else."""
-    (words,) = is_air_at_one_pressure([name, "leak"], pressures) or ("",)
-    assert ("any liquid that stiffens" in words) is told
+def test_air_at_one_pressure_may_be_another_liquid(name, pressures, is_warned):
+    """At one pressure a liquid that stiffens by another law fits as well as entrained air.
+
+    The sentence says so there, and nowhere else."""
+    warning = liquid_like_air([name, "leak"], pressures)
+    assert (len(warning) == 1) is is_warned
+    assert all("any liquid that stiffens" in sentence for sentence in warning)

@@ -10,7 +10,7 @@ from rippletwin.flow_sensor.estimate import band_limit
 from rippletwin.flow_sensor.line_response import line_response
 from rippletwin.flow_sensor.spectral_inversion import estimate_flow
 from rippletwin.flow_sensor.trunk import Trunk, equations
-from rippletwin.line.frequency_domain.line_network import Network
+from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
 
 BAND = 750.0  # five pumping frequencies: half the default, to train in seconds
@@ -42,7 +42,7 @@ def lumped(speed_hz, orders):
     """
     s = 2j * np.pi * orders * speed_hz
     diameters, speeds = (0.02, 0.015), (1000.0, 1300.0)
-    return Network(
+    return FrequencyDomainLine(
         s=s,
         lengths=np.array([2.0, 1.0]),
         series=np.array(

@@ -6,7 +6,8 @@ import pytest
 from rippletwin.flow_sensor.estimate import band_limit, orders_within
 from rippletwin.flow_sensor.line_response import line_response
 from rippletwin.flow_sensor.spectral_inversion import estimate_flow
-from rippletwin.line.frequency_domain.line_network import Network
+from rippletwin.harmonics import one_period, peak_amplitudes
+from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
 
 SAMPLES, SPEED, BAND = 3072, 1000 / 60, 1500.0
@@ -30,7 +31,7 @@ def line(positions=TWO, wave_speed_factor=1.0, resistance=RESISTANCE, own=0.0):
             shunt_admittance(s, density=870, wave_speed=a * wave_speed_factor, diameter=d)
             for a, d in zip(WAVE_SPEEDS, DIAMETERS)
         ]
-        return Network(
+        return FrequencyDomainLine(
             s=s,
             lengths=LENGTHS,
             series=np.array(series),
@@ -47,19 +48,16 @@ def ripples(count, rng):
     """Smooth random flow ripples (count, M), m3/s: all shaft orders, falling with frequency."""
     orders = np.arange(1, SAMPLES // 2)
     size = 2e-5 / (1 + orders / 30)
-    spectrum = np.zeros((count, SAMPLES // 2 + 1), complex)
     shape = (count, len(orders))
-    spectrum[:, orders] = size * (rng.standard_normal(shape) + 1j * rng.standard_normal(shape))
-    return np.fft.irfft(spectrum * SAMPLES / 2, SAMPLES)
+    harmonics = size * (rng.standard_normal(shape) + 1j * rng.standard_normal(shape))
+    return one_period(harmonics, SAMPLES, orders)
 
 
 def record(network, flow, noise, rng, speed=SPEED):
     """Windows (n, S, M) that the sensors read for `flow` (n, M)."""
     orders = np.arange(1, SAMPLES // 2)
     response = network(speed, orders).readings()  # of unit flow
-    spectrum = np.zeros((len(flow), len(response), SAMPLES // 2 + 1), complex)
-    spectrum[..., orders] = response * np.fft.rfft(flow)[:, None, orders]
-    windows = np.fft.irfft(spectrum, SAMPLES)
+    windows = one_period(response * peak_amplitudes(flow)[:, None, orders], SAMPLES, orders)
     return windows + noise * rng.standard_normal(windows.shape)
 
 
@@ -69,7 +67,7 @@ def error(flow, truth):
 
 
 def test_waves_reproduce_the_network():
-    """line_response against Network's own sweep: readings, source flow and load from the waves."""
+    """Waves at the pump give the readings, source flow and load of the line's own sweep."""
     orders = np.arange(1, 200)
     network = line(THREE, own=1e-14)(SPEED, orders)
     network.inserts.append((0.0, "shunt", 3e-14 * network.s))
@@ -111,7 +109,7 @@ def test_source_admittance_is_part_of_the_source():
     assert error(found.flow, flow) < 1e-4
     outlet = estimate_flow(windows, SPEED, network, 1.0, BAND, model_error=1e-5, of="outlet")
     at_pump = network(SPEED, outlet.orders).flow_at([0.0])[0]  # of unit source flow
-    expected = at_pump * np.fft.rfft(flow)[:, outlet.orders] * 2 / SAMPLES
+    expected = at_pump * peak_amplitudes(flow)[:, outlet.orders]
     np.testing.assert_allclose(outlet.harmonics, expected, atol=1e-4 * np.abs(expected).max())
     assert error(outlet.flow, flow) > 0.1
 
@@ -137,7 +135,7 @@ def test_stated_standard_deviation_is_that_of_the_errors():
     flow = ripples(400, rng)
     windows = record(line(), flow, 2000.0, rng)
     found = estimate_flow(windows, SPEED, line(), 2000.0, BAND, model_error=0.0, load_error=None)
-    truth = np.fft.rfft(flow)[:, found.orders] * 2 / SAMPLES
+    truth = peak_amplitudes(flow)[:, found.orders]
     rms = np.sqrt(np.mean(np.abs(found.harmonics - truth) ** 2, axis=0))
     measured = found.standard_deviation < 0.2 * found.prior
     ratio = (rms / found.standard_deviation)[measured]
@@ -153,7 +151,7 @@ def test_half_wave_blind_sensors_neither_explode_nor_blind_the_estimate():
     blind = line((0.4167, 0.4167 + apart))
     flow = ripples(50, rng)
     windows = record(blind, flow, 1000.0, rng)
-    truth = np.fft.rfft(flow)[:, 18] * 2 / SAMPLES
+    truth = peak_amplitudes(flow)[:, 18]
     alone = estimate_flow(windows, SPEED, blind, 1000.0, BAND, load_error=None)
     helped = estimate_flow(windows, SPEED, blind, 1000.0, BAND, load_error=0.1)
     size = np.sqrt(np.mean(np.abs(truth) ** 2))
@@ -180,7 +178,7 @@ def test_wrong_wave_speed_costs_accuracy_above_all_at_high_frequency():
     flow = ripples(20, rng)
     windows = record(line(THREE), flow, 500.0, rng)
     found = estimate_flow(windows, SPEED, line(THREE, wave_speed_factor=1.01), 500.0, BAND)
-    truth = np.fft.rfft(flow)[:, found.orders] * 2 / SAMPLES
+    truth = peak_amplitudes(flow)[:, found.orders]
     wrong = np.sum(np.abs(found.harmonics - truth) ** 2, axis=0)
     size = np.sum(np.abs(truth) ** 2, axis=0)
     low, high = (np.sqrt(wrong[b].sum() / size[b].sum()) for b in (slice(0, 20), slice(60, 90)))

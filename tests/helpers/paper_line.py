@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from rippletwin.line.frequency_domain.line_network import Network
+from rippletwin.harmonics import one_period
+from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
 from rippletwin.line.time_domain.line_elements import Pipe
 
@@ -36,7 +37,7 @@ def immittances(s, pipes=PIPES, friction="unsteady", viscosity=VISCOSITY):
 def network(s, pipes=PIPES, friction="unsteady", viscosity=VISCOSITY, **options):
     series, shunt = immittances(s, pipes, friction, viscosity)
     lengths = np.array([p.length for p in pipes])
-    return Network(s=s, lengths=lengths, series=series, shunt=shunt, **options)
+    return FrequencyDomainLine(s=s, lengths=lengths, series=series, shunt=shunt, **options)
 
 
 def ripple(orders, mean=MEAN_FLOW, depth=0.05, corner_hz=1000.0, base_hz=PUMPING_HZ):
@@ -50,7 +51,4 @@ def ripple(orders, mean=MEAN_FLOW, depth=0.05, corner_hz=1000.0, base_hz=PUMPING
 
 def samples(harmonics, orders, mean, count):
     """One period (count,) from peak amplitudes at whole orders."""
-    spectrum = np.zeros(count // 2 + 1, complex)
-    spectrum[orders] = harmonics * count / 2
-    spectrum[0] = mean * count
-    return np.fft.irfft(spectrum, count)
+    return mean + one_period(harmonics, count, orders)

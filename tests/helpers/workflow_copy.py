@@ -48,7 +48,7 @@ architectures: [cnn1d_341_100, cnn2d_7_2]
 
 def make(folder: Path) -> None:
     """The workflow, its library and a case in `folder`, with scripts that only make outputs."""
-    for name in ("workflow", "config", "src", "resources"):
+    for name in ("workflow", "config", "src", "resources", "profiles"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "Snakefile", folder)
     for script in (folder / "workflow" / "scripts").glob("*.py"):

@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import expm
 
 from paper_line import DENSITY, PIPES, SENSORS, immittances, network
-from rippletwin.line.frequency_domain.line_network import Insert, Network
+from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine, Insert
 
 S = 2j * np.pi * np.array([3.0, 150.0, 1234.5, 4999.0])
 
@@ -210,4 +210,6 @@ def test_wrong_use_is_refused():
     with pytest.raises(ValueError, match="load"):
         network(S, load=("valve", None)).pressure_at([0.0])
     with pytest.raises(ValueError, match="shunt"):
-        Network(S, net.lengths, net.series, net.shunt, inserts=[(1.0, "x", S)]).pressure_at([0.0])
+        FrequencyDomainLine(
+            S, net.lengths, net.series, net.shunt, inserts=[(1.0, "x", S)]
+        ).pressure_at([0.0])

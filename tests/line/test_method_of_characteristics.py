@@ -18,10 +18,17 @@ from paper_line import (
     samples,
 )
 from rippletwin.line.frequency_domain.line_network import Insert
-from rippletwin.line.time_domain.line_elements import Branch, Element, End, Line, Pipe, capacitance
+from rippletwin.line.time_domain.line_elements import (
+    Branch,
+    Element,
+    End,
+    Pipe,
+    TimeDomainLine,
+    capacitance,
+)
 from rippletwin.line.time_domain.method_of_characteristics import simulate, steps_a_period
-from rippletwin.line.time_domain.weighting_functions import summed_friction
 from rippletwin.twin.effects.side_branch import branch_admittance
+from summed_friction import summed_friction
 
 OIL = {"density": DENSITY, "viscosity": VISCOSITY}
 ORIFICE = End("orifice", 0.0, COEFFICIENT)
@@ -51,7 +58,7 @@ def test_lossless_is_the_frequency_domain(load):
     net = network(s, pipes, "none", source_flow=ripple(orders))
     net.load = ("anechoic", None) if load == "anechoic" else ("impedance", 6e9 + 0 * s)
     moc = simulate(
-        Line(
+        TimeDomainLine(
             pipes,
             samples(net.source_flow, orders, MEAN_FLOW, steps),
             PERIOD,
@@ -75,7 +82,9 @@ def test_joukowsky():
     flow = np.where(np.arange(2000) < 1000, 1e-5, -1e-5)  # mean zero: steady start is rest
     positions = [0.0, 5.0, 10.0]
     moc = simulate(
-        Line([pipe], flow, 0.04, End("closed"), friction="none", positions=positions, **OIL),
+        TimeDomainLine(
+            [pipe], flow, 0.04, End("closed"), friction="none", positions=positions, **OIL
+        ),
         periods=1,
     )
     t = np.arange(1, 2001) * 0.04 / 2000  # the state after each step
@@ -92,7 +101,7 @@ def test_steady_flow_loses_hagen_poiseuille():
     """A steady flow through the whole line: 128 mu L q/(pi D^4) summed (analytic)."""
     flow = np.full(512, MEAN_FLOW)
     ends = [0.0, sum(p.length for p in PIPES)]
-    moc = simulate(Line(PIPES, flow, PERIOD, ORIFICE, positions=ends, **OIL), periods=20)
+    moc = simulate(TimeDomainLine(PIPES, flow, PERIOD, ORIFICE, positions=ends, **OIL), periods=20)
     loss = sum(128 * DENSITY * VISCOSITY * p.length / (np.pi * p.diameter**4) for p in PIPES)
     drop = moc.pressure[0] - moc.pressure[1]
     assert np.allclose(drop, loss * MEAN_FLOW, rtol=1e-9)
@@ -106,7 +115,7 @@ def against_balance(friction, steps, orders=ORDERS, depth=0.05):
     net = network(s, friction=friction, source_flow=ripple(orders, depth=depth))
     steps = steps_a_period(PIPES, PERIOD, steps)
     moc = simulate(
-        Line(
+        TimeDomainLine(
             PIPES,
             samples(net.source_flow, orders, MEAN_FLOW, steps),
             PERIOD,
@@ -153,7 +162,7 @@ def short_line(steps, friction="unsteady", pipes=SHORT, inserts=(), source=0.0):
     net.load = ("impedance", 4e9 + 0 * s)
     net.inserts = [in_the_chain(insert, s, friction) for insert in inserts]
     net.source_admittance = source * s
-    line = Line(
+    line = TimeDomainLine(
         pipes,
         samples(net.source_flow, orders, MEAN_FLOW, steps),
         PERIOD,
@@ -293,7 +302,7 @@ def test_energy_is_conserved_over_a_period():
     orders = np.arange(1, 40)
     end = sum(p.length for p in pipes)
     moc = simulate(
-        Line(
+        TimeDomainLine(
             pipes,
             samples(ripple(orders), orders, MEAN_FLOW, 256),
             PERIOD,
@@ -315,7 +324,9 @@ def test_energy_is_conserved_over_a_period():
 def test_what_has_not_settled_says_so():
     """Stopped after two periods the run is not converged and names a place on the line."""
     flow = samples(ripple([1]), [1], MEAN_FLOW, 512)
-    moc = simulate(Line(PIPES, flow, PERIOD, ORIFICE, positions=SENSORS, **OIL), periods=2)
+    moc = simulate(
+        TimeDomainLine(PIPES, flow, PERIOD, ORIFICE, positions=SENSORS, **OIL), periods=2
+    )
     assert not moc.converged and moc.periods == 2 and moc.change > 1e-3
     assert 0 <= moc.worst_position <= sum(p.length for p in PIPES)
 
@@ -323,10 +334,12 @@ def test_what_has_not_settled_says_so():
 def test_wrong_use_is_refused():
     flow = np.full(64, MEAN_FLOW)
     with pytest.raises(ValueError, match="closed"):
-        simulate(Line(PIPES, flow, PERIOD, End("closed"), **OIL))
+        simulate(TimeDomainLine(PIPES, flow, PERIOD, End("closed"), **OIL))
     with pytest.raises(ValueError, match="shorter"):
-        simulate(Line([Pipe(0.01, 0.02, 1000.0)], flow, PERIOD, ORIFICE, **OIL))
+        simulate(TimeDomainLine([Pipe(0.01, 0.02, 1000.0)], flow, PERIOD, ORIFICE, **OIL))
     with pytest.raises(ValueError, match="outside"):
-        simulate(Line(PIPES, np.full(512, MEAN_FLOW), PERIOD, ORIFICE, positions=[9.0], **OIL))
+        simulate(
+            TimeDomainLine(PIPES, np.full(512, MEAN_FLOW), PERIOD, ORIFICE, positions=[9.0], **OIL)
+        )
     with pytest.raises(ValueError, match="end"):
-        simulate(Line(PIPES, np.full(512, MEAN_FLOW), PERIOD, End("valve"), **OIL))
+        simulate(TimeDomainLine(PIPES, np.full(512, MEAN_FLOW), PERIOD, End("valve"), **OIL))

@@ -1,7 +1,8 @@
 """Periodic steady state of a line with a nonlinear load, by harmonic balance.
 
-The linear rest of the system is one relation a p + b q = c per harmonic (`Network.load_relation`),
-whatever effects it carries; the load is a law q = f(p) in the time domain. Both hold at once where
+The linear rest of the system is one relation a p + b q = c per harmonic
+(`FrequencyDomainLine.load_relation`), whatever effects it carries; the load is a law q = f(p) in
+the time domain. Both hold at once where
 
     r(P) = a P + b F[f(p0 + p(t))] - c = 0,       F[] the harmonics of a period.
 
@@ -18,10 +19,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
+from scipy.fft import next_fast_len
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from rippletwin.line.frequency_domain.line_network import Network
+from rippletwin.harmonics import one_period, peak_amplitudes
+from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 
 OVERSAMPLING = 4  # samples a period over the highest order: products to third order alias nowhere
 _SMOOTH = 1e-4  # of the mean drop: below it the orifice law is linear, so that its slope is finite
@@ -58,7 +60,7 @@ def square_law(drop: np.ndarray, mean_drop: float) -> tuple[np.ndarray, np.ndarr
 
 
 def balance_orifice(
-    network: Network,
+    network: FrequencyDomainLine,
     *,
     mean_pressure: float,
     coefficient: float | None = None,
@@ -100,7 +102,7 @@ def balance_orifice(
 
 
 def balance(
-    network: Network,
+    network: FrequencyDomainLine,
     law: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
     *,
     orders: np.ndarray | None = None,
@@ -166,7 +168,7 @@ class _Grid:
     samples: int
 
     @classmethod
-    def of(cls, network: Network, orders: np.ndarray | None) -> _Grid:
+    def of(cls, network: FrequencyDomainLine, orders: np.ndarray | None) -> _Grid:
         s = network.s
         orders = np.arange(1, len(s) + 1) if orders is None else np.asarray(orders)
         whole = orders.astype(int)
@@ -175,9 +177,7 @@ class _Grid:
         return cls(whole, next_fast_len(OVERSAMPLING * int(whole.max()) + 1, real=True))
 
     def wave(self, harmonics: np.ndarray) -> np.ndarray:
-        spectrum = np.zeros(self.samples // 2 + 1, complex)
-        spectrum[self.orders] = 0.5 * self.samples * harmonics
-        return irfft(spectrum, self.samples)
+        return one_period(harmonics, self.samples, self.orders)
 
     def harmonics(self, wave: np.ndarray) -> np.ndarray:
-        return rfft(wave)[self.orders] * (2.0 / self.samples)
+        return peak_amplitudes(wave)[self.orders]

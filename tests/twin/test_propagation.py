@@ -12,8 +12,7 @@ import pytest
 
 from rippletwin.case.model import FlowRipple, Fluid, Load, Rig, Segment, Sensor
 from rippletwin.line.time_domain.weighting_functions import conduction_terms
-from rippletwin.twin.effects.base import LineState, Place
-from rippletwin.twin.effects.end_radiation import radiation_element, radiation_impedance
+from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS, candidates
 from rippletwin.twin.effects.thermal_boundary_layer import thermal_factor
 from rippletwin.twin.propagation import propagate
@@ -178,18 +177,3 @@ def test_conducting_terms_are_the_boundary_layer():
         exact = thermal_factor(s, 1.5e-5, 2.0 * radius, 1.4, 0.71)
         assert np.max(np.abs(summed - exact) / np.abs(exact - 1.0)) < 0.002
         assert min(kappa for kappa, _ in terms) > 0.0
-
-
-def test_radiating_element_is_the_open_end():
-    """To second order in kR it is Levine and Schwinger's end, and passive at every frequency."""
-    state = LineState(1.2, 1.5e-5, np.array([0.01]), np.array([343.0]), np.array([1.0]))
-    characteristic = 1.2 * 343.0 / state.area(0)
-    for end_correction in (0.5, 0.6133, 0.8217):
-        element = radiation_element(state, end_correction)
-        kr = np.array([0.05, 0.1, 0.2, 0.4])
-        s = 1j * kr * 343.0 / 0.005
-        exact = radiation_impedance(s, 0.01, 343.0, 1.2, end_correction)
-        error = np.abs(element.immittance(s) - exact) / characteristic
-        assert np.all(error < 0.2 * kr**4)
-        everywhere = 1j * np.geomspace(1.0, 1e7, 200)
-        assert np.all(element.immittance(everywhere).real >= 0.0)

@@ -7,6 +7,7 @@ import numpy as np
 
 from rippletwin.calibration.misfit import relative_misfit
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor
+from rippletwin.harmonics import peak_amplitudes
 from rippletwin.pump.outlets import Pipe
 from rippletwin.pump.simulation import simulate
 from rippletwin.spectra.observation import Observation
@@ -29,7 +30,7 @@ def coupled():
     )
     truth = simulate(PUMP, OIL, SPEED, Pipe(LINE, PLACES, load_pressure=LOAD))
     orders = 9 * np.arange(1, 26)
-    values = 2.0 * np.fft.rfft(truth.sensor_pressure)[:, orders] / truth.sensor_pressure.shape[1]
+    values = peak_amplitudes(truth.sensor_pressure)[:, orders]
     return rig, Observation(
         kind="periodic",
         label="a",

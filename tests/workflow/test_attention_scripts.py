@@ -25,7 +25,7 @@ def one_thread():
 @pytest.fixture
 def cells(tmp_path):
     """Seeds whose faults are pulses at known places, recordings, and untrained networks of two
-    training seeds, all through `probe` and `attention`: paths of the stores, a network each."""
+    training seeds, through `noise_free_probes` and `attention`: paths of stores, one a network."""
     signal = np.tile(np.sin(2 * np.pi * 9 * np.arange(POINTS) / POINTS), (4, 1, 1))
     for k in range(1, 4):
         signal[k, 0, 100 * k : 100 * k + 40] += k
@@ -47,7 +47,8 @@ def cells(tmp_path):
     )
     probes = tmp_path / "probes.zarr"
     wildcards = {"dataset": "CFD-MOC-P", "revolutions": "1"}
-    run_script("probe", tmp_path, {"o": probes}, wildcards, {}, signals=tmp_path / "seeds.zarr")
+    seeds = tmp_path / "seeds.zarr"
+    run_script("noise_free_probes", tmp_path, {"o": probes}, wildcards, {}, signals=seeds)
     torch.manual_seed(0)
     for name in NETWORKS:
         torch.save([build(name, 1).state_dict() for _ in range(2)], tmp_path / f"{name}.pt")
@@ -69,8 +70,9 @@ def test_from_seeds_to_the_page(tmp_path, cells):
     network with the accuracies given; one group of three networks has a rank correlation."""
     cell = store.load(cells[0])
     for k, fault in enumerate(CLASSES[1:], start=1):
-        inside = np.flatnonzero(cell.fault_region.sel(fault=fault).values)
+        inside = np.flatnonzero(cell.fault_region.sel(state=fault).values)
         assert inside.min() >= 100 * k and inside.max() < 100 * k + 40
+    assert not cell.fault_region.sel(state="H").any()
     assert cell.attended.shape == (2, 3) and cell.recording.values.tolist() == ["H", "S", "C"]
     assert np.nanmax(np.abs(cell.recorded_heat.mean("time") - 1)) < 1e-5
 

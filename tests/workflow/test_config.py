@@ -70,7 +70,6 @@ def test_configurations_are_valid(overlay):
         {"seeds": 0},
         {"sst": {"sise": 64}},
         {"noise": {"factor": -1}},
-        {"datasets": ["CFD"]},
         {"training": {"plain": {"learning_rate": "fast"}}},
         {"colour": "blue"},
     ],

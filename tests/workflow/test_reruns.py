@@ -1,5 +1,6 @@
 """What runs again after an edit: dry runs over Snakemake's real records of a finished run."""
 
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -16,7 +17,7 @@ TESTED_AGAIN = {
     "claims",
     "plot_attention",
     "plot_ranks",
-    "report",
+    "accuracy_table",
     "report_compound",
     "report_cost",
     "plot_accuracy",
@@ -24,7 +25,14 @@ TESTED_AGAIN = {
 }
 # Samples and images are temporary: who needs them again makes them again.
 TIME_AGAIN = {"augment", "train"} | TESTED_AGAIN
-IMAGES_AGAIN = {"augment", "pair", "image", "image_seeds", "train"} | TESTED_AGAIN
+IMAGES_AGAIN = TESTED_AGAIN | {
+    "augment",
+    "pair_windows",
+    "synchrosqueeze",
+    "synchrosqueeze_seeds",
+    "train",
+}
+PICTURES_OF_SIGNALS = {"plot_seeds", "plot_compound_seeds", "compare_sst"}
 
 
 @pytest.fixture(scope="session")
@@ -66,7 +74,7 @@ def test_sst_key_reruns_image_networks_only(workflow):
     """An SST key leaves networks on time windows alone."""
     edit(workflow / "config/config.yaml", "voices: 32", "voices: 24")
     rules, text = planned(workflow)
-    assert rules == IMAGES_AGAIN | {"plot_seeds", "compare_sst"}
+    assert rules == IMAGES_AGAIN | PICTURES_OF_SIGNALS
     assert "cnn2d_7_2.pt" in text and "cnn1d_341_100.pt" not in text
 
 
@@ -81,7 +89,7 @@ def test_prior_in_rig_yaml_reruns_calibration_and_what_needs_the_twin(workflow):
     edit(workflow / "case/rig.yaml", "diameter: 0.03", "diameter: 0.05")
     rules, text = planned(workflow)
     assert {"calibrate", "plot_calibration", "explain", "propagate", "flow_sensor"} <= rules
-    assert not {"ingest", "fault"} & rules
+    assert not {"cut_windows", "simulate_fault"} & rules
     for dataset in ("CFD-MOC-P", "CFD-MOC-P+"):
         assert f"output: out/models/{dataset}/" in text
     assert "output: out/models/CFD-P/" not in text
@@ -90,25 +98,26 @@ def test_prior_in_rig_yaml_reruns_calibration_and_what_needs_the_twin(workflow):
 def test_pump_in_rig_yaml_reruns_faults(workflow):
     """The counterpart: what the pump model reads of rig.yaml does rerun it."""
     edit(workflow / "case/rig.yaml", "pistons: 9", "pistons: 11")
-    assert {"ingest", "fault"} <= planned(workflow)[0]
+    assert {"cut_windows", "simulate_fault"} <= planned(workflow)[0]
 
 
 def test_library_file_reruns_what_imports_it(workflow):
-    """imaging.py is imported by the scripts that make images, and by no other."""
-    edit(workflow / "src/rippletwin/imaging.py", "COLUMNS = 256", "COLUMNS = 128")
-    assert planned(workflow)[0] == IMAGES_AGAIN | {"plot_seeds", "compare_sst"}
+    """Synchrosqueezing is imported by the scripts that make or draw images, and by no other."""
+    module = workflow / "src/rippletwin/learning/synchrosqueezing.py"
+    edit(module, "COLUMNS = 256", "COLUMNS = 128")
+    assert planned(workflow)[0] == IMAGES_AGAIN | PICTURES_OF_SIGNALS
 
 
 def test_effect_file_reruns_calibration(workflow):
-    """The registry imports effects by itself; their files count as sources all the same."""
-    effect = workflow / "src/rippletwin/effects/leak.py"
+    """The library imports effects by computed names; their files count as sources all the same."""
+    effect = workflow / "src/rippletwin/twin/effects/leak.py"
     effect.write_text(effect.read_text() + "\n# edited\n")
     assert "calibrate" in planned(workflow)[0]
 
 
 def test_physics_of_explain_reruns_the_corrected_columns_only(workflow):
     """What only `explain` imports changes the corrected twin, not the calibrated one."""
-    search = workflow / "src/rippletwin/explain/search.py"
+    search = workflow / "src/rippletwin/explanation/search/stepwise_search.py"
     search.write_text(search.read_text() + "\n# edited\n")
     rules, text = planned(workflow)
     assert {"explain", "propagate", "flow_sensor"} <= rules and "calibrate" not in rules
@@ -121,7 +130,10 @@ def test_method_of_the_flow_sensor_reruns_the_flow_columns_only(workflow):
     """Spectral or physics-informed: the flow of recordings changes, no simulation does."""
     edit(workflow / "config/config.yaml", "method: spectral", "method: pinn")
     rules, text = planned(workflow)
-    assert "flow_sensor" in rules and not {"calibrate", "explain", "propagate", "fault"} & rules
+    assert (
+        "flow_sensor" in rules
+        and not {"calibrate", "explain", "propagate", "simulate_fault"} & rules
+    )
     assert "output: out/models/CFD-Q+/" in text and "output: out/models/CFD-MOC-P" not in text
 
 
@@ -130,13 +142,53 @@ def test_a_compound_fault_adds_jobs_of_its_own(workflow):
     what temporary files ask for."""
     edit(workflow / "overlay.yaml", "[[S, C1]]", "[[S, C1], [S, C2]]")
     rules, text = planned(workflow)
-    assert {"fault", "propagate", "seed_signal", "evaluate_compound", "report_compound"} <= rules
+    wanted = "simulate_fault propagate seed_signal evaluate_compound report_compound".split()
+    assert set(wanted) <= rules
     assert "output: out/faults/S+C2.zarr" in text and "output: out/faults/S.zarr" not in text
 
 
+def test_a_row_of_datasets_that_nobody_uses_reruns_nothing(workflow):
+    """Edited or added: the rows of the configured datasets decide, each for itself."""
+    table = workflow / "config/datasets.tsv"
+    edit(table, "experimental\tpressure\trig\tnone", "experimental\tflow\trig\tcalibrated")
+    edit(table, "CFD-P\t", "mine\tflow\ttwin\tcalibrated\tnone\nCFD-P\t")
+    assert planned(workflow)[0] == set()
+
+
+def test_a_row_of_datasets_reruns_its_dataset(workflow):
+    """The flow of CFD-Q+ through the pipe instead of the corrected line: its seed signals are made
+    anew and what follows; the line is not propagated again, and no other dataset is trained but
+    for what temporary files ask for."""
+    table = workflow / "config/datasets.tsv"
+    edit(table, "CFD-Q+\tflow\ttwin", "CFD-Q+\tflow\tpipe")
+    rules, text = planned(workflow)
+    assert "seed_signal" in rules
+    assert not {"propagate", "flow_sensor", "explain", "simulate_fault"} & rules
+    assert "output: out/models/CFD-Q+/" in text
+    assert "output: out/models/CFD-MOC-P" not in text and "output: out/models/CFD-P/" not in text
+
+
+def test_a_share_of_recordings_reruns_no_simulated_dataset(workflow):
+    """How much of a recording networks learn from concerns the dataset `experimental` alone, which
+    is not configured here."""
+    edit(workflow / "config/config.yaml", "training_share: 0.8", "training_share: 0.7")
+    assert planned(workflow)[0] == set()
+
+
+def test_a_job_has_the_profiles_memory(workflow):
+    """profiles/default is loaded although no profile is named: a rule that says nothing of memory
+    or threads gets both from there."""
+    (workflow / "out/claims.md").unlink()
+    text = planned(workflow)[1]
+    resources = re.search(r"^rule claims:\n(?:    .*\n)*?    resources: (.*)$", text, re.M)[1]
+    assert "mem_mb=1000" in resources
+    assert "Using workflow specific profile profiles/default" in text
+
+
 def test_unknown_key_is_named(workflow):
-    """A misspelt key stops the run with a message that contains it."""
+    """A misspelt key stops the run with a message that names it and the right one, and is short."""
     edit(workflow / "overlay.yaml", "seeds: 1", "seeeds: 1")
     result = snakemake(workflow, "--dry-run")
-    assert result.returncode != 0
-    assert "seeeds" in result.stdout + result.stderr
+    said = result.stdout + result.stderr
+    assert result.returncode != 0 and len(said.splitlines()) < 10
+    assert "unknown key seeeds. Did you mean seeds?" in said

@@ -75,7 +75,7 @@ def reported(folder, truth, said):
     pd.DataFrame(columns=["architecture", "dataset", "mean", "std"]).to_csv(paper, index=False)
     table, page = folder / "accuracy.csv", folder / "accuracy.md"
     run_script(
-        "report",
+        "accuracy_table",
         folder,
         {"table": table, "page": page},
         {},
@@ -83,6 +83,8 @@ def reported(folder, truth, said):
             "cells": [("CFD-Q+", "cnn1d_3_1")],
             "severity": {"pressure": "C1", "flow": "C2"},
             "recordings": "made up",
+            "columns": ["CFD-Q+"],
+            "signals": {"CFD-Q+": "flow"},
         },
         predictions=[folder / "said.csv"],
         histories=[folder / "ended.json"],
@@ -126,7 +128,7 @@ def test_page_on_the_cost_names_the_physics_taken_in(tmp_path):
         tmp_path,
         {"page": page},
         {},
-        {},
+        {"pairs": [("CFD-Q", "CFD-Q+")]},
         table=tmp_path / "a.csv",
         verdict=tmp_path / "verdict.json",
         twin=tmp_path / "twin.json",
@@ -160,22 +162,28 @@ def test_flow_sensor_by_either_method_finds_the_flow(tmp_path):
         ),
         tmp_path / "recorded.zarr",
     )
-    files = {"": {"twin": twin_file.to_dict(twin)}, "+": twin_file.to_dict(twin)}
+    made_by = {
+        "calibrated": {"twin": twin_file.to_dict(twin)},
+        "corrected": twin_file.to_dict(twin),
+    }
     bandwidth = 400.0
     truth = band_limit(flow, SPEED, bandwidth)
-    for (plus, file), method in zip(files.items(), ("spectral", "pinn"), strict=True):
+    for (name, file), method in zip(made_by.items(), ("spectral", "pinn"), strict=True):
         (tmp_path / "twin.json").write_text(json.dumps(file))
         run_script(
             "flow_sensor",
             tmp_path,
-            {"flow": tmp_path / f"flow{plus}.zarr"},
-            {"plus": plus},
+            {"flow": tmp_path / f"flow_{name}.zarr"},
+            {"twin": name},
             {"bandwidth_hz": bandwidth, "method": method, "width": 16, "steps": 40},
             recorded=tmp_path / "recorded.zarr",
             twin=tmp_path / "twin.json",
         )
-        found = store.load(tmp_path / f"flow{plus}.zarr")
-        assert method in found.source and found.signal.attrs["units"] == "m3/s"
+        found = store.load(tmp_path / f"flow_{name}.zarr")
+        assert (
+            f"{method} flow sensor, {name} line" in found.source
+            and found.signal.attrs["units"] == "m3/s"
+        )
         wrong = found.signal.values[:, 0] - truth
         assert np.sqrt(np.mean(wrong**2) / np.mean(truth**2)) < 0.03
 
@@ -196,11 +204,11 @@ def test_a_compound_fault_is_both_faults_at_once(tmp_path):
         return simulate(rig["pump"], fluid, 60 * SPEED, outlet, faults, SAMPLES).flow
 
     run_script(
-        "fault",
+        "simulate_fault",
         tmp_path,
         {"flow": tmp_path / "fault.zarr"},
         {"state": "S+C1"},
-        {"leak_area": [2e-7, 3e-7], "pipe_length": 5.0},
+        {"leak_area": {"S": 2e-7, "C1": 3e-7}, "pipe_length": 5.0},
         rig=sheet(tmp_path),
         recordings=tmp_path / "recorded.zarr",
     )
@@ -232,8 +240,8 @@ def test_compound_ripples_stand_below_their_parts(tmp_path):
             "plot_seeds",
             tmp_path,
             {key: tmp_path / f"{name}_{file}" for key, file in files.items()},
-            {"dataset": f"{name}/CFD-P"},
-            {"min_frequency_hz": 12, "max_frequency_hz": 1500, "voices": 8, "k": 1.0},
+            {"dataset": "CFD-P"},
+            {"sst": {"min_frequency_hz": 12, "max_frequency_hz": 1500, "voices": 8, "k": 1.0}},
             rig=sheet(tmp_path),
             seeds=tmp_path / f"{name}.zarr",
             reference=tmp_path / "own.zarr",

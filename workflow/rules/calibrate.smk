@@ -1,9 +1,9 @@
-# Healthy recordings -> the calibrated twin, its report and its pictures.
+# Healthy recordings -> the calibrated twin, its report and the ripples to draw.
 rule calibrate:
     input:
         rig=RIG,
         recordings=recordings(),
-        source=library("calibrate.py"),
+        source=scripts_sources("calibrate.py"),
     output:
         twin=f"{RESULTS}/calibration/twin.json",
         report=f"{RESULTS}/calibration/report.md",
@@ -12,7 +12,6 @@ rule calibrate:
         f"{RESULTS}/logs/calibrate.log",
     benchmark:
         f"{RESULTS}/benchmarks/calibrate.tsv"
-    threads: 1
     resources:
         mem_mb=2000,
     params:
@@ -21,25 +20,3 @@ rule calibrate:
         max_frequency_hz=config["calibration"]["max_frequency_hz"],
     script:
         "../scripts/calibrate.py"
-
-
-rule plot_calibration:
-    input:
-        ripples=rules.calibrate.output.ripples,
-        source=library("plot_calibration.py"),
-    output:
-        report(
-            directory(f"{RESULTS}/figures/calibration"),
-            patterns=["{label}.png"],
-            category="calibration",
-            caption="../report/calibration.rst",
-        ),
-    log:
-        f"{RESULTS}/logs/plot_calibration.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/plot_calibration.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
-    script:
-        "../scripts/plot_calibration.py"

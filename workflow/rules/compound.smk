@@ -1,9 +1,9 @@
-# Compound faults, which no network learnt -> what the networks make of them.
+# Compound faults, which no network learnt -> what the networks say of them.
 rule evaluate_compound:
     input:
         samples=compound_samples_of,
         weights=rules.train.output.weights,
-        source=library("evaluate_compound.py"),
+        source=scripts_sources("evaluate_compound.py"),
     output:
         f"{RESULTS}/compound/{{dataset}}/{{architecture}}.csv",
     log:
@@ -11,7 +11,6 @@ rule evaluate_compound:
     benchmark:
         f"{RESULTS}/benchmarks/evaluate_compound/{{dataset}}/{{architecture}}.tsv"
     priority: 30
-    threads: 1
     resources:
         mem_mb=2000,
     script:
@@ -21,11 +20,11 @@ rule evaluate_compound:
 rule report_compound:
     input:
         answers=expand(
-            f"{RESULTS}/compound/{{dataset}}/{{architecture}}.csv",
-            dataset=simulated(),
+            rules.evaluate_compound.output,
+            dataset=SIMULATED,
             architecture=config["architectures"],
         ),
-        source=library("report_compound.py"),
+        source=scripts_sources("report_compound.py"),
     output:
         report(
             f"{RESULTS}/compound.md",
@@ -36,14 +35,7 @@ rule report_compound:
         f"{RESULTS}/logs/report_compound.log",
     benchmark:
         f"{RESULTS}/benchmarks/report_compound.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
     params:
-        cells=[
-            (dataset, architecture)
-            for dataset in simulated()
-            for architecture in config["architectures"]
-        ],
+        cells=cells(SIMULATED),
     script:
         "../scripts/report_compound.py"

@@ -1,6 +1,8 @@
 # How often `explain` is right when the effect is hidden: snakemake --cores 2 concealed
+from tool_commit import not_committed, tool_commit
+
 CONCEALED = f"{RESULTS}/concealed"
-TOOL = SOURCE / "concealed" / "tool.py"
+TOOL = ROOT / "src/concealed/tool.py"
 HIDDEN = [f"{n:03d}" for n in range(config["concealed"]["cases"])]
 
 
@@ -10,18 +12,15 @@ wildcard_constraints:
 
 rule concealed_numerics:
     input:
-        source=virtualrig(),
+        source=relative(package_files("virtualrig")),
     output:
         f"{CONCEALED}/numerics.json",
     log:
         f"{RESULTS}/logs/concealed_numerics.log",
     benchmark:
         f"{RESULTS}/benchmarks/concealed_numerics.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
     params:
-        commit=tool_commit,
+        commit=lambda wildcards: tool_commit(ROOT),
         number=config["concealed"]["number"],
         cases=config["concealed"]["cases"],
     shell:
@@ -32,7 +31,7 @@ rule concealed_numerics:
 rule conceal:
     input:
         numerics=rules.concealed_numerics.output,
-        source=virtualrig(),
+        source=relative(package_files("virtualrig")),
     output:
         case=directory(f"{CONCEALED}/cases/{{hidden}}"),
         seal=f"{CONCEALED}/seals/{{hidden}}.json",
@@ -41,11 +40,8 @@ rule conceal:
         f"{RESULTS}/logs/conceal/{{hidden}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/conceal/{{hidden}}.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
     params:
-        commit=tool_commit,
+        commit=lambda wildcards: tool_commit(ROOT),
         number=config["concealed"]["number"],
         cases=config["concealed"]["cases"],
         case=lambda wildcards: int(wildcards.hidden),
@@ -59,9 +55,8 @@ rule conceal:
 rule explain_concealed:
     input:
         case=rules.conceal.output.case,
-        tool=os.path.relpath(TOOL),
-        jail=os.path.relpath(TOOL.with_name("jail.py")),
-        source=library(TOOL),
+        tool=relative([TOOL, TOOL.with_name("jail.py")]),
+        source=relative(source_files_of(TOOL)),
     output:
         verdict=f"{CONCEALED}/explained/{{hidden}}/verdict.json",
         baselines=f"{CONCEALED}/explained/{{hidden}}/baselines.json",
@@ -69,7 +64,6 @@ rule explain_concealed:
         f"{RESULTS}/logs/explain_concealed/{{hidden}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/explain_concealed/{{hidden}}.tsv"
-    threads: 1
     resources:
         mem_mb=2000,
     params:
@@ -87,16 +81,13 @@ rule commit_verdicts:
         seals=expand(rules.conceal.output.seal, hidden=HIDDEN),
         verdicts=expand(rules.explain_concealed.output.verdict, hidden=HIDDEN),
         baselines=expand(rules.explain_concealed.output.baselines, hidden=HIDDEN),
-        source=library("commit_verdicts.py"),
+        source=scripts_sources("commit_verdicts.py"),
     output:
         f"{CONCEALED}/commitments.json",
     log:
         f"{RESULTS}/logs/commit_verdicts.log",
     benchmark:
         f"{RESULTS}/benchmarks/commit_verdicts.tsv"
-    threads: 1
-    resources:
-        mem_mb=500,
     script:
         "../scripts/commit_verdicts.py"
 
@@ -107,14 +98,13 @@ rule oracle_concealed:
         case=rules.conceal.output.case,
         seal=rules.conceal.output.seal,
         key=rules.conceal.output.key,
-        source=library("oracle_concealed.py"),
+        source=scripts_sources("oracle_concealed.py"),
     output:
         f"{CONCEALED}/oracle/{{hidden}}.json",
     log:
         f"{RESULTS}/logs/oracle_concealed/{{hidden}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/oracle_concealed/{{hidden}}.tsv"
-    threads: 1
     resources:
         mem_mb=2000,
     script:
@@ -129,16 +119,13 @@ rule score_concealed:
         seal_keys=expand(rules.conceal.output.key, hidden=HIDDEN),
         verdicts=expand(rules.explain_concealed.output.verdict, hidden=HIDDEN),
         baselines=expand(rules.explain_concealed.output.baselines, hidden=HIDDEN),
-        source=library("score_concealed.py"),
+        source=scripts_sources("score_concealed.py"),
     output:
         rows=f"{CONCEALED}/rows.json",
     log:
         f"{RESULTS}/logs/score_concealed.log",
     benchmark:
         f"{RESULTS}/benchmarks/score_concealed.tsv"
-    threads: 1
-    resources:
-        mem_mb=500,
     script:
         "../scripts/score_concealed.py"
 
@@ -147,7 +134,7 @@ rule report_concealed:
     input:
         rows=rules.score_concealed.output.rows,
         numerics=rules.concealed_numerics.output,
-        source=library("report_concealed.py"),
+        source=scripts_sources("report_concealed.py"),
     output:
         page=report(
             f"{CONCEALED}/report.md",
@@ -164,12 +151,9 @@ rule report_concealed:
         f"{RESULTS}/logs/report_concealed.log",
     benchmark:
         f"{RESULTS}/benchmarks/report_concealed.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
     params:
-        commit=tool_commit,
-        not_committed=not_committed,
+        commit=lambda wildcards: tool_commit(ROOT),
+        not_committed=lambda wildcards: not_committed(ROOT),
         number=config["concealed"]["number"],
     script:
         "../scripts/report_concealed.py"

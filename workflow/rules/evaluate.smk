@@ -3,7 +3,7 @@ rule evaluate:
     input:
         recorded=recorded_of,
         weights=rules.train.output.weights,
-        source=library("evaluate.py"),
+        source=scripts_sources("evaluate.py"),
     output:
         f"{RESULTS}/predictions/{{dataset}}/{{architecture}}.csv",
     log:
@@ -11,10 +11,9 @@ rule evaluate:
     benchmark:
         f"{RESULTS}/benchmarks/evaluate/{{dataset}}/{{architecture}}.tsv"
     priority: 30
-    threads: 1
     resources:
         mem_mb=2000,
     params:
-        share=config["experimental"]["training_share"],
+        learnt_share=learnt_share_of,
     script:
         "../scripts/evaluate.py"

@@ -3,7 +3,7 @@ rule explain:
     input:
         rig=rig_sheet(),
         recordings=recordings(),
-        source=library("explain.py"),
+        source=scripts_sources("explain.py"),
     output:
         verdict=f"{RESULTS}/explain/verdict.json",
         twin=f"{RESULTS}/explain/twin.json",

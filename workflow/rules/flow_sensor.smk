@@ -1,18 +1,15 @@
-# Recorded pressure -> flow at the pump outlet, by the calibrated line (flow) or the corrected (flow+).
+# Recorded pressure -> flow at the pump outlet, by the line of the calibrated or corrected twin.
 rule flow_sensor:
     input:
-        recorded=rules.ingest.output.windows,
+        recorded=rules.cut_windows.output.windows,
         twin=twin_of,
-        source=library("flow_sensor.py"),
+        source=scripts_sources("flow_sensor.py"),
     output:
-        directory(f"{RESULTS}/recordings/flow{{plus}}.zarr"),
+        directory(f"{RESULTS}/recordings/flow_{{twin}}.zarr"),
     log:
-        f"{RESULTS}/logs/flow_sensor{{plus}}.log",
+        f"{RESULTS}/logs/flow_sensor/{{twin}}.log",
     benchmark:
-        f"{RESULTS}/benchmarks/flow_sensor{{plus}}.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
+        f"{RESULTS}/benchmarks/flow_sensor/{{twin}}.tsv"
     params:
         bandwidth_hz=config["flow_sensor"]["bandwidth_hz"],
         method=config["flow_sensor"]["method"],

@@ -1,21 +1,17 @@
 # One noise-free revolution a state: the seed signals of each simulated dataset.
-# propagated: through the calibrated line; propagated+: through the corrected one.
 rule propagate:
     input:
         flow=f"{RESULTS}/faults/{{state}}.zarr",
         healthy=f"{RESULTS}/faults/H.zarr",
-        recordings=rules.ingest.output.windows,
+        recordings=rules.cut_windows.output.windows,
         twin=twin_of,
-        source=library("propagate.py"),
+        source=scripts_sources("propagate.py"),
     output:
-        directory(f"{RESULTS}/propagated{{plus}}/{{state}}.zarr"),
+        directory(f"{RESULTS}/propagated/{{twin}}/{{state}}.zarr"),
     log:
-        f"{RESULTS}/logs/propagate{{plus}}/{{state}}.log",
+        f"{RESULTS}/logs/propagate/{{twin}}/{{state}}.log",
     benchmark:
-        f"{RESULTS}/benchmarks/propagate{{plus}}/{{state}}.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
+        f"{RESULTS}/benchmarks/propagate/{{twin}}/{{state}}.tsv"
     params:
         steps=config["propagation"]["steps_per_revolution"],
         tolerance=config["propagation"]["tolerance"],
@@ -26,21 +22,15 @@ rule propagate:
 rule seed_signal:
     input:
         states=states_of,
-        source=library("seed_signal.py"),
+        source=scripts_sources("seed_signal.py"),
     output:
-        directory(f"{RESULTS}/seeds/{{dataset}}.zarr"),
+        directory(f"{RESULTS}/seeds/{{dataset}}/{{faults}}.zarr"),
     log:
-        f"{RESULTS}/logs/seed_signal/{{dataset}}.log",
+        f"{RESULTS}/logs/seed_signal/{{dataset}}/{{faults}}.log",
     benchmark:
-        f"{RESULTS}/benchmarks/seed_signal/{{dataset}}.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
+        f"{RESULTS}/benchmarks/seed_signal/{{dataset}}/{{faults}}.tsv"
     params:
-        # What a flow sensor sees is the flow that any line can be driven with.
-        signal=lambda wildcards: {"pressure": "pressure", "flow": "source_flow"}[
-            signal_of(wildcards.dataset)
-        ],
+        signal=seed_variable_of,
         bandwidth_hz=config["flow_sensor"]["bandwidth_hz"],
     script:
         "../scripts/seed_signal.py"

@@ -3,7 +3,7 @@ if RECORDED_HERE:
 
     rule record:
         input:
-            source=virtualrig(),
+            source=relative(package_files("virtualrig")),
         output:
             rig=RIG,
             recordings=directory(f"{CASE}/recordings"),
@@ -23,18 +23,17 @@ if RECORDED_HERE:
             " --processes {threads} > {log} 2>&1"
 
 
-rule ingest:
+rule cut_windows:
     input:
         rig=rig_sheet(),
         recordings=recordings(),
-        source=library("ingest.py"),
+        source=scripts_sources("cut_windows.py"),
     output:
         windows=directory(f"{RESULTS}/recordings/pressure.zarr"),
     log:
-        f"{RESULTS}/logs/ingest.log",
+        f"{RESULTS}/logs/cut_windows.log",
     benchmark:
-        f"{RESULTS}/benchmarks/ingest.tsv"
-    threads: 1
+        f"{RESULTS}/benchmarks/cut_windows.tsv"
     resources:
         mem_mb=2000,
     params:
@@ -42,4 +41,4 @@ rule ingest:
         windows=config["windows"]["per_recording"],
         samples=config["windows"]["samples_per_revolution"],
     script:
-        "../scripts/ingest.py"
+        "../scripts/cut_windows.py"

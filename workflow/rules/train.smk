@@ -2,7 +2,7 @@
 rule train:
     input:
         samples=samples_of,
-        source=library("train.py"),
+        source=scripts_sources("train.py"),
     output:
         weights=temp(f"{RESULTS}/models/{{dataset}}/{{architecture}}.pt"),
         history=f"{RESULTS}/models/{{dataset}}/{{architecture}}.json",
@@ -10,14 +10,15 @@ rule train:
         f"{RESULTS}/logs/train/{{dataset}}/{{architecture}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/train/{{dataset}}/{{architecture}}.tsv"
-    priority: urgency_of
-    threads: 1
+    priority: priority_of
     resources:
         mem_mb=4000,
     params:
         seeds=config["seeds"],
-        settings=lambda wildcards: config["training"][family_of(wildcards.architecture)],
-        share=config["experimental"]["training_share"],
-        cylinder=config["scoring"]["pressure"],
+        settings=lambda wildcards: config["training"][
+            ARCHITECTURES[wildcards.architecture].family
+        ],
+        learnt_share=learnt_share_of,
+        cylinder=cylinder_class_of,
     script:
         "../scripts/train.py"

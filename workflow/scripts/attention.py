@@ -1,82 +1,59 @@
 """What trained networks look at: alignment of every seed, heat of the first seed's network."""
 
-from collections import Counter
-
 import numpy as np
 import torch
 import xarray as xr
 
-from job import start
+from job import open_log
 from rippletwin import store
 from rippletwin.learning.architectures import CLASSES
-from rippletwin.learning.grad_cam import alignment, attention_density, attention_map, fault_region
+from rippletwin.learning.attention_summary import fault_attention, recording_attention
+from rippletwin.learning.grad_cam import attention_density, attention_map, fault_region
 from rippletwin.learning.networks import restored
-from rippletwin.learning.training import predict
+from rippletwin.learning.windows import spread_windows
 
-WINDOWS = 16  # of each recording, for the mean heat
+WINDOWS = 16  # of each recorded state, for the mean heat
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 torch.set_num_threads(snakemake.threads)
-probes = store.load(snakemake.input.probes)
-recorded = store.load(snakemake.input.recorded)
-state = probes.state.values
-x = {name: probes.signal.values[state == name] for name in CLASSES}
+probes, recorded = store.load(snakemake.input.probes), store.load(snakemake.input.recorded)
+x = {name: probes.signal.values[probes.state.values == name] for name in CLASSES}
 faults = CLASSES[1:]
-regions = {fault: fault_region(x["H"], x[fault]) for fault in faults}
+regions = np.array([fault_region(x["H"], x[fault]) for fault in faults])
 first_turn = np.stack([x[name][0] for name in CLASSES])
+spread = spread_windows(recorded.state.values, WINDOWS)
+windows = [recorded.signal.values[at] for at in spread.values()]
+name, trained = snakemake.wildcards.architecture, torch.load(snakemake.input.weights)
+first, *others = restored(name, first_turn.shape[1], trained)
+shares = [fault_attention(net, x, dict(zip(faults, regions))) for net in (first, *others)]
+attended, blind = (np.array(share) for share in zip(*shares))
+heat = attention_density(attention_map(first, first_turn, np.arange(len(CLASSES))))
+called, called_share, recorded_heat = zip(*(recording_attention(first, part) for part in windows))
 
-# evenly over each recording, which may be one of many of its state
-recorded_states = list(dict.fromkeys(recorded.state.values.tolist()))
-windows = []
-for name in recorded_states:
-    at = np.flatnonzero(recorded.state.values == name)
-    at = at[np.unique(np.linspace(0, len(at) - 1, WINDOWS).round().astype(int))]
-    windows.append(recorded.signal.values[at])
-
-attended, blind = [], []
-trained, channels = torch.load(snakemake.input.weights), x["H"].shape[1]
-for seed, network in enumerate(restored(snakemake.wildcards.architecture, channels, trained)):
-    shares = [
-        alignment(attention_map(network, x[fault], CLASSES.index(fault)), regions[fault])[0]
-        for fault in faults
-    ]
-    blind.append([np.isnan(share).mean() for share in shares])
-    attended.append([np.nan if np.isnan(s).all() else np.nanmean(s) for s in shares])
-    if seed == 0:
-        heat = attention_density(attention_map(network, first_turn, np.arange(len(CLASSES))))
-        called = []
-        recorded_heat = []
-        for part in windows:
-            label, count = Counter(predict(network, part)[0].tolist()).most_common(1)[0]
-            called.append((CLASSES[label], count / len(part)))
-            looked = attention_density(attention_map(network, part, label))
-            seen = ~np.isnan(looked.reshape(len(part), -1)).any(1)
-            recorded_heat.append(looked[seen].mean(0) if seen.any() else looked[0])
-
-places = probes.signal.dims[2:]  # (time,) or (frequency, column)
+axes = probes.signal.dims[2:]  # (time,) or (frequency, column)
+sizes = regions.mean(axis=(1, 2))
 store.save(
     xr.Dataset(
         {
-            "attended": (("seed", "fault"), np.array(attended)),
-            "blind": (("seed", "fault"), np.array(blind)),
-            "region": ("fault", [regions[fault].mean() for fault in faults]),
-            "fault_region": (("fault", places[0]), [regions[fault][0] for fault in faults]),
-            "simulated": (("state", "channel", *places), first_turn, probes.signal.attrs),
-            "simulated_heat": (("state", *places), heat),
-            "recorded": (("recording", "channel", *places), [part[0] for part in windows]),
-            "recorded_heat": (("recording", *places), recorded_heat),
-            "called_share": ("recording", [share for _, share in called]),
+            "attended": (("seed", "fault"), attended),
+            "blind": (("seed", "fault"), blind),
+            "region": ("fault", sizes),
+            "fault_region": (("state", axes[0]), np.pad(regions[:, 0], ((1, 0), (0, 0)))),
+            "simulated": (("state", "channel", *axes), first_turn, probes.signal.attrs),
+            "simulated_heat": (("state", *axes), heat),
+            "recorded": (("recording", "channel", *axes), [part[0] for part in windows]),
+            "recorded_heat": (("recording", *axes), np.array(recorded_heat)),
+            "called_share": ("recording", list(called_share)),
         },
         coords={
-            "fault": list(faults),
             "state": list(CLASSES),
-            "recording": recorded_states,
-            "called": ("recording", [name for name, _ in called]),
+            "fault": list(faults),
+            "recording": list(spread),
+            "called": ("recording", list(called)),
             "channel": probes.channel.values,
         },
-        attrs={"speed_hz": probes.attrs["speed_hz"]},
+        attrs={"speed_hz": probes.speed_hz},
     ),
     snakemake.output[0],
 )
-gain = np.nanmean(np.array(attended) / [regions[fault].mean() for fault in faults])
-tell(f"attention seeks the fault {gain:.2f} times as often as chance")
+report_progress(f"attention in the faults' regions over chance: {np.nanmean(attended / sizes):.2f}")

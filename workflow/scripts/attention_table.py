@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pandas as pd
 
-from job import start
+from job import open_log
 from rippletwin import store
 from rippletwin.learning.alignment_ranking import alignment_table, rank_table, ranking_markdown
 from rippletwin.learning.architectures import ARCHITECTURES
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 shares = []
 for (dataset, architecture), path in zip(
     snakemake.params.cells, snakemake.input.attention, strict=True
@@ -22,4 +22,4 @@ ranks = rank_table(table)
 table.to_csv(snakemake.output.table, index=False)
 ranks.to_csv(snakemake.output.ranks, index=False)
 Path(snakemake.output.page).write_text(ranking_markdown(table, ranks))
-tell(f"{len(table)} networks, {len(ranks)} rank correlations")
+report_progress(f"{len(table)} networks, {len(ranks)} rank correlations")

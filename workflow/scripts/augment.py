@@ -3,11 +3,11 @@
 import numpy as np
 import xarray as xr
 
-from job import start
+from job import open_log
 from rippletwin import store
 from rippletwin.learning.dataset import augment
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 params, revolutions = snakemake.params, int(snakemake.wildcards.revolutions)
 signals = store.load(snakemake.input.signals)
 recorded = store.load(snakemake.input.recorded)
@@ -32,4 +32,4 @@ for seed, path in enumerate(snakemake.output):
         path,
         compressed=False,
     )
-tell(f"{len(labels)} samples a seed, {len(snakemake.output)} seeds")
+report_progress(f"{len(labels)} samples a seed, {len(snakemake.output)} seeds")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from job import start
+from job import open_log
 from rippletwin import store
 from rippletwin.calibration import report
 from rippletwin.calibration.calibrate import Settings, calibrate
@@ -13,19 +13,21 @@ from rippletwin.case.load import load_case
 from rippletwin.spectra.observation import observe
 from rippletwin.twin.twin import Twin
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 params = snakemake.params
 case = load_case(Path(snakemake.input.rig).parent, states={"healthy"})
 observations = [observe(r, case.rig, piston_harmonics_only=True) for r in case.recordings]
 twin = Twin(case.rig, observations, friction=params.friction)
 settings = Settings(max_frequency_hz=params.max_frequency_hz)
 if params.method == "pareto":
-    calibration = calibrate_pareto(twin, observations, settings, progress=tell).calibration
+    calibration = calibrate_pareto(
+        twin, observations, settings, progress=report_progress
+    ).calibration
 else:
-    calibration = calibrate(twin, observations, settings, progress=tell)
+    calibration = calibrate(twin, observations, settings, progress=report_progress)
 for warning in calibration.warnings:
-    tell(f"warning: {warning}")
-tell(
+    report_progress(f"warning: {warning}")
+report_progress(
     f"relative misfit {calibration.before.relative:.1%} -> {calibration.after.relative:.1%}, "
     f"Theil {calibration.before.theil:.3f} -> {calibration.after.theil:.3f}"
 )

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pandas as pd
 
-from job import start
+from job import open_log
 from rippletwin.case.load import load_case
 from rippletwin.figures import attention
 from rippletwin.figures.style import save
 from rippletwin.learning import paper_claims
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 paths = snakemake.output
 pistons = load_case(Path(snakemake.input.rig).parent, states=()).rig.pump["pistons"]
 cells = paper_claims.cells_of(
@@ -37,4 +37,4 @@ groups = {
     for claim, rows in compared[compared.score == paper_claims.EITHER].groupby("claim", sort=False)
 }
 save(attention.claims(groups), paths.png, paths.svg)
-tell(f"{len(compared)} comparisons")
+report_progress(f"{len(compared)} comparisons")

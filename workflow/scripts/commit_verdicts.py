@@ -4,9 +4,9 @@ import json
 from pathlib import Path
 
 from concealed.commitments import sha256_of_files
-from job import start
+from job import open_log
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 paths = [*snakemake.input.seals, *snakemake.input.verdicts, *snakemake.input.baselines]
 Path(snakemake.output[0]).write_text(json.dumps(sha256_of_files(paths), indent=1) + "\n")
-tell(f"{len(paths)} files committed to")
+report_progress(f"{len(paths)} files committed to")

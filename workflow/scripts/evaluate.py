@@ -4,19 +4,17 @@ import numpy as np
 import pandas as pd
 import torch
 
-from job import start
+from job import open_log
 from rippletwin import store
 from rippletwin.learning.architectures import CLASSES
 from rippletwin.learning.dataset import split_by_time
 from rippletwin.learning.networks import restored
 from rippletwin.learning.training import predict
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 torch.set_num_threads(snakemake.threads)
 recorded = store.load(snakemake.input.recorded)
-kept = np.arange(recorded.sizes["window"])
-if snakemake.wildcards.dataset == "experimental":
-    _, kept = split_by_time(np.bincount(recorded.recording), snakemake.params.share)
+_, kept = split_by_time(np.bincount(recorded.recording), snakemake.params.learnt_share)
 x, truth = recorded.signal.values[kept], recorded.state.values[kept]
 
 tables = []
@@ -31,4 +29,4 @@ for seed, network in enumerate(restored(snakemake.wildcards.architecture, x.shap
     table.insert(0, "seed", seed)
     tables.append(table)
 pd.concat(tables).to_csv(snakemake.output[0], index=False)
-tell(f"{len(x)} windows, {len(tables)} seeds")
+report_progress(f"{len(kept)} windows, {len(tables)} seeds")

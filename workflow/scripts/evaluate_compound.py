@@ -4,13 +4,13 @@ import numpy as np
 import pandas as pd
 import torch
 
-from job import start
+from job import open_log
 from rippletwin import store
 from rippletwin.learning.architectures import CLASSES
 from rippletwin.learning.networks import restored
 from rippletwin.learning.training import predict
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 torch.set_num_threads(snakemake.threads)
 samples = store.load(snakemake.input.samples)
 x, faults = samples.signal.values, np.array(samples.label.attrs["classes"])[samples.label.values]
@@ -23,4 +23,4 @@ for seed, network in enumerate(restored(snakemake.wildcards.architecture, x.shap
         pd.DataFrame({"seed": seed, "recording": faults, "predicted": np.array(CLASSES)[predicted]})
     )
 pd.concat(tables).to_csv(snakemake.output[0], index=False)
-tell(f"{len(x)} windows, {len(tables)} seeds")
+report_progress(f"{len(x)} windows, {len(tables)} seeds")

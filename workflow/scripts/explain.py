@@ -2,18 +2,18 @@
 
 from pathlib import Path
 
-from job import start
+from job import open_log
 from rippletwin.case.load import load_case
 from rippletwin.explanation.explain import explain
 from rippletwin.explanation.verdict.verdict_file import write_verdict
 from rippletwin.figures.explanation import draw
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 case = load_case(Path(snakemake.input.rig).parent, states={"healthy"})
 explanation = explain(
-    case, snakemake.threads, lambda what, done, total: tell(f"{what}: {done} of {total}")
+    case, snakemake.threads, lambda what, done, total: report_progress(f"{what}: {done} of {total}")
 )
 folder = Path(snakemake.output.verdict).parent
 verdict = write_verdict(explanation, folder)
 draw(explanation, folder, processes=snakemake.threads)
-tell(verdict["sentence"])
+report_progress(verdict["sentence"])

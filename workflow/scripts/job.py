@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import sys
 import traceback
+from collections.abc import Callable
 
 from rippletwin.errors import InputError
 
 
-def start(snakemake):
-    """Redirect this process's output to the job's log; returns tell(text) for progress.
+def open_log(snakemake) -> Callable[[str], None]:
+    """Redirect this process's output to the job's log; returns report_progress(text).
 
     Bad input ends the job with its message alone, anything else with a traceback in the log.
     """
@@ -18,7 +19,7 @@ def start(snakemake):
     sys.stdout = sys.stderr = log
     name = " ".join([snakemake.rule, *map(str, snakemake.wildcards)])
 
-    def tell(text: str) -> None:
+    def report_progress(text: str) -> None:
         print(text, file=log)
         print(f"{name}: {text}", file=terminal, flush=True)
 
@@ -27,4 +28,4 @@ def start(snakemake):
         print(f"{name}: {error if kind is InputError else repr(error)}", file=terminal, flush=True)
 
     sys.excepthook = fail
-    return tell
+    return report_progress

@@ -4,11 +4,11 @@ import json
 from pathlib import Path
 
 from concealed.oracle import oracle_log_evidence
-from job import start
+from job import open_log
 from virtualrig.seal import open_seal_file
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 truth = open_seal_file(snakemake.input.seal, snakemake.input.key)
 value = oracle_log_evidence(snakemake.input.case, truth)
 Path(snakemake.output[0]).write_text(json.dumps({"oracle_log_evidence": value}) + "\n")
-tell(f"oracle log evidence {value}")
+report_progress(f"oracle log evidence {value}")

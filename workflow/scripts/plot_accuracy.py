@@ -2,13 +2,13 @@
 
 import pandas as pd
 
-from job import start
+from job import open_log
 from rippletwin.figures import diagnosis
 from rippletwin.figures.style import save
 from rippletwin.learning.accuracy import summarise
 from rippletwin.learning.architectures import ARCHITECTURES
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 ours = summarise(pd.read_csv(snakemake.input.table))
 paper = pd.read_csv(snakemake.input.paper)
 names = [name for name in ARCHITECTURES if name in set(ours.architecture)]
@@ -24,4 +24,4 @@ def cells(table):
 
 titles = [ARCHITECTURES[name].title for name in names]
 save(diagnosis.accuracy(titles, cells(ours), cells(paper)), *snakemake.output)
-tell(f"{len(names)} networks")
+report_progress(f"{len(names)} networks")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from job import start
+from job import open_log
 from rippletwin import store
 from rippletwin.case.load import load_case
 from rippletwin.figures import attention
@@ -12,21 +12,12 @@ from rippletwin.figures.style import save
 from rippletwin.learning.architectures import ARCHITECTURES
 from rippletwin.learning.synchrosqueezing import SstSettings, image_axes
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 params, output = snakemake.params, snakemake.output
 cells = [store.load(path) for path in snakemake.input.attention]
 networks = [ARCHITECTURES[name].title for name in params.architectures]
 pistons = load_case(Path(snakemake.input.rig).parent, states=()).rig.pump["pistons"]
 first = cells[0]
-simulated, recorded = first.state.values.tolist(), first.recording.values.tolist()
-regions = np.stack(
-    [
-        first.fault_region.sel(fault=state).values
-        if state in first.fault.values
-        else np.zeros(first.fault_region.shape[1], dtype=bool)
-        for state in simulated
-    ]
-)
 called = [
     [f"called {name}: {share:.0%}" for name, share in zip(cell.called.values, cell.called_share)]
     for cell in cells
@@ -58,6 +49,9 @@ def draw(states, variable, titles, region=None):
     return attention.windows(networks, states, signal / scale, heat, titles, label, region)
 
 
-save(draw(simulated, "simulated", shares, regions), output.simulated, output.simulated_svg)
-save(draw(recorded, "recorded", called), output.recorded, output.recorded_svg)
-tell(f"{len(networks)} networks")
+simulated = draw(first.state.values.tolist(), "simulated", shares, first.fault_region.values)
+save(simulated, output.simulated, output.simulated_svg)
+save(
+    draw(first.recording.values.tolist(), "recorded", called), output.recorded, output.recorded_svg
+)
+report_progress(f"{len(networks)} networks")

@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-from job import start
+from job import open_log
 from rippletwin import store
 from rippletwin.figures import ripple
 from rippletwin.figures.style import save
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 ripples = store.load(snakemake.input.ripples)
 folder = Path(snakemake.output[0])
 for label in ripples.point.values:
@@ -15,4 +15,4 @@ for label in ripples.point.values:
     curves = {name: values.values for name, values in point.data_vars.items()}
     figure = ripple.overlay(point.angle_deg.values, curves, point.channel.values, str(label))
     save(figure, folder / f"{label}.png", folder / f"{label}.svg")
-tell(f"{ripples.sizes['point']} operating points")
+report_progress(f"{ripples.sizes['point']} operating points")

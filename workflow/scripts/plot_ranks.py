@@ -2,12 +2,12 @@
 
 import pandas as pd
 
-from job import start
+from job import open_log
 from rippletwin.figures import attention
 from rippletwin.figures.style import save
 from rippletwin.learning.architectures import ARCHITECTURES
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 table = pd.read_csv(snakemake.input.table).fillna({"accuracy_std": 0, "alignment_std": 0})
 groups = {
     dataset: (
@@ -19,4 +19,4 @@ groups = {
     for dataset, rows in table.groupby("dataset", sort=False)
 }
 save(attention.ranks(groups), snakemake.output.png, snakemake.output.svg)
-tell(f"{len(groups)} datasets")
+report_progress(f"{len(groups)} datasets")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from job import start
+from job import open_log
 from rippletwin import store
 from rippletwin.case.load import load_case
 from rippletwin.figures import diagnosis, ripple
@@ -21,9 +21,8 @@ from rippletwin.learning.synchrosqueezing import (
     sst_images,
 )
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 pistons = load_case(Path(snakemake.input.rig).parent, states=()).rig.pump["pistons"]
-dataset = snakemake.wildcards.dataset.rpartition("/")[2]
 seeds, reference = store.load(snakemake.input.seeds), store.load(snakemake.input.reference)
 together = {fault for state in seeds.state.values if "+" in state for fault in state.split("+")}
 parts = [state for state in reference.state.values if state in together]
@@ -35,18 +34,14 @@ signals = signals - signals.mean(axis=-1, keepdims=True)
 pressure = seeds.signal.attrs["units"] == "Pa"
 scale, label = (1e6, "pressure ripple / MPa") if pressure else (1e-3 / 60, "flow ripple / L/min")
 angle = np.arange(signals.shape[-1]) * 360 / signals.shape[-1]
-figure = ripple.states(angle, dict(zip(states, signals)), f"{dataset}: {label}", scale)
+figure = ripple.states(
+    angle, dict(zip(states, signals)), f"{snakemake.wildcards.dataset}: {label}", scale
+)
 save(figure, snakemake.output.ripple, snakemake.output.ripple_svg)
 
 windows = np.tile(signals[:, None], 2)
 rate = seeds.sizes["time"] * seeds.speed_hz
-params = snakemake.params
-settings = SstSettings(
-    min_frequency_hz=params.min_frequency_hz,
-    max_frequency_hz=params.max_frequency_hz,
-    voices=params.voices,
-    k=params.k,
-)
+settings = SstSettings(**snakemake.params.sst)
 healthy = reference.signal.sel(state="H").isel(channel=[0]).values[None]
 healthy = healthy - healthy.mean(axis=-1, keepdims=True)
 settings = replace(settings, scale=amplitude_scale(np.tile(healthy, 2), rate, settings))
@@ -54,4 +49,4 @@ images = sst_images(windows, rate, settings)[:, 0]
 frequency_hz, _ = image_axes(settings, 2 / seeds.speed_hz)
 figure = diagnosis.sst(dict(zip(states, images)), frequency_hz, seeds.speed_hz, pistons)
 save(figure, snakemake.output.sst, snakemake.output.sst_svg)
-tell(f"{len(states)} states")
+report_progress(f"{len(states)} states")

@@ -2,14 +2,13 @@
 
 import xarray as xr
 
-from job import start
+from job import open_log
 from rippletwin import store
 from rippletwin.twin.propagation import propagate, pump_change
 from rippletwin.twin.twin_file import load_twin
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 params = snakemake.params
-line = "corrected" if snakemake.wildcards.plus else "calibrated"
 recorded = store.load(snakemake.input.recordings)
 fault, healthy = store.load(snakemake.input.flow), store.load(snakemake.input.healthy)
 twin = load_twin(snakemake.input.twin)
@@ -24,7 +23,7 @@ result = propagate(
     params.steps,
     params.tolerance,
 )
-tell(
+report_progress(
     f"{result.periods} revolutions to a change of {result.change:.1g}, "
     f"largest at {result.worst_position:.2f} m"
 )
@@ -45,7 +44,7 @@ store.save(
         attrs={
             "state": snakemake.wildcards.state,
             "speed_hz": recorded.speed_hz,
-            "source": f"the {line} line by the method of characteristics",
+            "source": f"the {snakemake.wildcards.twin} line by the method of characteristics",
         },
     ),
     snakemake.output[0],

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from job import start
+from job import open_log
 from rippletwin.learning.tables import answer_table
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 answers = pd.concat(
     pd.read_csv(path).assign(dataset=dataset, architecture=architecture)
     for (dataset, architecture), path in zip(
@@ -22,4 +22,6 @@ that learnt single faults only. Shares of the answers over samples and seeds, pe
 
 {answer_table(answers)}"""
 )
-tell(f"{answers.recording.nunique()} compound faults, {len(snakemake.params.cells)} networks")
+report_progress(
+    f"{answers.recording.nunique()} compound faults, {len(snakemake.params.cells)} networks"
+)

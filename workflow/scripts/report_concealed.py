@@ -5,9 +5,9 @@ from pathlib import Path
 
 from concealed.figures import draw_figures
 from concealed.page import report_page
-from job import start
+from job import open_log
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 rows = json.loads(Path(snakemake.input.rows).read_text())
 origin = {
     "commit": snakemake.params.commit,
@@ -17,4 +17,4 @@ origin = {
 }
 draw_figures(rows, snakemake.output.figures)
 Path(snakemake.output.page).write_text(report_page(rows, origin))
-tell(f"{snakemake.output.page} written")
+report_progress(f"{snakemake.output.page} written")

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pandas as pd
 
-from job import start
+from job import open_log
 from rippletwin.learning.tables import cost_table
 from rippletwin.twin.twin_file import load_twin
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 results = pd.read_csv(snakemake.input.table)
 verdict = json.loads(Path(snakemake.input.verdict).read_text())
 effects = load_twin(snakemake.input.twin).effects
@@ -25,9 +25,9 @@ recordings left out of its fit: {verdict["fit"]["before"]["held_out"]:.1%} befor
 Accuracy on recordings in per cent, mean and standard deviation over seeds: with the calibrated
 twin, with the corrected one, and the difference, which is the cost.
 
-{cost_table(results)}
+{cost_table(results, snakemake.params.pairs)}
 ## Either severity of a cylinder fault counts as right
 
-{cost_table(results, "accuracy_either")}"""
+{cost_table(results, snakemake.params.pairs, "accuracy_either")}"""
 )
-tell(f"{len(taken_in)} effects taken in")
+report_progress(f"{len(taken_in)} effects taken in")

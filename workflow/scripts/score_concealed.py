@@ -5,10 +5,10 @@ from pathlib import Path
 
 from concealed.commitments import sha256_of_files
 from concealed.score import score_case
-from job import start
+from job import open_log
 from virtualrig.seal import open_seal_file
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 paths = snakemake.input
 committed = json.loads(Path(paths.commitments[0]).read_text())
 digests = sha256_of_files([*paths.seals, *paths.verdicts, *paths.baselines])
@@ -24,4 +24,4 @@ for case, (seal, key, *results) in enumerate(
     row = score_case(open_seal_file(seal, key), verdict, baselines, oracle["oracle_log_evidence"])
     rows.append({"case": case} | row)
 Path(snakemake.output.rows).write_text(json.dumps(rows, indent=1) + "\n")
-tell(f"{len(rows)} cases scored")
+report_progress(f"{len(rows)} cases scored")

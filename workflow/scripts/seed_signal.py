@@ -3,11 +3,11 @@
 import numpy as np
 import xarray as xr
 
-from job import start
+from job import open_log
 from rippletwin import store
 from rippletwin.flow_sensor.spectral_inversion import band_limit
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 params = snakemake.params
 stores = [store.load(path) for path in snakemake.input.states]
 signals = [dataset[params.signal] for dataset in stores]
@@ -25,4 +25,4 @@ store.save(
     ),
     snakemake.output[0],
 )
-tell(f"{len(stores)} states from {stores[0].attrs['source']}")
+report_progress(f"{len(stores)} states from {stores[0].attrs['source']}")

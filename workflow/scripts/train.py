@@ -6,14 +6,15 @@ from dataclasses import asdict
 import numpy as np
 import torch
 
-from job import start
+from job import open_log
 from rippletwin import store
+from rippletwin.learning.accuracy import UNKNOWN
 from rippletwin.learning.architectures import CLASSES
 from rippletwin.learning.dataset import split_by_time
 from rippletwin.learning.networks import build
 from rippletwin.learning.training import TrainingSettings, train
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 params, paths = snakemake.params, snakemake.input.samples
 settings = TrainingSettings(**params.settings, threads=snakemake.threads)
 
@@ -23,8 +24,8 @@ def samples(path):
     data = store.load(path)
     if "label" in data:
         return data.signal.values, data.label.values
-    kept, _ = split_by_time(np.bincount(data.recording), params.share)
-    kept = kept[data.state.values[kept] != "?"]  # nothing to learn from an unknown state
+    kept, _ = split_by_time(np.bincount(data.recording), params.learnt_share)
+    kept = kept[data.state.values[kept] != UNKNOWN]  # nothing to learn from an unknown state
     state = np.where(data.state == "C", params.cylinder, data.state)[kept]
     return data.signal.values[kept], np.array([CLASSES.index(s) for s in state])
 
@@ -43,7 +44,7 @@ for seed in range(params.seeds):
     )
     weights.append(network.state_dict())
     histories.append(asdict(history))
-    tell(
+    report_progress(
         f"seed {seed + 1} of {params.seeds}: {history.epochs} epochs, {history.reason}, "
         f"validation accuracy {history.validation_accuracy[history.best_epoch]:.1%}"
     )

@@ -20,7 +20,7 @@ from rippletwin.case.model import (
     Uncertainty,
 )
 from rippletwin.case.plausibility import implausible
-from rippletwin.case.readers import read_signals
+from rippletwin.case.readers.registry import read_signals
 from rippletwin.case.rig_yaml import find_sheet, read_sheet, schema_errors
 from rippletwin.case.sheet_checks import sheet_errors
 from rippletwin.case.signal_checks import sampling_rate, signal_errors

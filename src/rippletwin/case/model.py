@@ -1,4 +1,7 @@
-"""What a user gives: the rig and its recordings, as frozen dataclasses named as in rig.yaml."""
+"""What a user gives: the rig and its recordings, as frozen dataclasses named as in rig.yaml.
+
+Units are SI; pressures are gauge pressures.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +20,16 @@ STATE_CODES = {
     "unknown": None,
 }
 """State labels of rig.yaml and the class they stand for; None is a state nobody knows."""
+
+
+ATMOSPHERE = 101325.0
+"""Standard atmosphere, Pa. Every pressure of a case, a twin and a pump is a gauge pressure, above
+it; a gas goes by the absolute one."""
+
+
+def absolute(gauge):
+    """Absolute pressure, Pa, of a gauge pressure of any shape."""
+    return gauge + ATMOSPHERE
 
 
 @dataclass(frozen=True)

@@ -1,1 +1,1 @@
-"""Missing physics: search, localisation, checks and verdict."""
+"""Missing physics: what does a calibrated twin lack? Search, localise, check, report."""

@@ -1,71 +1,90 @@
-"""`explain`: from a case to what its twin lacks."""
+"""`explain`: from the healthy recordings of a case to what its twin lacks.
+
+The steps of the method, each with the module that takes it:
+
+ 1. Observe: harmonics of every recording and of its halves       spectra.observation
+ 2. Find contradictions in the data                               checks.data_contradictions
+ 3. Prepare: phase modulation of the shaft, base twin             localise.phase_modulation
+ 4. Search: stepwise selection of effects                         search.stepwise_search
+ 5. Search again with the modulation by the explained line        localise.phase_modulation
+ 6. Couple the pump to the line and resume the search             twin.pump_line_coupling
+ 7. Drop effects that fail on held-out data                       checks.cross_validation
+ 8. Find the intervals of the effects' parameters                 checks.profile_intervals
+ 9. Fit passive networks, which need no name                      search.passive_networks
+10. Find swapped sensors and inverted signs                       checks.sensor_wiring
+11. Read the alarms: misfit, pull, disagreement, drift            checks.alarms
+12. Repeat the best fits with an unknown source                   localise.source_free_fits
+13. Cross-validate the base and the explanation                   checks.cross_validation
+14. Draw the null distribution of the evidence, if asked for      checks.bootstrap
+15. Decide                                                        verdict.decision
+16. Test the data sheet: prior sensitivity of accepted effects    checks.prior_sensitivity
+17. Locate the mismatch with free corrections                     localise.free_corrections
+18. Analyse the shaft orders by the explained line                localise.shaft_orders
+
+`verdict.verdict_file` writes the result.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from rippletwin.calibration.fit import Fit
-from rippletwin.calibration.frequency_continuation import fit_hypothesis
 from rippletwin.calibration.posterior import MIN_MODEL_ERROR
-from rippletwin.case.model import Case
+from rippletwin.case.model import Case, Recording, Rig
 from rippletwin.errors import InputError
-from rippletwin.explanation.checks import alarms, data_contradictions, sensor_wiring
+from rippletwin.explanation.checks.alarms import fit_each_observation, read_alarms
 from rippletwin.explanation.checks.bootstrap import bootstrap_null
 from rippletwin.explanation.checks.cross_validation import (
     cross_validate,
     prune_by_cross_validation,
 )
-from rippletwin.explanation.checks.prior_sensitivity import (
-    compare_without_each_effect,
-)
+from rippletwin.explanation.checks.data_contradictions import find_contradictions
+from rippletwin.explanation.checks.prior_sensitivity import compare_without_each_effect
 from rippletwin.explanation.checks.profile_intervals import add_profile_intervals
-from rippletwin.explanation.fit_jobs import Workers, open_workers
-from rippletwin.explanation.localise import free_corrections, source_free_fits
-from rippletwin.explanation.localise.shaft_orders import (
-    MIN_RELATIVE_LEVEL,
-    MODULATION_SHARE,
-    ROUGH_MODULATION_SHARE,
-    ShaftOrders,
-    analyse_shaft_orders,
+from rippletwin.explanation.checks.sensor_wiring import find_swapped_sensors
+from rippletwin.explanation.fit_jobs import FitJob, open_workers
+from rippletwin.explanation.localise.free_corrections import locate_mismatch
+from rippletwin.explanation.localise.phase_modulation import (
+    estimate_phase_modulation,
     modulation_differs,
-    shaft_order_level,
     with_phase_modulation,
 )
-from rippletwin.explanation.search.stepwise_moves import extension_job
+from rippletwin.explanation.localise.shaft_order_interval import add_amplitude_interval
+from rippletwin.explanation.localise.shaft_orders import ShaftOrders, analyse_shaft_orders
+from rippletwin.explanation.localise.source_free_fits import refit_source_free
+from rippletwin.explanation.search.passive_networks import best_explanation, fit_passive_networks
 from rippletwin.explanation.search.stepwise_search import Search, resume_search, search_effects
-from rippletwin.explanation.thresholds import GOOD
+from rippletwin.explanation.thresholds import MODULATION_SHARE, ROUGH_MODULATION_SHARE
 from rippletwin.explanation.verdict.decision import decide, withdraw_refuted_name
 from rippletwin.explanation.verdict.explanation import Explanation
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
-from rippletwin.spectra.observation import observe, revolutions_of
-from rippletwin.twin.effects.library import candidates
+from rippletwin.spectra.observation import Observation, observe, revolutions_of
 from rippletwin.twin.forward_model import ForwardModel
 from rippletwin.twin.pump_line_coupling import couple_pump_to_line
 from rippletwin.twin.twin import Twin
 
-HIGHEST_HZ = 4000.0
-MAX_MODEL_ERROR_FOR_COUPLING = (
-    10.0 * MIN_MODEL_ERROR
-)  # relative model error above which pressure and flow at the pump are unknown
+HIGHEST_HZ = 4000.0  # of the harmonics that are fitted
+MAX_MODEL_ERROR_FOR_COUPLING = 10.0 * MIN_MODEL_ERROR
+"""Relative model error above which pressure and flow at the pump are too uncertain."""
+
+Progress = Callable[[str, int, int], None]
 
 
 def explain(
-    case: Case,
-    processes: int = 2,
-    progress: Callable[[str, int, int], None] | None = None,
-    draws: int = 0,
+    case: Case, processes: int = 2, progress: Progress | None = None, draws: int = 0
 ) -> Explanation:
-    """Explain a case's healthy recordings.
+    """Explain the healthy recordings of a case.
 
-    `progress` is told what is being fitted, how many fits are done, and of how many. With `draws`
-    the threshold is that of as many recordings drawn without an effect (`explain.bootstrap`).
-    Raises InputError where no recording is healthy.
+    progress  gets what is being fitted, how many fits are done and how many there are
+    draws     recordings without an effect to draw for the threshold (`checks.bootstrap`); 0 for
+              the default threshold
+
+    Raises InputError if no recording is healthy.
     """
     if not case.healthy:
         raise InputError(
@@ -74,197 +93,200 @@ def explain(
             "none has state: healthy",
             "explaining needs at least one healthy recording",
         )
-    # Linear algebra on large arrays: threads suffice, each with one of its own.
-    with threadpool_limits(1), ThreadPoolExecutor(max(processes, 1)) as pool:
-        read = list(pool.map(partial(observe_whole_and_halves, rig=case.rig), case.healthy))
-    observations = [parts[0] for parts in read]
-    early, late = ([parts[k] for parts in read if len(parts) > 1] for k in (1, 2))
-    reason = data_contradictions.find_contradictions(
-        case.rig, case.healthy, observations, early, late
-    )
+    observations, early, late = _observe_all(case, processes)
+    contradiction = find_contradictions(case.rig, case.healthy, observations, early, late)
     return explain_observations(
-        case.rig, observations, early, late, processes, progress, reason, draws
+        case.rig, observations, early, late, processes, progress, contradiction, draws
     )
 
 
 def explain_observations(
-    rig,
-    observations: Sequence,
-    early: Sequence = (),
-    late: Sequence = (),
+    rig: Rig,
+    observations: Sequence[Observation],
+    early: Sequence[Observation] = (),
+    late: Sequence[Observation] = (),
     processes: int = 2,
-    progress: Callable[[str, int, int], None] | None = None,
-    reason: str = "",
+    progress: Progress | None = None,
+    contradiction: str = "",
     draws: int = 0,
 ) -> Explanation:
-    """Explain observations; `early` and `late` are those of the two halves of periodic ones.
+    """Explain observations: steps 3 to 18.
 
-    `reason` says why the data contradict themselves, where they do; then nothing is searched for.
-    With `draws` the threshold is that of so many recordings drawn without an effect.
+    early, late    observations of the two halves of periodic recordings
+    contradiction  why the data contradict themselves, if they do; then nothing is searched for
     """
-    turning = _estimate_phase_modulation(rig, observations)
-    base, data, found = *prepare_base(rig, observations, turning), None
-    if not reason:
-        found = _search(base, data, processes, progress)
-        shaft = _shaft(found.best, observations)
-        if modulation_differs(shaft, turning, data):
-            turning = shaft
-            base, data = prepare_base(rig, observations, turning)
-            found = _search(base, data, processes, progress)
-        base, data, found = _search_with_coupled_pump(base, data, found, processes, progress)
-    early, late = (
-        select_fitted_frequencies(with_phase_modulation(part, turning), rig, HIGHEST_HZ)
-        for part in (early, late)
-    )
-    held = late if len(data) == 1 and late else None
-    with open_workers(base, data, processes) as pool:
-        if found is None:
-            fit = pool.fit([{"hypothesis": ()}])[0]
-            found = Search(fit, [], fit)
-        else:
-            found.best = add_profile_intervals(
-                pool, prune_by_cross_validation(pool, found.best, held)
-            )
-            found.passive_networks = _fit_passive_networks(pool, found)
-            reason = sensor_wiring.find_swapped_sensors(base, data, found)
-        single = _fit_each_observation(pool, found.base)
-        rung = alarms.Alarms(
-            found.base.model_error,
-            alarms.largest_pull(found.base),
-            alarms.largest_disagreement(single),
-            alarms.drift_p_value(early, late, rig.delay),
+    # Steps 3 to 6: search
+    modulation = estimate_phase_modulation(rig, observations, HIGHEST_HZ)
+    base, data = prepare_base(rig, observations, modulation)
+    state = _State(base, data, modulation)
+    if contradiction:
+        search = _fit_base_only(state)
+    else:
+        search = _search(state, processes, progress)
+        state, search = _search_again(state, search, observations, processes, progress)
+        state, search = _search_with_coupled_pump(state, search, processes, progress)
+    base, data = state.base, state.observations
+    early = _select_fitted(early, rig, state.modulation)
+    late = _select_fitted(late, rig, state.modulation)
+    held_out = late if len(data) == 1 and late else None
+    with open_workers(base, data, processes) as workers:
+        if not contradiction:
+            # Steps 7 to 10: the best explanation and its competitors
+            best = prune_by_cross_validation(workers, search.best, held_out)
+            best = add_profile_intervals(workers, best)
+            networks = fit_passive_networks(workers, best)
+            search = replace(search, best=best, passive_networks=networks)
+            contradiction = find_swapped_sensors(base, data, search)
+        # Steps 11 to 14: checks
+        point_fits = fit_each_observation(workers, search.base)
+        alarms = read_alarms(search.base, point_fits, early, late, rig.delay)
+        source_free_fits = refit_source_free(workers, search)
+        explanation = best_explanation(search)
+        validation = cross_validate(workers, search.base, explanation, held_out)
+        null_distribution = None
+        if draws and search.best.hypothesis:
+            null_distribution = bootstrap_null(search.base, data, draws, processes, progress)
+        # Steps 15 and 16: decision
+        decision = decide(
+            search,
+            alarms,
+            validation if explanation.hypothesis else None,
+            contradiction,
+            null_distribution,
         )
-        explanation = found.passive_networks[0] if _prefers_other(found) else found.best
-        blind = source_free_fits.refit_source_free(pool, found)
-        validation = cross_validate(pool, found.base, explanation, held)
-        checked = validation if explanation.hypothesis else None
-        by_chance = None
-        if draws and found.best.hypothesis:
-            by_chance = bootstrap_null(found.base, data, draws, processes, progress)
-        judgement = decide(found, rung, checked, reason, by_chance)
-        without = compare_without_each_effect(pool, found.base, judgement.accepted)
-        judgement = withdraw_refuted_name(judgement, without)
+        sensitivity = compare_without_each_effect(workers, search.base, decision.accepted)
+        decision = withdraw_refuted_name(decision, sensitivity)
+    # Steps 17 and 18: where the mismatch is
+    location = locate_mismatch(search.base, data)
+    shaft_orders = add_amplitude_interval(
+        _analyse_shaft_orders(decision.accepted, observations),
+        decision.accepted,
+        observations,
+        HIGHEST_HZ,
+    )
     return Explanation(
         rig=rig,
         observations=tuple(data),
-        alarms=rung,
-        search=found,
-        judgement=judgement,
+        search=search,
+        alarms=alarms,
         validation=validation,
-        single=tuple(single),
-        shaft=_shaft(judgement.accepted, observations),
-        blind=tuple(blind),
-        located=free_corrections.locate(found.base, data),
-        without=without,
-        chance=by_chance,
+        decision=decision,
+        point_fits=tuple(point_fits),
+        source_free_fits=tuple(source_free_fits),
+        prior_sensitivity=sensitivity,
+        shaft_orders=shaft_orders,
+        location=location,
+        null_distribution=null_distribution,
     )
 
 
-def prepare_base(
-    rig, observations: Sequence, turning: ShaftOrders | None = None
-) -> tuple[Twin, list]:
-    """The paper's line, not yet fitted, and the observations as fits take them, of a shaft that
-    turns as `turning` says."""
-    highest = HIGHEST_HZ if observations[0].orders is not None else None
-    data = select_fitted_frequencies(with_phase_modulation(observations, turning), rig, highest)
-    base = Twin(rig, data, uncertain_pump=True)
-    ForwardModel(
-        base, data
-    )  # what the twin keeps of the pump is worked out before the processes part
-    return base, data
+@dataclass(frozen=True)
+class _State:
+    """What is fitted: the base twin, the observations, and the modulation of their ripple."""
+
+    base: Twin
+    observations: list[Observation]
+    modulation: ShaftOrders | None
 
 
-def _search(base: Twin, data: Sequence, processes: int, progress) -> Search:
-    with open_workers(base, data, processes) as pool:
-        return search_effects(pool, progress)
+def _observe_all(case: Case, processes: int) -> tuple[list, list, list]:
+    """Step 1: observations of the healthy recordings, and of their early and late halves."""
+    # Threads suffice: most of the time goes to linear algebra on large arrays, which releases the
+    # interpreter. Each uses one thread of its own.
+    with threadpool_limits(1), ThreadPoolExecutor(max(processes, 1)) as pool:
+        parts = list(pool.map(partial(observe_whole_and_halves, rig=case.rig), case.healthy))
+    whole = [part[0] for part in parts]
+    early, late = ([part[k] for part in parts if len(part) > 1] for k in (1, 2))
+    return whole, early, late
 
 
-def _search_with_coupled_pump(
-    base: Twin, data: Sequence, found: Search, processes: int, progress
-) -> tuple:
-    """Base, observations and what the search found: where the source is the lumped pump, that has
-    been made to answer the line, and the search has gone on."""
-    known = (
-        couple_pump_to_line(found.best.twin, data)
-        if found.best.model_error < MAX_MODEL_ERROR_FOR_COUPLING
-        else None
-    )
-    if known is None:
-        return base, data, found
-    base = Twin(base.rig, known, uncertain_pump=True)
-    with open_workers(base, known, processes) as pool:
-        return base, known, resume_search(pool, found, progress)
-
-
-def _estimate_phase_modulation(rig, observations: Sequence) -> ShaftOrders | None:
-    """How unevenly the shaft turns, by a line that is calibrated and no more; None where evenly.
-    The line as it is explained will tell better."""
-    found = None
-    if "pistons" in rig.pump:
-        found = shaft_order_level(observations, rig.pump["pistons"], HIGHEST_HZ)
-    if found is None or found[0] < MIN_RELATIVE_LEVEL:
-        return None
-    shaft = None
-    for uncertain_pump in (False, True):
-        # What a swing takes from the ripple must not be put down to the pump, so that comes second.
-        data = select_fitted_frequencies(
-            with_phase_modulation(observations, shaft), rig, HIGHEST_HZ
-        )
-        twin = fit_hypothesis(Twin(rig, data, uncertain_pump=uncertain_pump), (), data).twin
-        shaft = analyse_shaft_orders(twin, observations, HIGHEST_HZ, ROUGH_MODULATION_SHARE)
-    return shaft
-
-
-def _shaft(fit: Fit, observations: Sequence) -> ShaftOrders | None:
-    """How the shaft turns by the line as it is explained, as far as it is."""
-    share = (
-        MODULATION_SHARE
-        if fit.model_error < MAX_MODEL_ERROR_FOR_COUPLING
-        else ROUGH_MODULATION_SHARE
-    )
-    return analyse_shaft_orders(fit.twin, observations, HIGHEST_HZ, share)
-
-
-def _fit_passive_networks(pool: Workers, found: Search) -> list[Fit]:
-    """Passive networks without a name, alone and beside the best, where there is room for them."""
-    best = found.best
-    if best.model_error <= GOOD:
-        return []
-    networks = [c for c in candidates(pool.base.rig, named=False)]
-    jobs = [{"hypothesis": (network,)} for network in networks]
-    if best.hypothesis:
-        jobs += [extension_job(best, network, pool.base.rig) for network in networks]
-    fits = [f for f in pool.fit(jobs) if np.isfinite(f.evidence)]
-    return sorted(fits, key=lambda f: -f.evidence)
-
-
-def _prefers_other(found: Search) -> bool:
-    best = found.best
-    if not found.passive_networks:
-        return False
-    return found.passive_networks[0].evidence > best.evidence and best.model_error > GOOD
-
-
-def _fit_each_observation(pool: Workers, base: Fit) -> list[Fit]:
-    """The base fitted to each observation alone; none where there is only one."""
-    count = len(pool.observations)
-    if count < 2:
-        return []
-    return pool.fit(
-        [{"hypothesis": (), "theta": base.twin.theta, "use": [k]} for k in range(count)]
-    )
-
-
-def observe_whole_and_halves(recording, rig) -> list:
-    """The observation of a recording; of a periodic one then those of both halves of its
-    revolutions."""
+def observe_whole_and_halves(recording: Recording, rig: Rig) -> list[Observation]:
+    """The observation of a recording; for a periodic one also those of both halves."""
     if recording.kind != "periodic":
         return [observe(recording, rig, HIGHEST_HZ)]
     revolutions = revolutions_of(recording, rig)
-    count = len(revolutions.windows)
-    cuts = [slice(None), slice(0, count // 2), slice(count // 2, None)]
+    half = len(revolutions.windows) // 2
     parts = [
-        replace(revolutions, windows=revolutions.windows[cut], speed_hz=revolutions.speed_hz[cut])
-        for cut in cuts
+        replace(revolutions, windows=revolutions.windows[part], speed_hz=revolutions.speed_hz[part])
+        for part in (slice(None), slice(0, half), slice(half, None))
     ]
     return [observe(recording, rig, HIGHEST_HZ, revolutions=part) for part in parts]
+
+
+def prepare_base(
+    rig: Rig, observations: Sequence[Observation], modulation: ShaftOrders | None = None
+) -> tuple[Twin, list[Observation]]:
+    """Step 3: the twin without effects, not yet fitted, and the observations as they are fitted.
+
+    `modulation` is that of the shaft (`localise.phase_modulation`).
+    """
+    highest_hz = HIGHEST_HZ if observations[0].orders is not None else None
+    data = select_fitted_frequencies(
+        with_phase_modulation(observations, modulation), rig, highest_hz
+    )
+    base = Twin(rig, data, uncertain_pump=True)
+    # Simulate the pump before the worker processes start: the twin keeps the result.
+    ForwardModel(base, data)
+    return base, data
+
+
+def _fit_base_only(state: _State) -> Search:
+    """The fitted base in place of a search."""
+    with open_workers(state.base, state.observations, 1) as workers:
+        (fit,) = workers.fit([FitJob(())])
+    return Search(fit, [], fit)
+
+
+def _search(state: _State, processes: int, progress: Progress | None) -> Search:
+    """Step 4: stepwise selection of effects."""
+    with open_workers(state.base, state.observations, processes) as workers:
+        return search_effects(workers, progress)
+
+
+def _search_again(
+    state: _State,
+    search: Search,
+    observations: Sequence[Observation],
+    processes: int,
+    progress: Progress | None,
+) -> tuple[_State, Search]:
+    """Step 5: search again if the explained line gives another phase modulation.
+
+    `observations` have all shaft orders.
+    """
+    modulation = _analyse_shaft_orders(search.best, observations)
+    if not modulation_differs(modulation, state.modulation, state.observations):
+        return state, search
+    base, data = prepare_base(state.base.rig, observations, modulation)
+    state = _State(base, data, modulation)
+    return state, _search(state, processes, progress)
+
+
+def _search_with_coupled_pump(
+    state: _State, search: Search, processes: int, progress: Progress | None
+) -> tuple[_State, Search]:
+    """Step 6: let a simulated pump respond to the line's pressure, and resume the search."""
+    if search.best.model_error >= MAX_MODEL_ERROR_FOR_COUPLING:
+        return state, search
+    coupled = couple_pump_to_line(search.best.twin, state.observations)
+    if coupled is None:
+        return state, search
+    base = Twin(state.base.rig, coupled, uncertain_pump=True)
+    with open_workers(base, coupled, processes) as workers:
+        search = resume_search(workers, search, progress)
+    return _State(base, coupled, state.modulation), search
+
+
+def _select_fitted(
+    observations: Sequence[Observation], rig: Rig, modulation: ShaftOrders | None
+) -> list[Observation]:
+    """The halves of recordings as they are fitted."""
+    modulated = with_phase_modulation(observations, modulation)
+    return select_fitted_frequencies(modulated, rig, HIGHEST_HZ)
+
+
+def _analyse_shaft_orders(fit: Fit, observations: Sequence[Observation]) -> ShaftOrders | None:
+    """The shaft orders by a fitted line; a poor fit asks less of a modulation."""
+    is_poor = fit.model_error >= MAX_MODEL_ERROR_FOR_COUPLING
+    share = ROUGH_MODULATION_SHARE if is_poor else MODULATION_SHARE
+    return analyse_shaft_orders(fit.twin, observations, HIGHEST_HZ, share)

@@ -1,10 +1,15 @@
-"""Fits of many hypotheses to one set of data, in processes."""
+"""Fits of many hypotheses to one set of observations, in several processes.
+
+A `FitJob` says which hypothesis is fitted and how the fit starts: by continuation in frequency from
+the nominal values, from a given theta, or near another fit.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from dataclasses import dataclass
 from itertools import product
 from multiprocessing import get_context
 
@@ -15,8 +20,116 @@ from rippletwin.calibration.fit import Fit, Hypothesis
 from rippletwin.calibration.frequency_continuation import fit_hypothesis, refine
 from rippletwin.twin.twin import Twin
 
-WEAK_COORDINATE = -2.0  # of a weak effect's parameters, in prior standard deviations
-PLACES_PER_WAVE = 8  # on the shortest wave
+WEAK_COORDINATE = -2.0  # of a weak effect's strength, in prior standard deviations
+POSITIONS_PER_WAVELENGTH = 8  # starts of a weak effect's position, on the shortest wavelength
+
+
+@dataclass(frozen=True)
+class Continuation:
+    """Start from the nominal values at low frequencies and raise the frequency limit step by step.
+
+    starts  coordinates of effect parameters by name, one mapping a start; empty for the scan of the
+            newest effect (`scan_starts`)
+    draws   number of random starts around each mode below a limit (see `fit_hypothesis`)
+    """
+
+    starts: tuple[Mapping[str, float], ...] = ()
+    draws: int = 0
+
+    def count_starts(self, rig, hypothesis: Hypothesis) -> int:
+        """Number of starts, at most."""
+        return len(self.starts or scan_starts(rig, hypothesis)) + self.draws
+
+    def fit(self, base: Twin, hypothesis: Hypothesis, observations, source_free: bool) -> Fit:
+        """Fit `hypothesis` by continuation in frequency."""
+        starts = self.starts or scan_starts(base.rig, hypothesis)
+        return fit_hypothesis(base, hypothesis, observations, starts, source_free, self.draws)
+
+
+@dataclass(frozen=True, eq=False)
+class FromTheta:
+    """Start on all frequencies at `theta` (P,); with `exact` end at the exact mode (`refine`)."""
+
+    theta: np.ndarray
+    exact: bool = True
+
+    def count_starts(self, rig, hypothesis: Hypothesis) -> int:
+        """Number of starts: one."""
+        return 1
+
+    def fit(self, base: Twin, hypothesis: Hypothesis, observations, source_free: bool) -> Fit:
+        """Fit `hypothesis` from `theta`."""
+        return refine(base, hypothesis, observations, [self.theta], source_free, self.exact)
+
+
+@dataclass(frozen=True, eq=False)
+class NearFit:
+    """Start on all frequencies at another `neighbour` fit, with the newest effect added.
+
+    The newest effect starts from its scan and from small strengths at many positions.
+    """
+
+    neighbour: Fit
+
+    def count_starts(self, rig, hypothesis: Hypothesis) -> int:
+        """Number of starts in the effect's scan."""
+        return len(scan_starts(rig, hypothesis))
+
+    def fit(self, base: Twin, hypothesis: Hypothesis, observations, source_free: bool) -> Fit:
+        """Fit `hypothesis` from the best of the starts near `neighbour`."""
+        highest_hz = max(o.frequency_hz[-1] for o in observations)
+        positions = int(np.ceil(POSITIONS_PER_WAVELENGTH * base.rig.delay * highest_hz))
+        starts = scan_starts(base.rig, hypothesis)
+        starts += [
+            start
+            for start in weak_effect_starts(base.rig, hypothesis, positions)
+            if start not in starts
+        ]
+        twin, thetas = base.with_(effects=hypothesis), []
+        for start in starts:
+            theta = transfer_theta(self.neighbour, hypothesis, base)
+            for name, u in start.items():
+                theta[twin.index[name]] = u
+            thetas.append(theta)
+        return refine(base, hypothesis, observations, thetas, source_free, exact=False)
+
+
+@dataclass(frozen=True, eq=False)
+class FitJob:
+    """One fit.
+
+    hypothesis    the effects of the twin, each at its place
+    start         where the fit starts
+    observations  indices of the observations that are fitted; None for all
+    base          twin without effects that replaces that of the workers, as where the priors
+                  differ; None for theirs
+    source_free   whether the source's amplitude and phase are unknown at every frequency
+    """
+
+    hypothesis: Hypothesis
+    start: Continuation | FromTheta | NearFit = Continuation()
+    observations: tuple[int, ...] | None = None
+    base: Twin | None = None
+    source_free: bool = False
+
+
+def run_fit_job(base: Twin, observations: Sequence, job: FitJob) -> Fit:
+    """Run a job on the observations, with the twin `base` unless the job has one of its own."""
+    if job.observations is not None:
+        observations = [observations[k] for k in job.observations]
+    base = base if job.base is None else job.base
+    return job.start.fit(base, job.hypothesis, observations, job.source_free)
+
+
+def job_from(fit: Fit, **options) -> FitJob:
+    """The job that repeats a fit from its mode; `options` are fields of `FitJob`."""
+    return FitJob(fit.hypothesis, FromTheta(fit.twin.theta), **options)
+
+
+def job_without_effect(fit: Fit, k: int, base: Twin) -> FitJob:
+    """The job that refits without effect k, from the mode of `fit`."""
+    rest = fit.without(k)
+    return FitJob(rest, FromTheta(transfer_theta(fit, rest, base)))
 
 
 def scan_starts(rig, hypothesis: Hypothesis) -> list[dict[str, float]]:
@@ -24,9 +137,11 @@ def scan_starts(rig, hypothesis: Hypothesis) -> list[dict[str, float]]:
     return _combined(rig, hypothesis, lambda parameter: parameter.scan)
 
 
-def weak_effect_starts(rig, hypothesis: Hypothesis, places: int) -> list[dict[str, float]]:
-    """Starts for the newest effect where it does little: positive parameters that have no scan of
-    their own at WEAK, and as many `places` along the line, about a good fit the valleys are narrow.
+def weak_effect_starts(rig, hypothesis: Hypothesis, positions: int) -> list[dict[str, float]]:
+    """Starts for a newest effect of small strength.
+
+    Positive parameters without a scan start at WEAK_COORDINATE. A position starts at `positions`
+    points along the line: near a good fit the modes are narrow.
     """
 
     def coordinates(parameter):
@@ -34,7 +149,7 @@ def weak_effect_starts(rig, hypothesis: Hypothesis, places: int) -> list[dict[st
         if prior.kind == "lognormal" and len(parameter.scan) == 1:
             return (WEAK_COORDINATE,)
         if parameter.name == "position":
-            share = (np.arange(places) + 0.5) / places
+            share = (np.arange(positions) + 0.5) / positions
             return tuple(prior.coordinate(prior.centre + prior.scale * share))
         return parameter.scan
 
@@ -51,7 +166,7 @@ def _combined(rig, hypothesis: Hypothesis, coordinates: Callable) -> list[dict[s
 
 
 def transfer_theta(fit: Fit, hypothesis: Hypothesis, base: Twin) -> np.ndarray:
-    """theta of a twin with another hypothesis, parameters in common where `fit` has them."""
+    """theta (P,) of a twin with another hypothesis; parameters that `fit` has keep its values."""
     twin = base.with_(effects=hypothesis)
     return np.array(
         [
@@ -62,75 +177,66 @@ def transfer_theta(fit: Fit, hypothesis: Hypothesis, base: Twin) -> np.ndarray:
 
 
 def common_coordinates(fit: Fit, hypothesis: Hypothesis) -> dict[str, float]:
-    """Coordinates by name, as fitted, of the effects that another hypothesis has too."""
+    """Fitted coordinates by name of the effects that another hypothesis has too."""
     names = {f"{effect.name}@{place}" for effect, place in hypothesis}
     index, theta = fit.twin.index, fit.twin.theta
     return {name: float(theta[k]) for name, k in index.items() if name.split(".")[0] in names}
 
 
-def job_without_effect(fit: Fit, k: int, base: Twin) -> dict:
-    """The job that fits again without effect k, from where the fit is."""
-    rest = fit.without(k)
-    return {"hypothesis": rest, "theta": transfer_theta(fit, rest, base)}
-
-
 class Workers:
-    """Fits hypotheses to one set of data, in `pool` or, where that is None, in this process."""
+    """Run jobs on one base twin and one set of observations.
+
+    `pool` is a process pool whose processes hold both (`open_workers`); None runs the jobs in this
+    process.
+    """
 
     def __init__(self, base: Twin, observations: Sequence, pool=None):
         self.base, self.observations = base, list(observations)
         self._pool = pool
 
-    def fit(self, jobs: Sequence[dict], progress: Callable[[], None] | None = None) -> list[Fit]:
-        """Fits in the order of `jobs`, each a hypothesis and options of `work`.
+    def fit(self, jobs: Sequence[FitJob], progress: Callable[[], None] | None = None) -> list[Fit]:
+        """Fits in the order of `jobs`; `progress` is called after each.
 
-        Those of most starts are begun first, so that no process ends long after the others.
+        Jobs with the most starts run first, so that no process is left with a long job at the end.
         """
-        first = sorted(range(len(jobs)), key=lambda k: -self._starts(jobs[k]))
-        fits = self.map(run_fit_job, [jobs[k] for k in first], progress)
-        return [fit for _, fit in sorted(zip(first, fits), key=lambda pair: pair[0])]
-
-    def _starts(self, job: dict) -> int:
-        """How many a fit sets out from, at most."""
-        if "theta" in job:
-            return 1
-        starts = job.get("starts") or scan_starts(self.base.rig, job["hypothesis"])
-        return len(starts) + job.get("draws", 0)
+        rig = self.base.rig
+        order = sorted(
+            range(len(jobs)), key=lambda k: -jobs[k].start.count_starts(rig, jobs[k].hypothesis)
+        )
+        fits = self.map(run_fit_job, [jobs[k] for k in order], progress)
+        return [fit for _, fit in sorted(zip(order, fits), key=lambda pair: pair[0])]
 
     def map(
-        self,
-        function: Callable,
-        jobs: Sequence[dict],
-        progress: Callable[[], None] | None = None,
+        self, function: Callable, jobs: Sequence, progress: Callable[[], None] | None = None
     ) -> list:
-        """function(base twin, observations, job) of every job, in their order."""
+        """function(base twin, observations, job) of every job, in the order of `jobs`."""
         calls = [(function, job) for job in jobs]
         if self._pool is None:
-            _prepare(self.base, self.observations)
-            results = map(_call, calls)
+            _keep_data(self.base, self.observations)
+            pending = map(_call, calls)
         else:
-            results = self._pool.map(_call, calls)
-        found = []
-        for result in results:
-            found.append(result)
+            pending = self._pool.map(_call, calls)
+        results = []
+        for result in pending:
+            results.append(result)
             if progress is not None:
                 progress()
-        return found
+        return results
 
 
 @contextmanager
 def open_workers(base: Twin, observations: Sequence, count: int) -> Iterator[Workers]:
-    """`Workers` with `count` processes; an interrupt ends them.
+    """`Workers` with `count` processes, which end with the context, also on an interrupt.
 
-    Linear algebra gets one thread in each: more of them wait for each other where the processes
-    already fill the machine.
+    Linear algebra gets one thread in each process: more threads than processor cores wait for each
+    other.
     """
     with threadpool_limits(1):
         if count < 2:
             yield Workers(base, observations)
             return
         pool = ProcessPoolExecutor(
-            count, get_context("fork"), initializer=_prepare, initargs=(base, observations)
+            count, get_context("fork"), initializer=_keep_data, initargs=(base, observations)
         )
         try:
             yield Workers(base, observations, pool)
@@ -138,66 +244,36 @@ def open_workers(base: Twin, observations: Sequence, count: int) -> Iterator[Wor
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-_DATA: tuple = ()  # of a worker process: base twin and observations
+_DATA: tuple = ()  # base twin and observations of a worker process
 
 
-def _prepare(base, observations):
+def _keep_data(base, observations):
     global _DATA
     _DATA = base, observations
 
 
-def _call(call: tuple[Callable, dict]):
+def _call(call: tuple[Callable, object]):
     function, job = call
     return function(*_DATA, job)
 
 
-def run_fit_job(base: Twin, observations: Sequence, job: dict) -> Fit:
-    """Fit `hypothesis` to the observations with the indices `use` (all by default).
-
-    The job's `base` takes the place of the twin, as where the sheet is another. With `theta` from
-    there, `exact` as in `refine`; with `fit` from where that ended and the newest effect's starts,
-    as strong as its prior and weak; else by continuation from the starts `starts` or the newest
-    effect's scan; `source_free` and `draws` as in `fit_hypothesis`.
-    """
-    base = job.get("base", base)
-    use = job.get("use")
-    observations = observations if use is None else [observations[k] for k in use]
-    hypothesis, free = job["hypothesis"], job.get("source_free", False)
-    if "theta" in job:
-        return refine(base, hypothesis, observations, [job["theta"]], free, job.get("exact", True))
-    if "fit" in job:
-        twin, thetas = base.with_(effects=hypothesis), []
-        places = int(
-            np.ceil(
-                PLACES_PER_WAVE * base.rig.delay * max(o.frequency_hz[-1] for o in observations)
-            )
-        )
-        starts = scan_starts(base.rig, hypothesis)
-        starts += [u for u in weak_effect_starts(base.rig, hypothesis, places) if u not in starts]
-        for start in starts:
-            theta = transfer_theta(job["fit"], hypothesis, base)
-            for name, u in start.items():
-                theta[twin.index[name]] = u
-            thetas.append(theta)
-        return refine(base, hypothesis, observations, thetas, free, exact=False)
-    starts = job.get("starts") or scan_starts(base.rig, hypothesis)
-    return fit_hypothesis(base, hypothesis, observations, starts, free, job.get("draws", 0))
-
-
 def rank_by_evidence(fits: Sequence[Fit]) -> list[Fit]:
-    """Fits with an evidence, best first."""
+    """The fits whose evidence is finite, best first."""
     return sorted((f for f in fits if np.isfinite(f.evidence)), key=lambda f: -f.evidence)
 
 
-def progress_callback(progress, what: str, total: int) -> Callable[[], None] | None:
-    """What tells `progress` (what, done, total) at every call; None where nobody asks."""
+def progress_callback(progress, task: str, total: int) -> Callable[[], None] | None:
+    """A function that counts its calls and reports (task, done, total) to `progress`.
+
+    None where `progress` is None.
+    """
     if progress is None:
         return None
     done = 0
 
-    def tell():
+    def report():
         nonlocal done
         done += 1
-        progress(what, done, total)
+        progress(task, done, total)
 
-    return tell
+    return report

@@ -1,4 +1,8 @@
-"""What evidence an effect must add, and how good a fit can be."""
+"""Thresholds that decide a verdict: evidence, misfit, parameters, folds and shaft orders.
+
+Evidence is compared as a log Bayes factor: the difference of two log evidences (natural
+logarithm). exp(3) is about 20.
+"""
 
 from __future__ import annotations
 
@@ -6,26 +10,60 @@ from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.posterior import MIN_MODEL_ERROR
 from rippletwin.twin.effects.base import Effect
 
-ACCEPT = 8.0
-"""Log evidence that an effect must add. The largest that chance gave any effect of the library in
-parametric bootstraps of no-effect cases with refitting is below it (docs/explain.md)."""
+# Evidence
 
-SURE = 2.0 * ACCEPT
-"""Log evidence from which something is missing even where the line fits without and no explanation
-holds on data left out."""
+MIN_LOG_BAYES_FACTOR = 8.0
+"""An effect is accepted if it adds at least this. It is above the largest value in parametric
+bootstraps of cases without an effect, with refitting (docs/explain.md)."""
 
-EQUIVALENT = 3.0  # two explanations closer than this cannot be told apart: twenty to one
-CERTAIN = -3.0  # the same for an effect that no real line is without: twenty to one against it
-GOOD = (
-    1.25 * MIN_MODEL_ERROR
-)  # relative model error at which a fit is as good as it can be believed
+DECISIVE_LOG_BAYES_FACTOR = 2.0 * MIN_LOG_BAYES_FACTOR
+"""From this value on something is missing even where the explanation fails cross-validation."""
+
+EQUIVALENT_LOG_BAYES_FACTOR = 3.0  # two explanations closer than this are equivalent: 20 to 1
+
+MIN_LOG_BAYES_FACTOR_ALWAYS_PRESENT = -3.0
+"""The same as MIN_LOG_BAYES_FACTOR for an effect that is always present: it is accepted unless the
+data are 20 to 1 against it."""
+
+FALSE_ALARM_RATE = 0.02  # of cases without an effect, for the threshold of a bootstrap
+
+# Relative model error: what source and sensor errors do not account for
+
+GOOD_MODEL_ERROR = 1.25 * MIN_MODEL_ERROR  # up to here no effect can improve the fit noticeably
+MAX_MODEL_ERROR_TO_NAME = 2.0 * MIN_MODEL_ERROR
+"""Above this no effect is named. With the true effect the model error falls to its minimum; with a
+similar effect it stays above (docs/explain.md)."""
+MISFIT_ALARM = 3.0 * MIN_MODEL_ERROR  # of the base fit
+
+# Parameters and data of several recordings
+
+PULL_ALARM = 4.0  # prior standard deviations between a parameter and the data sheet
+DISAGREEMENT_ALARM = 4.0  # standard deviations between the fits of two operating points
+DRIFT_SIGNIFICANCE = 1e-3  # p-value that both halves of a recording are of one state
+WIDE_PRIOR_MISFIT_RATIO = 2.0
+"""Between the accepted fit and a fit without an effect with wide priors. A fit that misfits less
+than this times the accepted misfit is a rival; one that misfits less by this factor refutes the
+effect."""
+
+# Cross-validation
+
+SMALL_HELD_OUT_SHARE = 1 / 3  # of the base's held-out misfit
+MAX_FOLD_DIFFERENCE = 3.5  # standard deviations between an effect's parameter in a fold and overall
+
+# Shaft orders that are no multiples of the number of pistons
+
+MIN_SHAFT_ORDER_LEVEL = 0.01  # relative to the ripple; below it the orders have no name
+SHAFT_ORDER_SIGNIFICANCE = 1e-6  # p-value that the orders are noise
+MIN_COHERENT_SHARE = 0.5  # of the energy at shaft orders that one flow at the pump accounts for
+MODULATION_SHARE = 0.9  # of the energy at shaft orders that modulation must explain to be the name
+ROUGH_MODULATION_SHARE = 0.7  # the same for a twin that is only calibrated, and so less accurate
 
 
-def needed(fit: Fit) -> float:
+def min_log_bayes_factor(effect: Effect) -> float:
+    """Log evidence that an effect must add to be accepted."""
+    return MIN_LOG_BAYES_FACTOR_ALWAYS_PRESENT if effect.certain else MIN_LOG_BAYES_FACTOR
+
+
+def min_log_bayes_factor_of_newest(fit: Fit) -> float:
     """Log evidence that the newest effect of a fit must have added."""
-    return needed_of(fit.hypothesis[-1][0])
-
-
-def needed_of(effect: Effect) -> float:
-    """Log evidence that an effect must add."""
-    return CERTAIN if effect.certain else ACCEPT
+    return min_log_bayes_factor(fit.hypothesis[-1][0])

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rippletwin.harmonics import one_period, peak_amplitudes
+
 SPEED_STEP = 2e-4  # relative: windows closer than that share one inversion
 
 
@@ -46,7 +48,7 @@ def estimate(
     count, sensors, samples = windows.shape
     speeds = np.broadcast_to(np.asarray(speed_hz, dtype=float), (count,))
     orders = orders_within(bandwidth_hz, speeds.mean(), samples)
-    measured = np.fft.rfft(windows, axis=-1)[..., orders] * (2 / samples)  # (n, S, F)
+    measured = peak_amplitudes(windows)[..., orders]  # (n, S, F)
     noise_power = 4 / samples * np.broadcast_to(np.asarray(noise, float) ** 2, (sensors,))
     # The largest reading stands for the waves: a node at one sensor is rarely one at the others.
     power = np.max(np.mean(np.abs(measured) ** 2, axis=0), axis=0)  # (F,)
@@ -59,10 +61,8 @@ def estimate(
         matrix, error, prior = inversion(speeds[members].mean(), orders, noise_power, power)
         harmonics[members] = np.einsum("fs,nsf->nf", matrix, measured[members])
         variance += error * len(members) / count
-    spectrum = np.zeros((count, samples // 2 + 1), complex)
-    spectrum[:, orders] = harmonics * (samples / 2)
     return FlowEstimate(
-        flow=np.fft.irfft(spectrum, samples, axis=-1),
+        flow=one_period(harmonics, samples, orders),
         orders=orders,
         harmonics=harmonics,
         standard_deviation=np.sqrt(variance),
@@ -88,7 +88,4 @@ def band_limit(flow: np.ndarray, speed_hz: float, bandwidth_hz: float) -> np.nda
     """
     samples = flow.shape[-1]
     orders = orders_within(bandwidth_hz, speed_hz, samples)
-    spectrum = np.fft.rfft(flow, axis=-1)
-    kept = np.zeros_like(spectrum)
-    kept[..., orders] = spectrum[..., orders]
-    return np.fft.irfft(kept, samples, axis=-1)
+    return one_period(peak_amplitudes(flow)[..., orders], samples, orders)

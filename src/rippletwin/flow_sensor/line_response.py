@@ -8,10 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from rippletwin.case.model import FlowRipple
-from rippletwin.line.frequency_domain.line_network import Network
+from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
+from rippletwin.twin.forward_model import ForwardModel
+from rippletwin.twin.operating_point import OperatingCondition
 
-NetworkFactory = Callable[[float, np.ndarray], Network]
-"""(speed_hz, orders (F,)) -> Network at s = 2 pi j orders speed_hz, its load linear."""
+NetworkFactory = Callable[[float, np.ndarray], FrequencyDomainLine]
+"""(speed_hz, orders (F,)) -> FrequencyDomainLine at s = 2 pi j orders speed_hz, its load linear."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,7 @@ class LineResponse:
     to_load: np.ndarray
 
 
-def line_response(network: Network, of: str = "source") -> LineResponse:
+def line_response(network: FrequencyDomainLine, of: str = "source") -> LineResponse:
     """What `network`'s line does with a state at the pump, whatever source and load are.
 
     `of` is the flow wanted: the ideal "source"'s, or the "outlet"'s Q(0), which lacks what the
@@ -55,7 +57,7 @@ def line_response(network: Network, of: str = "source") -> LineResponse:
     )
 
 
-def own_admittance(network: Network, of: str) -> np.ndarray:
+def own_admittance(network: FrequencyDomainLine, of: str) -> np.ndarray:
     """Admittance (F,) between Q(0) and the flow wanted, see `line_response`."""
     if of not in ("source", "outlet"):
         raise ValueError(f"of must be 'source' or 'outlet', not {of!r}")
@@ -69,12 +71,8 @@ def network_of(twin, load_pressure: float, ripple: FlowRipple | None = None) -> 
     `load_pressure` in Pa; the mean of `ripple` (m3/s) sets an orifice whose coefficient the rig
     does not give, and what admittance the ripple has is the source's. None takes the lumped pump.
     """
-    from rippletwin.spectra.observation import Observation
-    from rippletwin.twin.forward_model import ForwardModel
 
-    sensors = twin.rig.sensors
-
-    def network(speed_hz: float, orders: np.ndarray) -> Network:
+    def network(speed_hz: float, orders: np.ndarray) -> FrequencyDomainLine:
         nonlocal ripple
         if ripple is None:
             from rippletwin.pump.outlets import ConstantPressure
@@ -82,22 +80,11 @@ def network_of(twin, load_pressure: float, ripple: FlowRipple | None = None) -> 
 
             outlet = ConstantPressure(load_pressure)
             ripple = simulate(twin.rig.pump, twin.rig.fluid, 60 * speed_hz, outlet)
-        size = len(orders)
-        point = Observation(
-            kind="periodic",
-            label="",
-            frequency_hz=orders * speed_hz,
-            orders=orders,
-            values=np.zeros((len(sensors), size), complex),
-            covariance=np.zeros((size, len(sensors), len(sensors))),
-            mean=np.full(len(sensors), load_pressure),
-            speed_hz=speed_hz,
-            load_pressure=load_pressure,
-            source="free",  # its load stays linear: no ripple to balance an orifice with
-            flow_ripple=ripple,
-            sensors=sensors,
+        # A free source has no ripple to balance an orifice with: the load stays linear.
+        condition = OperatingCondition.at_orders(
+            orders, speed_hz, load_pressure, ripple, source="free"
         )
-        line = ForwardModel(twin, [point]).network(twin.theta)
+        line = ForwardModel(twin, [condition]).network(twin.theta)
         line.source_admittance = line.source_admittance + ripple.source_admittance(line.s)
         return line
 

@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from rippletwin.line.frequency_domain.line_network import Network
+from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 
 
 class Trunk(nn.Module):
@@ -100,7 +100,7 @@ class Equations:
     waves: torch.Tensor
 
 
-def equations(trunk: Trunk, network: Network, places: np.ndarray) -> Equations:
+def equations(trunk: Trunk, network: FrequencyDomainLine, places: np.ndarray) -> Equations:
     """The rows of `Equations` at the frequencies of `network`, `places` (C,) of 0..1 a piece."""
     starts, segments = pieces_of(network)
     lengths, count = np.diff([*starts, network.length]), len(starts)
@@ -145,7 +145,7 @@ def equations(trunk: Trunk, network: Network, places: np.ndarray) -> Equations:
     return Equations(inside, torch.cat(joints, dim=1), load, p * _column(factor), waves)
 
 
-def pieces_of(network: Network) -> tuple[np.ndarray, np.ndarray]:
+def pieces_of(network: FrequencyDomainLine) -> tuple[np.ndarray, np.ndarray]:
     """Start (D,) in m and segment (D,) of the uniform pieces between segments and inserts."""
     edges = np.concatenate([[0.0], np.cumsum(network.lengths)])
     inside = [x for x, _, _ in network.inserts if 0.0 < x < network.length]
@@ -153,7 +153,7 @@ def pieces_of(network: Network) -> tuple[np.ndarray, np.ndarray]:
     return starts, np.searchsorted(edges, starts, side="right") - 1
 
 
-def _joint(network: Network, x: float) -> torch.Tensor:
+def _joint(network: FrequencyDomainLine, x: float) -> torch.Tensor:
     """Matrix J (F, 2, 2) with [p, q] before = J [p, q] behind the lumped elements at `x`."""
     matrix = np.zeros((len(network.s), 2, 2), complex)
     matrix[:] = np.eye(2)

@@ -30,6 +30,11 @@ class Architecture:
         """What an input without any ripple reads: 0 in time, exp(0) in an image."""
         return 1.0 if self.domain == "image" else 0.0
 
+    @property
+    def family(self) -> str:
+        """Which of the two sets of training settings it takes: "residual" or "plain"."""
+        return "residual" if self.blocks else "plain"
+
 
 # 1D: 1536 is half a revolution on either side, the one padding that gives the table's (64, 59) for
 # kernel 341, stride 100 and 3072 points; 150@50 gives (64, 59) without any.
@@ -45,3 +50,13 @@ ARCHITECTURES: dict[str, Architecture] = {
     "resnet18_2d": Architecture("ResNet18 (3×3@1)", "image", 3, 1, 1, (2, 2, 2, 2)),
     "resnet34_2d": Architecture("ResNet34 (3×3@1)", "image", 3, 1, 1, (3, 4, 6, 3)),
 }
+
+LONGEST_TRAININGS = (
+    "resnet34_2d",
+    "resnet18_2d",
+    "cnn2d_30_3",
+    "cnn1d_3_1",
+    "cnn2d_3_1",
+    "resnet34_1d",
+)
+"""Networks that take longest to train on two cores, the longest first: they are started first."""

@@ -2,26 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 
-from rippletwin.learning.accuracy import (
-    summarise,
-)
+from rippletwin.learning.accuracy import summarise
 from rippletwin.learning.architectures import ARCHITECTURES, CLASSES
 
 DOMAIN_TITLES = {"time": "Time domain", "image": "Time-frequency domain"}
 
 
-def accuracy_table(rows: pd.DataFrame, paper: pd.DataFrame, column: str = "accuracy") -> str:
+def accuracy_table(
+    rows: pd.DataFrame,
+    paper: pd.DataFrame,
+    datasets: Sequence[str],
+    column: str = "accuracy",
+) -> str:
     """The paper's table in markdown: ours, with the paper's mean and deviation in brackets.
 
-    rows : tidy results (``result_row``); paper : columns architecture, dataset, mean, std.
-    Datasets appear in the paper's order, each followed by that of the corrected twin, then those
-    the paper has not; a cell nobody ran, or nobody can score, is a dash.
+    rows : tidy results (``result_row``); paper : columns architecture, dataset, mean, std;
+    datasets : names of the columns from left to right, of which those are shown that either has.
+    A cell nobody ran, or nobody can score, is a dash.
     """
     ours, theirs = _cells(summarise(rows, column)), _cells(paper)
-    datasets = _in_order([*paper["dataset"], *rows["dataset"]])
+    known = {*paper["dataset"], *rows["dataset"]}
+    datasets = [dataset for dataset in datasets if dataset in known]
 
     lines = [
         "| Input | Architecture | " + " | ".join(datasets) + " |",
@@ -41,16 +47,18 @@ def accuracy_table(rows: pd.DataFrame, paper: pd.DataFrame, column: str = "accur
     return "\n".join(lines) + "\n"
 
 
-def cost_table(rows: pd.DataFrame, column: str = "accuracy") -> str:
+def cost_table(
+    rows: pd.DataFrame, pairs: Sequence[tuple[str, str]], column: str = "accuracy"
+) -> str:
     """Markdown of what the left-out physics cost: each dataset beside the corrected twin's.
 
-    rows : tidy results (``result_row``). A line a network, and one for the mean of those networks
-    that ran on both; the cost is accuracy with the corrected twin less that with the calibrated,
-    in per cent of all windows. A cell nobody ran is a dash.
+    rows : tidy results (``result_row``); pairs : (dataset of the calibrated twin, the same of the
+    corrected one). A line a network, and one for the mean of those networks that ran on both; the
+    cost is accuracy with the corrected twin less that with the calibrated, in per cent of all
+    windows. A cell nobody ran is a dash.
     """
     table = summarise(rows, column)
     cells, means = _cells(table), table.set_index(["architecture", "dataset"])["mean"]
-    pairs = [(d, d + "+") for d in _in_order(rows["dataset"]) if d + "+" in set(rows["dataset"])]
     ran = [name for name in ARCHITECTURES if name in set(rows["architecture"])]
     head = [title for without, plus in pairs for title in (without, plus, "cost")]
     lines = ["| Architecture | " + " | ".join(head) + " |", "|---|" + "---|" * len(head)]
@@ -87,21 +95,6 @@ def answer_table(answers: pd.DataFrame) -> str:
         cells = [str(recording), dataset, ARCHITECTURES[architecture].title, str(len(said))]
         lines.append("| " + " | ".join([*cells, *share]) + " |")
     return "\n".join(lines) + "\n"
-
-
-def _in_order(datasets) -> list[str]:
-    """Each dataset once: a plus after its dataset, recordings last, else as they come."""
-    found = list(dict.fromkeys(datasets))
-    first = {dataset: k for k, dataset in reversed(list(enumerate(map(_without_plus, found))))}
-
-    def place(dataset):
-        return dataset == "experimental", first[_without_plus(dataset)], dataset
-
-    return sorted(found, key=place)
-
-
-def _without_plus(dataset: str) -> str:
-    return dataset.removesuffix("+")
 
 
 def _cells(table: pd.DataFrame) -> dict[tuple[str, str], str]:

@@ -19,14 +19,6 @@ import numpy as np
 import torch
 from torch import nn
 
-# glibc returns every large tensor to the kernel and faults its pages in again at the next step: up
-# to half of a step's time. To be in the environment before Python starts.
-MALLOC_ENVIRONMENT = {
-    "MALLOC_MMAP_MAX_": "0",
-    "MALLOC_TRIM_THRESHOLD_": "17179869184",
-    "MALLOC_TOP_PAD_": "268435456",
-}
-
 
 @dataclass(frozen=True)
 class TrainingSettings:

@@ -1,7 +1,7 @@
 """The chambers' equations and their solution in time.
 
-For the pressure p of each chamber, with volume V and flows q (Edge & Darling 1989, J. Dyn. Sys.
-Meas. Control 111, 307; here without the oil's inertia in the ports):
+For the absolute pressure p of each chamber, with volume V and flows q (Edge & Darling 1989, J. Dyn.
+Sys. Meas. Control 111, 307; here without the oil's inertia in the ports):
 
     V dc/dt = -dV/dt - q_delivery + q_suction - q_leak,    c(p) = p/B - x p0/p
 
@@ -21,7 +21,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-ATMOSPHERE = 101325.0
+from rippletwin.case.model import ATMOSPHERE
+
 SMOOTHING = 1e3  # Pa
 GAMMA = 1.0 - np.sqrt(0.5)
 TOLERANCE = 1e-11  # of a Newton step, relative to the largest pressure
@@ -155,17 +156,19 @@ def revolution(
 ):
     """One revolution of K steps, from the state `p` and the line's, both overwritten.
 
+    All pressures are absolute.
+
     p             (n + 1,) pressures of the chambers and the outlet, Pa
     tables        (K, 4, n) at the end of each step, as for `solve_stage`
     stage_tables  (K, 4, n) at its first stage
-    line          (Zc, half the friction of a cell Pa s/m3, K_v of the orifice)
+    line          (Zc, half the friction of a cell Pa s/m3, K_v of the orifice, pressure behind it)
     line_p/_q     (cells + 1,) state of the line, empty where the outlet's pressure is given
     sensors       (S, 5): first of four neighbouring nodes, and their weights
     outlet        (K,) the outlet's pressure at the end of each step, Pa; empty with a line
     Returns flow (K,), pressures (K, n + 1) and sensor pressures (K, S), each at a step's end.
     """
     steps, _, n = tables.shape
-    zc, half, k_v = line
+    zc, half, k_v, behind = line
     flow = np.empty(steps)
     pressures = np.empty((steps, n + 1))
     readings = np.empty((steps, len(sensors)))
@@ -203,11 +206,12 @@ def revolution(
                 backward = line_p[j + 1] - (zc - half) * line_q[j + 1]
                 new_p[j] = 0.5 * (forward + backward)
                 new_q[j] = 0.5 * (forward - backward) / (zc + half)
-            # orifice q = K_v sqrt(p) met by the C+ characteristic p = forward - (zc + half) q
+            # orifice q = K_v sqrt(p - behind) met by the C+ characteristic, on which
+            # p = forward - (zc + half) q
             forward = line_p[cells - 1] + (zc - half) * line_q[cells - 1]
             b = (zc + half) * k_v
-            root = 0.5 * (np.sqrt(b * b + 4.0 * max(forward, 0.0)) - b)
-            new_p[cells], new_q[cells] = root * root, k_v * root
+            root = 0.5 * (np.sqrt(b * b + 4.0 * max(forward - behind, 0.0)) - b)
+            new_p[cells], new_q[cells] = behind + root * root, k_v * root
             line_p[:], line_q[:] = new_p, new_q
         for j in range(len(sensors)):
             first_node = int(sensors[j, 0])

@@ -10,6 +10,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from rippletwin.case.model import absolute
+
 
 @dataclass(frozen=True)
 class Geometry:
@@ -31,7 +33,7 @@ class Geometry:
     port_timing_deg: float = 0.0  # by so much the port plate is turned, later being positive
     discharge_coefficient: float = 0.65
     case_leakage: float = 3e-13  # laminar, of a chamber, m3/s/Pa
-    suction_pressure: float = 1e5  # absolute, also that of the case, Pa
+    suction_pressure: float = 0.0  # gauge, also that of the case, Pa: an open tank
 
     @classmethod
     def from_dict(cls, pump: dict) -> Geometry:
@@ -41,7 +43,7 @@ class Geometry:
         if unknown:
             raise ValueError(f"unknown pump keys {unknown}; known are {known}")
         geometry = cls(**{key: value for key, value in pump.items() if value is not None})
-        may_be_negative = ("port_timing_deg",)
+        may_be_negative = ("port_timing_deg", "suction_pressure")
         may_be_zero = ("air_fraction", "case_leakage", "port_overlap_deg")
         for name in known:
             value = getattr(geometry, name)
@@ -49,6 +51,11 @@ class Geometry:
                 continue
             if value < 0.0 or (value == 0.0 and name not in may_be_zero):
                 raise ValueError(f"pump key {name} = {value} must be positive")
+        if absolute(geometry.suction_pressure) <= 0.0:
+            raise ValueError(
+                f"pump key suction_pressure = {geometry.suction_pressure}, a gauge pressure, must "
+                "be above that of a vacuum"
+            )
         if geometry.port_overlap_deg + 2 * geometry.port_opening_deg > 180.0:
             raise ValueError("port_overlap_deg + 2 port_opening_deg exceeds half a revolution")
         return geometry
@@ -90,19 +97,6 @@ class Geometry:
         rising = np.clip((phi - shut) / self.port_opening_deg, 0.0, 1.0)
         falling = np.clip((180.0 - shut - phi) / self.port_opening_deg, 0.0, 1.0)
         return _smooth(rising) * _smooth(falling)
-
-
-def kinematic_flow(pump: dict, speed_rpm: float, angle_deg: np.ndarray) -> np.ndarray:
-    """Delivery of an incompressible, leak-free pump with ideal ports, m3/s at `angle_deg`.
-
-    The sum of the displacing pistons' speeds (Ivantysyn & Ivantysynova 2001, Hydrostatic Pumps
-    and Motors, ch. 2): what `simulate` tends to for a stiff fluid and no overlap.
-    """
-    geometry = Geometry.from_dict(pump)
-    k = np.arange(geometry.pistons)[:, None]
-    phi = np.radians(angle_deg) - 2 * np.pi * k / geometry.pistons
-    rate = -geometry.volume_slope(phi) * speed_rpm * np.pi / 30
-    return np.maximum(rate, 0.0).sum(axis=0)
 
 
 def _smooth(u):

@@ -1,4 +1,7 @@
-"""What the pump delivers into: a constant pressure, a given pressure, or a pipe with an orifice."""
+"""What the pump delivers into: a constant pressure, a given pressure, or a pipe with an orifice.
+
+Pressures are gauge pressures.
+"""
 
 from __future__ import annotations
 
@@ -14,35 +17,39 @@ DELAY_TOLERANCE = 1e-5  # relative, of the pipe's travel time as a whole number 
 
 @dataclass(frozen=True)
 class ConstantPressure:
-    """An outlet held at `pressure` (Pa, absolute)."""
+    """An outlet held at `pressure`, Pa."""
 
     pressure: float
 
 
 @dataclass(frozen=True)
 class PressureWave:
-    """An outlet whose pressure (M,), Pa absolute, is given at M even angles of a revolution."""
+    """An outlet whose pressure (M,), Pa, is given at M even angles of a revolution."""
 
     pressure: np.ndarray
 
 
 @dataclass(frozen=True)
 class Pipe:
-    """A uniform pipe with steady laminar friction and an orifice q = K_v sqrt(p) at its end.
+    """A uniform pipe with steady laminar friction and an orifice q = K_v sqrt(p - p0) at its end.
 
     Give either `load_pressure` (Pa), the pressure upstream of the orifice at the mean flow, from
     which K_v follows, or K_v itself as `orifice` (m3/s/sqrt(Pa)): a faulty pump meets the orifice
-    that the healthy one left. Sensors at `sensor_positions` (m from the pump).
+    that the healthy one left. p0 is `back_pressure`, Pa. Sensors at `sensor_positions` (m from the
+    pump).
     """
 
     segment: Segment
     sensor_positions: tuple[float, ...] = ()
     load_pressure: float | None = None
     orifice: float | None = None
+    back_pressure: float = 0.0
 
     def __post_init__(self):
         if (self.load_pressure is None) == (self.orifice is None):
             raise ValueError("give either load_pressure or orifice")
+        if self.load_pressure is not None and not self.load_pressure > self.back_pressure:
+            raise ValueError("load_pressure must be above back_pressure")
         if not all(0.0 <= x <= self.segment.length for x in self.sensor_positions):
             raise ValueError("a sensor lies outside the pipe")
 
@@ -66,6 +73,11 @@ def choose_steps(pistons, period, outlet, least):
     return int(candidates[good[0]]), int(np.rint(cells[good[0]]))
 
 
+def orifice_coefficient(outlet: Pipe, mean_flow: float) -> float:
+    """K_v, m3/s/sqrt(Pa), that lets `mean_flow` (m3/s) pass at the pipe's load pressure."""
+    return mean_flow / np.sqrt(outlet.load_pressure - outlet.back_pressure)
+
+
 def pipe_state(fluid, outlet, step, cells, mean_flow):
     """Constants of the line, its steady state at `mean_flow`, and the sensors' nodes and weights.
 
@@ -79,9 +91,10 @@ def pipe_state(fluid, outlet, step, cells, mean_flow):
     viscosity = fluid.density * fluid.kinematic_viscosity
     friction = 128 * viscosity / (np.pi * segment.diameter**4)  # Hagen-Poiseuille, Pa s/m4
     half = 0.5 * friction * segment.length / cells
-    k_v = outlet.orifice or mean_flow / np.sqrt(outlet.load_pressure)
+    k_v = outlet.orifice or orifice_coefficient(outlet, mean_flow)
     drop = friction * segment.length * mean_flow
-    line_p = (mean_flow / k_v) ** 2 + drop * np.linspace(1.0, 0.0, cells + 1)
+    at_load = outlet.back_pressure + (mean_flow / k_v) ** 2
+    line_p = at_load + drop * np.linspace(1.0, 0.0, cells + 1)
     line_q = np.full(cells + 1, mean_flow)
 
     sensors = np.zeros((len(outlet.sensor_positions), 5))

@@ -17,6 +17,7 @@ from functools import cache
 import numpy as np
 
 from rippletwin.case.model import Fluid
+from rippletwin.harmonics import peak_amplitudes
 from rippletwin.pump.outlets import ConstantPressure
 from rippletwin.pump.simulation import PumpRipple, simulate
 
@@ -48,7 +49,7 @@ class RippleChange:
 
         def at(ripple, turn):
             count = len(ripple.flow)
-            spectrum = np.append(2.0 / count * np.fft.rfft(ripple.flow), 0.0)
+            spectrum = np.append(peak_amplitudes(ripple.flow), 0.0)
             return spectrum[np.minimum(orders, count // 2 + 1)] * np.exp(1j * orders * turn)
 
         above, sheet, below = (

@@ -1,4 +1,8 @@
-"""The pump delivering into an outlet, healthy or with leaks, until it is periodic."""
+"""The pump delivering into an outlet, healthy or with leaks, until it is periodic.
+
+Pressures that go in and come out are gauge pressures. The chambers' equations need absolute ones,
+for the air in the oil; `simulate` is where one becomes the other.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rippletwin.case.model import FlowRipple, Fluid
+from rippletwin.case.model import ATMOSPHERE, FlowRipple, Fluid, absolute
 from rippletwin.pump import chambers
 from rippletwin.pump.faults import Cylinder, Slipper, leak_conductances, orifice_conductance
 from rippletwin.pump.geometry import Geometry
@@ -16,6 +20,7 @@ from rippletwin.pump.outlets import (
     Pipe,
     PressureWave,
     choose_steps,
+    orifice_coefficient,
     pipe_state,
     pressure_at_steps,
     resample_periodic,
@@ -31,7 +36,7 @@ PERIODIC = 1e-6  # largest change from one revolution to the next, relative to t
 class PumpRipple(FlowRipple):
     """A FlowRipple with what else the simulation knows, over one revolution of M samples.
 
-    outlet_pressure (M,), chamber_pressure (pistons, M), sensor_pressure (S, M), all Pa.
+    outlet_pressure (M,), chamber_pressure (pistons, M), sensor_pressure (S, M), all Pa gauge.
     `converged` tells whether the solution is periodic: `change`, from the last revolution but
     one to the last relative to the ripple's rms, is within the tolerance after `revolutions`.
     `orifice` is K_v of the pipe's load, None at a constant pressure.
@@ -94,21 +99,26 @@ def simulate(
         geometry.bulk_modulus,
         geometry.air_fraction,
         geometry.case_leakage,
-        geometry.suction_pressure,
+        absolute(geometry.suction_pressure),
     )
 
     mean_flow = geometry.displacement / period
-    line, line_p, line_q, sensors = pipe_state(fluid, outlet, period / steps, cells, mean_flow)
-    given = np.zeros(0) if cells else pressure_at_steps(outlet.pressure, steps)
+    (zc, half, k_v), line_p, line_q, sensors = pipe_state(
+        fluid, outlet, period / steps, cells, mean_flow
+    )
+    line_p, behind = absolute(line_p), absolute(outlet.back_pressure if cells else 0.0)
+    given = np.zeros(0) if cells else absolute(pressure_at_steps(outlet.pressure, steps))
     load_pressure = line_p[0] if cells else given.mean()
     delivering = np.arange(geometry.pistons) * 2 > geometry.pistons
-    state = np.append(np.where(delivering, load_pressure, geometry.suction_pressure), load_pressure)
+    state = np.append(
+        np.where(delivering, load_pressure, absolute(geometry.suction_pressure)), load_pressure
+    )
 
     previous, change = None, np.inf
     for revolutions in range(1, MAX_REVOLUTIONS + 1):  # noqa: B007 (reported)
         flow, pressures, readings = chambers.revolution(
             state, end_of_step, first_stage, period / steps, constants, case_leak, cross_leak,
-            line, line_p, line_q, sensors, given,
+            (zc, half, k_v, behind), line_p, line_q, sensors, given,
         )  # fmt: skip
         if not np.isfinite(flow).all():
             raise ArithmeticError(f"the chamber equations did not converge at {speed_rpm} r/min")
@@ -118,7 +128,8 @@ def simulate(
             break
         previous = flow
         if cells and outlet.orifice is None:
-            line = (line[0], line[1], flow.mean() / np.sqrt(outlet.load_pressure))
+            k_v = orifice_coefficient(outlet, flow.mean())
+    pressures, readings = pressures - ATMOSPHERE, readings - ATMOSPHERE
 
     def sample(values):  # values at the end of each step -> at the output's angles
         return resample_periodic(np.roll(values, 1, axis=0), samples_per_revolution).T
@@ -133,7 +144,7 @@ def simulate(
         converged=bool(change < PERIODIC),
         change=float(change),
         revolutions=revolutions,
-        orifice=float(line[2]) if cells else None,
+        orifice=float(k_v) if cells else None,
         geometry=geometry,
         density=fluid.density,
     )

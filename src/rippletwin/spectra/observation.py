@@ -9,6 +9,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from rippletwin.case.model import FlowRipple, Recording, Rig, Sensor
+from rippletwin.harmonics import peak_amplitudes
 from rippletwin.spectra.angular_resampling import Revolutions, cut_revolutions
 from rippletwin.spectra.noise import noise_cycle_scatter, noise_mad
 from rippletwin.spectra.speed_regression import harmonics_at_mean_speed, mean_speed
@@ -101,8 +102,7 @@ def _observe_periodic(
     speed_hz = mean_speed(revolutions.speed_hz)
     highest = _highest(max_frequency_hz, recording.sampling_rate_hz)
     orders = np.arange(1, int(highest / speed_hz) + 1)
-    spectra = np.stack([np.fft.rfft(window)[:, orders] for window in revolutions.windows])
-    spectra *= 2 / revolutions.windows.shape[2]
+    spectra = np.stack([peak_amplitudes(window)[:, orders] for window in revolutions.windows])
     values, covariance = harmonics_at_mean_speed(spectra, revolutions.speed_hz, orders, progress)
     if piston_harmonics_only:
         kept = orders % rig.pump["pistons"] == 0

@@ -21,7 +21,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rippletwin.line.frequency_domain.line_network import Network
+from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
 from rippletwin.twin.forward_model import ForwardModel
 from rippletwin.twin.twin import Arrays
@@ -88,7 +88,7 @@ class DifferentiableForward(ForwardModel):
         self._predicted(theta)
         self._hold = True
         base = self.network(theta)
-        pressure, flow = base._respond(base.sensor_positions)
+        pressure, flow = base.respond(base.sensor_positions)
         factor = np.broadcast_to(base.sensor_factor, pressure.shape)
         readings = pressure * factor
         out = np.zeros((len(theta), *pressure.shape), complex)
@@ -187,7 +187,7 @@ class DifferentiableForward(ForwardModel):
         h, p = 1e-4, self.twin.parameters[k]
         return float(p.value(theta[k] + h) - p.value(theta[k] - h)) / (2 * h)
 
-    def _copies(self, theta: np.ndarray, base: Network) -> np.ndarray:
+    def _copies(self, theta: np.ndarray, base: FrequencyDomainLine) -> np.ndarray:
         """Readings (S, 1 + N, F) at theta and with each parameter moved that goes together."""
         twin, rig, count = self.twin, self.twin.rig, len(self._together) + 1
         coordinates = np.repeat(theta[:, None], count, axis=1)
@@ -206,7 +206,7 @@ class DifferentiableForward(ForwardModel):
             load=1.0 if load is None else value(load),
         )
         source, admittance = self._sources(theta, base, shape)
-        network = Network(
+        network = FrequencyDomainLine(
             s=self.s,
             lengths=base.lengths,
             series=np.empty((n, *shape), complex),
@@ -221,12 +221,12 @@ class DifferentiableForward(ForwardModel):
                 self.s, density=density, viscosity=v.viscosity, diameter=d, friction=twin.friction
             )
             network.shunt[k] = shunt_admittance(self.s, density=density, wave_speed=a, diameter=d)
-        line = self._line_state(v)
+        state = self.line_state(v)
         for effect, place, own in twin.effect_values(coordinates):
             own = {name: x[:, None] for name, x in own.items()}
             if "position" in own:
                 own["position"] = own["position"][0, 0]
-            effect.apply(network, line, own, place)
+            effect.apply(network, state, own, place)
         for k, length in enumerate(v.lengths):
             network.series[k] *= length / base.lengths[k]
             network.shunt[k] *= length / base.lengths[k]
@@ -234,7 +234,7 @@ class DifferentiableForward(ForwardModel):
         def flat(x):
             return np.ravel(np.broadcast_to(x, shape))
 
-        side_by_side = Network(
+        side_by_side = FrequencyDomainLine(
             s=flat(self.s),
             lengths=base.lengths,
             series=network.series.reshape(n, -1),
@@ -254,7 +254,7 @@ class DifferentiableForward(ForwardModel):
         readings = side_by_side.readings().reshape(-1, *shape)
         return readings * np.broadcast_to(network.sensor_factor, readings.shape)
 
-    def _sources(self, theta: np.ndarray, base: Network, shape: tuple) -> tuple:
+    def _sources(self, theta: np.ndarray, base: FrequencyDomainLine, shape: tuple) -> tuple:
         """Flow and, effects left out, admittance of the source at theta and with each parameter
         moved that goes together, both (1 + N, F)."""
         flow = np.array(np.broadcast_to(base.source_flow, shape))

@@ -11,15 +11,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rippletwin.line.frequency_domain.line_network import Network
+from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.line.frequency_domain.nonlinear_compliance import NonlinearComplianceSolver
 from rippletwin.line.frequency_domain.orifice_load import OrificeLoad
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
-from rippletwin.twin.effects.base import ATMOSPHERE, LineState
+from rippletwin.twin.effects.base import LineState
 from rippletwin.twin.flow_source import FlowSource
+
+if TYPE_CHECKING:
+    from rippletwin.twin.twin import Arrays, Twin
 
 ROUGH = 1e-4  # of the pressure at an orifice, while the line's storage is known to less
 ABOVE = 3.0  # times the highest harmonic observed: those that reach it by way of the line
@@ -34,7 +38,7 @@ class ForwardModel:
     impedance is predicted as the reflection coefficient (1, F), see `reflection`.
     """
 
-    def __init__(self, twin, observations: Sequence):
+    def __init__(self, twin: Twin, observations: Sequence):
         self.twin = twin
         self.observations = list(observations)
         rig = twin.rig
@@ -81,7 +85,17 @@ class ForwardModel:
             )
 
     def __call__(self, theta: np.ndarray) -> list[np.ndarray]:
-        network = self.network(theta)
+        return self._observed(self.network(theta), theta)
+
+    def unit_response(self, theta: np.ndarray) -> list[np.ndarray]:
+        """Predictions for a unit flow at every frequency, in the shaft's frame, and a ripple so
+        small that load and line are linear."""
+        network = self._linear(theta)
+        network.source_flow = self.source.turn(theta)
+        return self._observed(network, theta)
+
+    def _observed(self, network: FrequencyDomainLine, theta: np.ndarray) -> list[np.ndarray]:
+        """What each observation reads of `network`, (S, F)."""
         pressure = network.readings() if len(network.sensor_positions) else None
         impedance = None
         predicted = []
@@ -99,14 +113,14 @@ class ForwardModel:
         """Whether the line stores something beyond proportion to the pressure."""
         return bool(self._periodic and self._linear(self.twin.theta).nonlinear_compliances)
 
-    def network(self, theta: np.ndarray) -> Network:
+    def network(self, theta: np.ndarray) -> FrequencyDomainLine:
         """The line with source, effects and load at `theta`; an orifice's ripple is solved."""
         network = self._linear(theta)
         if self._orifice is not None or (network.nonlinear_compliances and self._periodic):
             self._balance(network, theta)
         return network
 
-    def _linear(self, theta: np.ndarray) -> Network:
+    def _linear(self, theta: np.ndarray) -> FrequencyDomainLine:
         """The same with a load for small ripple."""
         twin, rig = self.twin, self.twin.rig
         v = twin.arrays(theta)
@@ -120,7 +134,7 @@ class ForwardModel:
             ]
         )
         source, source_admittance = self.source.at(theta)
-        network = Network(
+        network = FrequencyDomainLine(
             s=self.s,
             lengths=v.lengths,
             series=series,
@@ -131,12 +145,13 @@ class ForwardModel:
             sensor_positions=v.positions,
         )
         if twin.effects:
-            line = self._line_state(v)
+            state = self.line_state(v)
             for effect, place, values in twin.effect_values(theta):
-                effect.apply(network, line, values, place)
+                effect.apply(network, state, values, place)
         return network
 
-    def _line_state(self, v) -> LineState:
+    def line_state(self, v: Arrays) -> LineState:
+        """The numbers of the line that effects need, with `v` of `Twin.arrays`."""
         fluid = self.twin.rig.fluid
         resistance = None
         if self.twin.rig.load.kind == "orifice":
@@ -147,7 +162,7 @@ class ForwardModel:
             diameters=v.diameters,
             wave_speeds=v.wave_speeds,
             lengths=v.lengths,
-            mean_pressure=np.nan_to_num(self.load_pressure) + ATMOSPHERE,
+            mean_pressure=np.nan_to_num(self.load_pressure),
             load_resistance=resistance,
             heat_capacity_ratio=fluid.heat_capacity_ratio,
             prandtl=fluid.prandtl,
@@ -183,7 +198,7 @@ class ForwardModel:
             return "impedance", factor * self.load_impedance
         return kind, None
 
-    def _balance(self, network: Network, theta: np.ndarray) -> None:
+    def _balance(self, network: FrequencyDomainLine, theta: np.ndarray) -> None:
         """Give `network` the full-amplitude state at its load, and what its line stores beyond."""
         if network.nonlinear_compliances:
             wide, seen, whole = self._widened(network, theta, self._extended_for_compliance)
@@ -199,13 +214,13 @@ class ForwardModel:
             state = wide._law(whole, theta)(*whole.load_relation())
             network.load = "state", tuple(x[seen] for x in state)
 
-    def _balance_load(self, network: Network, theta: np.ndarray) -> None:
+    def _balance_load(self, network: FrequencyDomainLine, theta: np.ndarray) -> None:
         """Give `network` the full-amplitude state at its load, its drains as they are."""
         if self._orifice is not None:
             state = self._law(network, theta)(*network.load_relation())
             network.load = "state", tuple(state)
 
-    def _law(self, network: Network, theta: np.ndarray, **accuracy: float):
+    def _law(self, network: FrequencyDomainLine, theta: np.ndarray, **accuracy: float):
         """The load of `network`, (a, b, c) -> (p, q) where a p + b q = c; an orifice is not linear.
 
         Where an effect changed the load, its linear part is the changed one.
@@ -222,7 +237,7 @@ class ForwardModel:
         return law
 
     @staticmethod
-    def _widened(network: Network, theta: np.ndarray, with_above: tuple) -> tuple:
+    def _widened(network: FrequencyDomainLine, theta: np.ndarray, with_above: tuple) -> tuple:
         """The forward model with harmonics above, where those of `network` are among its columns,
         and its network at `theta`."""
         wide, seen = with_above

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from rippletwin.case.model import FlowRipple, Rig
+from rippletwin.case.model import FlowRipple, Rig, Sensor
 from rippletwin.errors import InputError
 from rippletwin.harmonics import flow_harmonics
 
@@ -24,6 +25,47 @@ its mean, or have a gain of its own."""
 COUPLED = 0.3  # relative: a mean further off than this is no pressure
 DEGREES = 3.0  # of freedom of Student's distribution, which has such tails
 ROUNDS, SETTLED = 30, 1e-12
+
+
+@dataclass(frozen=True)
+class OperatingCondition:
+    """What to predict where nothing was recorded: an `Observation` without data.
+
+    The fields are those of `rippletwin.spectra.observation.Observation`. Without `mean` the load
+    pressure is believed as stated; without `sensors` all of the rig's are predicted.
+    """
+
+    label: str = ""
+    frequency_hz: np.ndarray = ()
+    orders: np.ndarray | None = None
+    speed_hz: float | None = None
+    load_pressure: float | None = None
+    flow_ripple: FlowRipple | None = None
+    kind: str = "periodic"
+    source: str = "nominal"
+    mean: np.ndarray | None = None
+    sensors: tuple[Sensor, ...] | None = None
+    normalised: bool = False
+
+    @classmethod
+    def at_orders(
+        cls,
+        orders: np.ndarray,
+        speed_hz: float,
+        load_pressure: float,
+        flow_ripple: FlowRipple,
+        source: str = "nominal",
+    ) -> OperatingCondition:
+        """Shaft `orders` (F,) at rev/s, Pa before the load and the flow ripple of the pump."""
+        orders = np.asarray(orders)
+        return cls(
+            frequency_hz=orders * speed_hz,
+            orders=orders,
+            speed_hz=speed_hz,
+            load_pressure=load_pressure,
+            flow_ripple=flow_ripple,
+            source=source,
+        )
 
 
 class OperatingPoint(NamedTuple):

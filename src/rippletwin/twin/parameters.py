@@ -8,7 +8,7 @@ without a prior (`flat`) has a scale in its place and no pull.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,11 +18,13 @@ from rippletwin.twin.priors import Prior, lognormal, normal
 
 @dataclass(frozen=True)
 class Parameter:
-    """One unknown of a twin.
+    """One unknown of a twin or of an effect.
 
-    name   unique, e.g. "wave_speed[2]" (segments count from 1)
+    name   unique in a twin, e.g. "wave_speed[2]" (segments count from 1)
     unit   SI
     prior  u -> value
+    scan   coordinates u from which a fit starts, each of them: there are several where the
+           posterior has several local modes along this parameter
     place  what it belongs to: "segment 2", "sensor p1", "load", "recording 1", an effect's label
     flat   no prior: `prior` is only the fit's coordinate
     """
@@ -30,6 +32,7 @@ class Parameter:
     name: str
     unit: str
     prior: Prior
+    scan: tuple[float, ...] = (0.0,)
     place: str = ""
     flat: bool = False
 
@@ -86,7 +89,7 @@ def line_parameters(rig: Rig, guessed_load: bool) -> list[Parameter]:
         ("length", sheet.length, "m"),
     )
     out = [
-        Parameter(f"{name}[{k}]", unit, lognormal(getattr(segment, name), sd), f"segment {k}")
+        Parameter(f"{name}[{k}]", unit, lognormal(getattr(segment, name), sd), place=f"segment {k}")
         for name, sd, unit in relative
         for k, segment in enumerate(rig.line, 1)
     ]
@@ -95,15 +98,15 @@ def line_parameters(rig: Rig, guessed_load: bool) -> list[Parameter]:
             f"position[{s.name}]",
             "m",
             normal(s.position, sheet.sensor_position),
-            f"sensor {s.name}",
+            place=f"sensor {s.name}",
         )
         for s in rig.sensors
     ]
     viscosity = lognormal(rig.fluid.kinematic_viscosity, sheet.viscosity)
-    out.append(Parameter("viscosity", "m2/s", viscosity, "fluid"))
+    out.append(Parameter("viscosity", "m2/s", viscosity, place="fluid"))
     if rig.load.kind in ("orifice", "impedance"):
         sd = GUESSED_SD if guessed_load else sheet.load
-        out.append(Parameter("load", "", lognormal(1.0, sd), "load"))
+        out.append(Parameter("load", "", lognormal(1.0, sd), place="load"))
     return out
 
 
@@ -115,17 +118,18 @@ def pump_parameters(rig: Rig) -> list[Parameter]:
     modulus = lognormal(geometry.bulk_modulus, BULK_MODULUS_SD)
     timing = normal(geometry.port_timing_deg, PORT_TIMING_SD)
     return [
-        Parameter("bulk_modulus", "Pa", modulus, "pump"),
-        Parameter("port_timing", "deg", timing, "pump"),
+        Parameter("bulk_modulus", "Pa", modulus, place="pump"),
+        Parameter("port_timing", "deg", timing, place="pump"),
     ]
 
 
 def angle_parameter(label: str) -> Parameter:
     """Shaft angle at the first sample of the recording `label`; the data alone say it."""
-    return Parameter(f"angle[{label}]", "rad", normal(0.0, ANGLE_SCALE), f"recording {label}", True)
+    prior, place = normal(0.0, ANGLE_SCALE), f"recording {label}"
+    return Parameter(f"angle[{label}]", "rad", prior, place=place, flat=True)
 
 
-def effect_parameters(effects: Sequence, own: Sequence[Sequence]) -> list[Parameter]:
+def effect_parameters(effects: Sequence, own: Sequence[Sequence[Parameter]]) -> list[Parameter]:
     """Parameters `own` of each of the (effect, place) pairs, named after both.
 
     Raises ValueError where an effect is twice at a place.
@@ -134,7 +138,7 @@ def effect_parameters(effects: Sequence, own: Sequence[Sequence]) -> list[Parame
     if len(set(labels)) < len(labels):
         raise ValueError(f"an effect can be at a place once, not {labels}")
     return [
-        Parameter(f"{label}.{p.name}", p.unit, p.prior, label)
+        replace(p, name=f"{label}.{p.name}", place=label)
         for label, parameters in zip(labels, own)
         for p in parameters
     ]

@@ -8,9 +8,10 @@ import numpy as np
 from scipy.signal import resample
 
 from rippletwin.errors import InputError
+from rippletwin.harmonics import one_period
 from rippletwin.line.time_domain import method_of_characteristics
-from rippletwin.line.time_domain.line_elements import End, Line, Pipe, capacitance
-from rippletwin.twin.effects.base import ATMOSPHERE, LineState
+from rippletwin.line.time_domain.line_elements import End, Pipe, TimeDomainLine, capacitance
+from rippletwin.twin.effects.base import LineState
 
 PERIODS = 200  # at most, until the line repeats itself
 
@@ -52,8 +53,10 @@ def propagate(
     )
 
 
-def line_in_time(twin, flow, healthy_flow, speed_hz, load_pressure, source_capacitance=0.0) -> Line:
-    """The twin as a `Line`, every effect in it; arguments as `propagate`'s."""
+def line_in_time(
+    twin, flow, healthy_flow, speed_hz, load_pressure, source_capacitance=0.0
+) -> TimeDomainLine:
+    """The twin as a `TimeDomainLine`, every effect in it; arguments as `propagate`'s."""
     rig = twin.calibrated_rig()
     if rig.load.kind == "impedance":
         raise InputError(
@@ -71,7 +74,7 @@ def line_in_time(twin, flow, healthy_flow, speed_hz, load_pressure, source_capac
         mean, resistance = coefficient * root, 2.0 * root / coefficient
         nominal = mean / factor
     pressure = rig.load.back_pressure if rig.load.kind == "orifice" else load_pressure
-    line = Line(
+    line = TimeDomainLine(
         pipes=[Pipe(s.length, s.diameter, s.wave_speed) for s in rig.line],
         flow=np.asarray(flow, dtype=float) + change - np.mean(healthy_flow) + mean,
         period=1.0 / speed_hz,
@@ -89,7 +92,7 @@ def line_in_time(twin, flow, healthy_flow, speed_hz, load_pressure, source_capac
         diameters=np.array([s.diameter for s in rig.line]),
         wave_speeds=np.array([s.wave_speed for s in rig.line]),
         lengths=np.array([s.length for s in rig.line]),
-        mean_pressure=load_pressure + ATMOSPHERE,
+        mean_pressure=load_pressure,
         load_resistance=resistance,
         heat_capacity_ratio=rig.fluid.heat_capacity_ratio,
         prandtl=rig.fluid.prandtl,
@@ -97,7 +100,7 @@ def line_in_time(twin, flow, healthy_flow, speed_hz, load_pressure, source_capac
         load_passes_flow=rig.load.passes_flow,
     )
     for effect, place, values in twin.effect_values(twin.theta):
-        effect.in_time(line, state, values, place)
+        effect.apply_in_time(line, state, values, place)
     return line
 
 
@@ -111,6 +114,6 @@ def pump_change(twin, healthy_flow, speed_hz: float, load_pressure: float):
     for k, change in twin.pump_changes(speed_hz, load_pressure):
         u = twin.theta[k]
         spectrum = np.array([u, u**2]) @ change.harmonics(orders, mean)
-        flow += np.fft.irfft(np.append(0.0, spectrum) * count / 2, count)
+        flow += one_period(spectrum, count, orders)
         capacity += u * float(change.source_admittance(pumping)[0].imag / pumping[0].imag)
     return flow, capacity

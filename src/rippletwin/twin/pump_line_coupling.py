@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rippletwin.harmonics import flow_harmonics
+from rippletwin.harmonics import flow_harmonics, one_period
 from rippletwin.twin.forward_model import ForwardModel
 from rippletwin.twin.twin import Twin
 
@@ -46,20 +46,16 @@ def _answered(twin: Twin, observation):
     outlet = forward.network(twin.theta).pressure_at([0.0])[0] / turn
     count, mean = len(ripple.flow), observation.load_pressure
 
-    def wave(harmonics):
-        spectrum = np.zeros(count // 2 + 1, complex)
-        spectrum[orders] = 0.5 * count * harmonics
-        return np.fft.irfft(spectrum, count)
-
     def harmonics(outlet):
         speed_rpm = 60.0 * observation.speed_hz
         run = simulate(pump, twin.rig.fluid, speed_rpm, outlet, samples_per_revolution=count)
         return flow_harmonics(run, orders), run
 
     free, source = harmonics(ConstantPressure(mean))
-    delivered, _ = harmonics(PressureWave(mean + wave(outlet)))
+    delivered, _ = harmonics(PressureWave(mean + one_period(outlet, count, orders)))
     answer = delivered - free + source.source_admittance(forward.s) * outlet
-    flow = ripple.flow + wave(answer * np.exp(1j * orders * turned))
+    answer = answer * np.exp(1j * orders * turned)
+    flow = ripple.flow + one_period(answer, count, orders)
     return replace(observation, flow_ripple=replace(ripple, flow=flow))
 
 

@@ -19,7 +19,7 @@ An effect at its place is a pair (effect, place) of `rippletwin.twin.effects`; i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -28,7 +28,11 @@ from rippletwin.case.model import FlowRipple, Rig, Segment, Sensor
 from rippletwin.line.frequency_domain.pipe_immittance import FRICTION_LAWS
 from rippletwin.twin import parameters as coordinates
 from rippletwin.twin.forward_model import ForwardModel, characteristic_impedance
-from rippletwin.twin.operating_point import OperatingPoint, operating_point
+from rippletwin.twin.operating_point import (
+    OperatingCondition,
+    OperatingPoint,
+    operating_point,
+)
 from rippletwin.twin.parameters import (
     angle_parameter,
     effect_parameters,
@@ -177,15 +181,8 @@ class Twin:
         where the data sheet has none.
         """
         twin = self if friction is None else self.with_(friction=friction)
-        point = Point(
-            label="",
-            frequency_hz=np.asarray(orders) * speed_hz,
-            orders=np.asarray(orders),
-            speed_hz=speed_hz,
-            load_pressure=load_pressure,
-            flow_ripple=ripple,
-        )
-        return twin.predict([point])[0]
+        condition = OperatingCondition.at_orders(orders, speed_hz, load_pressure, ripple)
+        return twin.predict([condition])[0]
 
     def reference_impedance(self, theta: np.ndarray, observation) -> float:
         """What an input impedance is divided by, Pa s/m3: rho a/A of the first segment.
@@ -211,7 +208,7 @@ class Twin:
             "uncertain_pump": self.uncertain_pump,
             "theta": None if "effects" in changes else self.theta,
         }
-        labels = [Point(label=label) for label in self.labels]
+        labels = [OperatingCondition(label) for label in self.labels]
         twin = Twin(self.rig, labels, **{**state, **changes})
         twin._ripples = self._ripples
         return twin
@@ -264,20 +261,3 @@ class Twin:
                 ConstantPressure(observation.load_pressure),
             )
         return self._ripples[key]
-
-
-@dataclass(frozen=True)
-class Point:
-    """An operating point to predict, with the fields of an observation but no data."""
-
-    label: str
-    frequency_hz: np.ndarray = ()
-    orders: np.ndarray = ()
-    speed_hz: float | None = None
-    load_pressure: float | None = None
-    flow_ripple: FlowRipple | None = None
-    kind: str = "periodic"
-    source: str = "nominal"
-    mean: np.ndarray | None = None
-    sensors: tuple | None = None
-    normalised: bool = False

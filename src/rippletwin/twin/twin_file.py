@@ -11,7 +11,8 @@ import numpy as np
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor, Uncertainty
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
-from rippletwin.twin.twin import Point, Twin
+from rippletwin.twin.operating_point import OperatingCondition
+from rippletwin.twin.twin import Twin
 
 
 def to_dict(twin: Twin) -> dict:
@@ -36,7 +37,7 @@ def from_dict(data: dict) -> Twin:
     """The twin that `to_dict` wrote."""
     return Twin(
         _rig(data["rig"]),
-        [Point(label=label) for label in data["recordings"]],
+        [OperatingCondition(label) for label in data["recordings"]],
         friction=data["friction"],
         effects=[(EFFECTS[e["name"]], Place(**e["place"])) for e in data["effects"]],
         source_sd=data["source_sd"],

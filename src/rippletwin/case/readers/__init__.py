@@ -1,35 +1,5 @@
-"""One reader a file format, registered by suffix; a new format is one new file here.
+"""Readers of recordings, one file a format; `registry` names each with its suffixes.
 
 A reader is `read(path, sensors) -> Signals`: `sensors` are the names the rig expects; it raises
 InputError where the file lacks one of them or cannot be read.
 """
-
-from __future__ import annotations
-
-from importlib import import_module
-from pathlib import Path
-
-from rippletwin.case.readers.file_checks import check_readable
-from rippletwin.case.readers.signals import Signals
-from rippletwin.errors import InputError
-
-MODULES = {".h5": "hdf5", ".hdf5": "hdf5", ".csv": "csv_text", ".mat": "matlab", ".tdms": "tdms"}
-
-__all__ = ["MODULES", "Signals", "read_signals"]
-
-
-def read_signals(path: Path, sensors: list[str]) -> Signals:
-    """Read a recording with the reader of its suffix, whose library is imported only now.
-
-    Raises InputError where no reader knows the suffix, or the file cannot be read.
-    """
-    name = MODULES.get(path.suffix.lower())
-    if name is None:
-        raise InputError(
-            path,
-            "file",
-            f"no reader for {path.suffix or 'a file without a suffix'}",
-            f"Give one of {', '.join(MODULES)}",
-        )
-    check_readable(path)
-    return import_module(f"rippletwin.case.readers.{name}").read(path, sensors)

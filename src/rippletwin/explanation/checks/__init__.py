@@ -1,1 +1,5 @@
-"""Whether data and fits may be believed: contradictions, alarms, cross-validation, sensitivity."""
+"""May the data and the explanation be believed?
+
+Contradictions in the data, alarms, cross-validation, prior sensitivity, profile intervals and the
+null distribution.
+"""

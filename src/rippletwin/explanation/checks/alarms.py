@@ -1,9 +1,10 @@
-"""Is anything missing at all? Three alarms, and drift within a recording.
+"""Alarms: does the line without effects fail to explain the data?
 
-Refitting hides what is missing, so a good fit proves nothing. The alarms are the misfit left after
-refitting, the pull of the parameters on their priors (where an absorbed effect shows), and the
-disagreement of parameters fitted to each operating point alone. What decides is the evidence that
-the best effect of the whole library adds (`rippletwin.explanation.thresholds.ACCEPT`).
+Refitting hides what is missing, so a good fit proves nothing. Four alarms look at the base fit: the
+misfit left after refitting, the pull of the parameters away from the data sheet (where an absorbed
+effect shows), the disagreement between fits of single operating points, and drift within a
+recording. The verdict rests on the evidence of the best effect; the alarms decide where no effect
+is accepted.
 """
 
 from __future__ import annotations
@@ -16,25 +17,29 @@ from scipy.special import chdtrc
 
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.posterior import MIN_MODEL_ERROR
+from rippletwin.explanation.fit_jobs import FitJob, FromTheta, Workers
+from rippletwin.explanation.thresholds import (
+    DISAGREEMENT_ALARM,
+    DRIFT_SIGNIFICANCE,
+    MISFIT_ALARM,
+    PULL_ALARM,
+)
 from rippletwin.spectra.frequency_selection import select_frequencies
 
-MISFIT_ALARM = 3.0 * MIN_MODEL_ERROR  # relative model error above which a fit is bad
-PULL_ALARM = 4.0  # prior standard deviations
-DISAGREEMENT_ALARM = 4.0  # standard deviations between two operating points
-DRIFT_SIGNIFICANCE = 1e-3
-RESONANCE_PASSAGES = (
-    100.0  # of the line that a wave makes in a sharp resonance, whose phase the speed turns
-)
+RESONANCE_PASSAGES = 100.0
+"""Passages of the line that a wave makes in a sharp resonance; another speed changes its phase."""
+HALVES_MODEL_ERROR = 0.5 * MIN_MODEL_ERROR  # relative, between the two halves of a recording
 
 
 @dataclass(frozen=True)
 class Alarms:
-    """What each alarm reads, and whether it rings.
+    """What each alarm measures, and whether it is raised.
 
-    misfit         relative model error left in the base fit
-    pull           largest |coordinate| of a parameter with a prior, and whose
-    disagreement   largest difference between operating points, in standard deviations, and whose
-    drift          p-value that early and late windows are one state, and of which recording
+    misfit         relative model error of the base fit
+    pull           largest |coordinate| of a parameter with a prior, and the parameter's name
+    disagreement   largest difference between operating points in standard deviations, and the
+                   parameter's name
+    drift          p-value that both halves of a recording are of one state, and its label
     """
 
     misfit: float
@@ -43,19 +48,43 @@ class Alarms:
     drift: tuple[float, str]
 
     @property
-    def ringing(self) -> tuple[str, ...]:
-        """Names of the alarms that ring."""
-        rings = {
+    def raised(self) -> tuple[str, ...]:
+        """Names of the alarms that are raised."""
+        states = {
             "misfit": self.misfit > MISFIT_ALARM,
             "pull": self.pull[0] > PULL_ALARM,
             "disagreement": self.disagreement[0] > DISAGREEMENT_ALARM,
             "drift": self.drift[0] < DRIFT_SIGNIFICANCE,
         }
-        return tuple(name for name, rung in rings.items() if rung)
+        return tuple(name for name, state in states.items() if state)
+
+
+def read_alarms(
+    base: Fit, point_fits: Sequence[Fit], early: Sequence, late: Sequence, delay: float
+) -> Alarms:
+    """The alarms of the base fit, its fits to single observations, and the halves of recordings.
+
+    `delay` (s) is that of the line.
+    """
+    return Alarms(
+        base.model_error,
+        largest_pull(base),
+        largest_disagreement(point_fits),
+        drift_p_value(early, late, delay),
+    )
+
+
+def fit_each_observation(workers: Workers, base: Fit) -> list[Fit]:
+    """The base fitted to each observation alone; empty for a single observation."""
+    count = len(workers.observations)
+    if count < 2:
+        return []
+    start = FromTheta(base.twin.theta)
+    return workers.fit([FitJob((), start, observations=(k,)) for k in range(count)])
 
 
 def largest_pull(fit: Fit) -> tuple[float, str]:
-    """Largest pull of a line parameter on its prior, and the parameter's name."""
+    """Largest |coordinate| of a line parameter with a prior, and the parameter's name."""
     pulls = [
         (abs(float(u)), p.name)
         for p, u in zip(fit.twin.parameters, fit.twin.theta)
@@ -65,8 +94,10 @@ def largest_pull(fit: Fit) -> tuple[float, str]:
 
 
 def largest_effect_pull(fit: Fit) -> float:
-    """Largest pull of an effect's own parameter on its prior. Where along the line it sits is no
-    strain: one place is as likely as another."""
+    """Largest |coordinate| of a parameter of the effects.
+
+    A position has no pull: its prior is uniform.
+    """
     pulls = [
         abs(float(u))
         for p, u in zip(fit.twin.parameters, fit.twin.theta)
@@ -76,10 +107,10 @@ def largest_effect_pull(fit: Fit) -> float:
 
 
 def largest_disagreement(fits: Sequence[Fit]) -> tuple[float, str]:
-    """Largest difference of a line parameter between fits to single operating points.
+    """Largest difference of a line parameter between fits of single operating points.
 
-    Two posteriors of one parameter share its prior: the variance of their difference is that of
-    both less what the prior gave both, which is held positive.
+    In standard deviations, with the parameter's name. Both posteriors share the prior, so their
+    difference has the sum of both variances less what the prior contributed to each.
     """
     worst = (0.0, "")
     for i, a in enumerate(fits):
@@ -96,19 +127,18 @@ def largest_disagreement(fits: Sequence[Fit]) -> tuple[float, str]:
 
 
 def drift_p_value(early: Sequence, late: Sequence, delay: float) -> tuple[float, str]:
-    """Smallest p-value, over recordings, that two parts of it agree, and the recording's label.
+    """Smallest p-value of any recording that both halves are of one state, and its label.
 
-    The shaft angle between the parts is free, the covariances are the parts' own, and a relative
-    error is allowed: half the model's floor, and what another mean speed does to the phase of the
-    passages of the line that a sharp resonance is made of. Corrected for the number of recordings.
+    The shaft angle between the halves is free. The p-value is corrected for the number of
+    recordings (Bonferroni). `delay` (s) is that of the line.
     """
     worst = (1.0, "")
     for a, b in zip(early, late):
         if a.orders is None:
             continue
         a, b = at_common_orders(a, b)
-        gap, variance = aligned_difference(a, b, delay)
-        statistic = 2.0 * np.sum(np.abs(gap) ** 2 / variance)
+        difference, variance = aligned_difference(a, b, delay)
+        statistic = 2.0 * np.sum(np.abs(difference) ** 2 / variance)
         p = chdtrc(2 * a.values.size - 1, statistic)
         worst = min(worst, (min(1.0, float(p) * len(early)), a.label))
     return worst
@@ -123,24 +153,31 @@ def at_common_orders(a, b) -> tuple:
 
 
 def aligned_difference(a, b, delay: float) -> tuple[np.ndarray, np.ndarray]:
-    """b less a (S, F), their shaft angle aligned, and the variance that `drift` allows for."""
+    """b - a (S, F) with aligned shaft angles, and the variance (S, F) that one state allows.
+
+    The variance is that of the noise, of a relative model error, and of what another mean speed
+    does to the phase of a sharp resonance.
+    """
     orders = np.asarray(a.orders, float)
     power = np.mean(np.abs(a.values) ** 2, axis=0)
     variance = np.einsum("fss->sf", a.covariance + b.covariance).real
-    speed = abs(a.speed_hz / b.speed_hz - 1.0)
-    phase = 2 * np.pi * a.frequency_hz * RESONANCE_PASSAGES * delay * speed
-    variance = variance + ((0.5 * MIN_MODEL_ERROR) ** 2 + phase**2) * power
+    speed_change = abs(a.speed_hz / b.speed_hz - 1.0)
+    phase = 2 * np.pi * a.frequency_hz * RESONANCE_PASSAGES * delay * speed_change
+    variance = variance + (HALVES_MODEL_ERROR**2 + phase**2) * power
     match = np.sum(np.conj(a.values) * b.values / variance, axis=0)
-    # The angle: first coarsely, from the strongest order, then refined by the phase slope.
+    # Find the angle on a grid over one pitch first, then by the slope of the phase.
     grid = np.linspace(-np.pi, np.pi, 4001) / np.gcd.reduce(np.asarray(a.orders, int))
     angle = grid[np.argmax((np.exp(-1j * np.outer(grid, orders)) @ match).real)]
     for _ in range(3):
-        turned = match * np.exp(-1j * angle * orders)
-        angle += np.sum(orders * turned.imag) / max(np.sum(orders**2 * np.abs(turned)), 1e-300)
+        aligned = match * np.exp(-1j * angle * orders)
+        angle += np.sum(orders * aligned.imag) / max(np.sum(orders**2 * np.abs(aligned)), 1e-300)
     return b.values * np.exp(-1j * angle * orders) - a.values, variance
 
 
-def evidence_p_value(gain: float, tried: int) -> float:
-    """Bound on the chance of so much evidence from `tried` effects without any: Markov's inequality
-    on the Bayes factor, whose mean is 1 under the base, summed over the library."""
-    return float(min(1.0, tried * np.exp(-min(gain, 700.0))))
+def evidence_p_value(log_bayes_factor: float, tried: int) -> float:
+    """Upper bound on the probability of so much evidence from `tried` effects if none is present.
+
+    Markov's inequality on the Bayes factor, whose mean under the base is 1, with a union bound over
+    the effects.
+    """
+    return float(min(1.0, tried * np.exp(-min(log_bayes_factor, 700.0))))

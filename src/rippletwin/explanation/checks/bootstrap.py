@@ -1,15 +1,14 @@
-"""How much evidence chance gives an effect: the threshold by parametric bootstrap.
+"""Null distribution of the evidence by parametric bootstrap with refitting.
 
-Recordings that the line alone might have given are drawn from its fit: sensor noise, model error
-and errors of the source, all as large as they were estimated. To each the line is fitted again, and
-every effect of the library at every place it can be. The largest log evidence that any effect adds
-is what the one found in the recording itself has to beat (Efron & Tibshirani 1993, An Introduction
-to the Bootstrap, sec. 16.4, with refitting).
+Recordings without an effect are drawn from the base fit, with sensor noise, model error and source
+error as estimated. The line and every effect at every place are fitted to each draw. The largest
+log Bayes factor of a draw is what an effect in the recording itself has to exceed (Efron and
+Tibshirani 1993, An Introduction to the Bootstrap, sec. 16.4).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
@@ -21,30 +20,34 @@ from rippletwin.calibration.posterior import Posterior
 from rippletwin.explanation.fit_jobs import Workers
 from rippletwin.explanation.search.single_effects import fit_single_effects
 from rippletwin.explanation.search.stepwise_search import applicable_candidates
+from rippletwin.explanation.thresholds import FALSE_ALARM_RATE
 from rippletwin.twin.forward_model import characteristic_impedance
 
-FALSE_ALARM_RATE = 0.02  # of cases without an effect in which the threshold is passed
-MIN_DRAWS = 10  # draws from which a tail is extrapolated
+MIN_DRAWS = 10  # fewer do not determine the tail of the distribution
 
 
 @dataclass(frozen=True)
 class NullDistribution:
-    """Largest log evidence (N,) of any effect in each draw without one."""
+    """Largest log Bayes factor (N,) of any effect in each draw without an effect."""
 
-    gains: tuple[float, ...]
+    log_bayes_factors: tuple[float, ...]
 
     @property
     def threshold(self) -> float:
-        """Log evidence that chance passes in ALARMS of cases: the quantile of a Gumbel distribution
-        fitted to the draws' largest, or the largest of all where that is more."""
-        from scipy.stats import gumbel_r  # half a second that few need
+        """Log Bayes factor that is exceeded in FALSE_ALARM_RATE of cases without an effect.
 
-        shape = gumbel_r.fit(self.gains)
-        return float(max(np.max(self.gains), gumbel_r.ppf(1.0 - FALSE_ALARM_RATE, *shape)))
+        The quantile of a fitted Gumbel distribution, or the largest of the draws if that is more.
+        """
+        from scipy.stats import gumbel_r  # takes half a second to import and is rarely needed
 
-    def p_value(self, gain: float) -> float:
-        """Share of draws with as much, the recording itself counted among them."""
-        return (1.0 + float(np.sum(np.asarray(self.gains) >= gain))) / (1.0 + len(self.gains))
+        shape = gumbel_r.fit(self.log_bayes_factors)
+        quantile = float(gumbel_r.ppf(1.0 - FALSE_ALARM_RATE, *shape))
+        return max(float(np.max(self.log_bayes_factors)), quantile)
+
+    def p_value(self, log_bayes_factor: float) -> float:
+        """Share of draws with at least this value, the recording itself counted as one of them."""
+        exceeding = float(np.sum(np.asarray(self.log_bayes_factors) >= log_bayes_factor))
+        return (1.0 + exceeding) / (1.0 + len(self.log_bayes_factors))
 
 
 def bootstrap_null(
@@ -55,23 +58,23 @@ def bootstrap_null(
     progress: Callable[[str, int, int], None] | None = None,
     seed: int = 0,
 ) -> NullDistribution:
-    """What chance makes of `base`, the line without effects as fitted to `observations`.
+    """Null distribution of `base`, the line without effects as fitted to `observations`.
 
-    Raises ValueError for fewer than FEWEST draws.
+    Raises ValueError for fewer than MIN_DRAWS draws.
     """
     if draws < MIN_DRAWS:
-        raise ValueError(f"{draws} draws: at least {MIN_DRAWS} are needed to tell a threshold")
+        raise ValueError(f"{draws} draws are too few for a threshold: at least {MIN_DRAWS}")
     jobs = [(base, tuple(observations), seed, k) for k in range(draws)]
     if processes < 2:
-        return NullDistribution(tuple(_with_progress(map(_largest_gain, jobs), draws, progress)))
+        values = tuple(_with_progress(map(_largest_log_bayes_factor, jobs), draws, progress))
+        return NullDistribution(values)
     with ProcessPoolExecutor(processes, get_context("fork")) as pool:
-        return NullDistribution(
-            tuple(_with_progress(pool.map(_largest_gain, jobs), draws, progress))
-        )
+        values = tuple(_with_progress(pool.map(_largest_log_bayes_factor, jobs), draws, progress))
+    return NullDistribution(values)
 
 
 def draw_without_effects(fit: Fit, observations: Sequence, rng: np.random.Generator) -> list:
-    """Observations that the fitted twin might have given, drawn anew."""
+    """Observations drawn from the fitted twin and its error model."""
     posterior = Posterior(fit.twin, observations, None, fit.source_free)
     prediction = posterior.predict(fit.twin.theta)
     posterior.estimate_errors(prediction, fit.twin.theta)
@@ -83,25 +86,24 @@ def draw_without_effects(fit: Fit, observations: Sequence, rng: np.random.Genera
 
 
 def _as_recorded(observation, rig, values: np.ndarray) -> np.ndarray:
-    """A prediction in the quantity that was observed: of a reflection the impedance."""
+    """Predicted values in the observed quantity: an impedance for a reflection coefficient."""
     if observation.kind != "input_impedance":
         return values
     unit = 1.0 if observation.normalised else characteristic_impedance(rig.fluid, rig.line[0])
     return unit * (1.0 + values) / (1.0 - values)
 
 
-def _largest_gain(job) -> float:
+def _largest_log_bayes_factor(job: tuple[Fit, tuple, int, int]) -> float:
     base, observations, seed, k = job
     drawn = draw_without_effects(base, observations, np.random.default_rng([seed, k]))
     twin = base.twin.with_(theta=np.zeros_like(base.twin.theta))
-    found, singles = fit_single_effects(
-        Workers(twin, drawn), applicable_candidates(twin.rig, drawn)
-    )
-    return max((fit.evidence - found.evidence for fit in singles), default=-np.inf)
+    candidates = applicable_candidates(twin.rig, drawn)
+    refitted_base, fits = fit_single_effects(Workers(twin, drawn), candidates)
+    return max((fit.evidence - refitted_base.evidence for fit in fits), default=-np.inf)
 
 
-def _with_progress(gains, draws, progress):
-    for k, gain in enumerate(gains, 1):
+def _with_progress(values: Iterable[float], draws: int, progress) -> Iterator[float]:
+    for k, value in enumerate(values, 1):
         if progress is not None:
             progress("draws without an effect", k, draws)
-        yield gain
+        yield value

@@ -1,6 +1,6 @@
-"""Does the explanation hold on data it has not seen, and do its parameters agree between folds?
+"""Cross-validation: does the explanation predict data that it was not fitted to?
 
-Real physics transfers to another operating point; an absorber does not.
+Real physics transfers to another operating point; an effect that only absorbs error does not.
 """
 
 from __future__ import annotations
@@ -12,24 +12,25 @@ import numpy as np
 
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.misfit import Score, score_fit
-from rippletwin.explanation.fit_jobs import Workers, job_without_effect
-from rippletwin.explanation.thresholds import SURE
+from rippletwin.explanation.fit_jobs import Workers, job_from, job_without_effect
+from rippletwin.explanation.thresholds import (
+    DECISIVE_LOG_BAYES_FACTOR,
+    MAX_FOLD_DIFFERENCE,
+    SMALL_HELD_OUT_SHARE,
+)
 from rippletwin.spectra.frequency_selection import select_frequencies
 
-UNDETERMINED_VARIANCE = 0.5  # variance of a coordinate whose prior has 1
-LITTLE_MISFIT = 1 / 3  # of the held-out misfit
-MAX_FOLD_DIFFERENCE = (
-    3.5  # standard deviations between a fold's parameter of an effect and the whole fit's
-)
+UNDETERMINED_VARIANCE = 0.5  # of a coordinate in a fold; its prior has 1
+FREQUENCY_BLOCKS = 8  # of a single spectrum, every second of which is held out
 
 
 @dataclass(frozen=True)
 class Validation:
-    """Base ("before") and explanation ("after") in sample and held out.
+    """Scores of the base ("before") and the explanation ("after"), in sample and held out.
 
-    left_out     what each fold left out, in words
-    disagreement largest difference of an effect's parameter between a fold and the whole, in
-                 standard deviations
+    left_out      what each fold left out, in words
+    disagreement  largest difference of an effect's parameter between a fold and the whole fit, in
+                  standard deviations
     """
 
     before: dict[str, Score]
@@ -39,128 +40,132 @@ class Validation:
 
     @property
     def passes(self) -> bool:
-        """Whether the held-out misfit improves, and the parameters agree or little is left of it.
+        """Whether the explanation holds on held-out data.
 
-        An absorber gains little on data it has not seen. What removes most of the misfit there is
-        none, though a fold of one operating point may have placed a parameter elsewhere.
+        Either most of the held-out misfit is gone, or it improves and the folds agree on the
+        parameters. A fold of one operating point may misplace a parameter, but nothing that only
+        absorbs error removes most of the held-out misfit.
         """
         before, after = (which["held_out"].misfit for which in (self.before, self.after))
-        return after < LITTLE_MISFIT * before or (
+        return after < SMALL_HELD_OUT_SHARE * before or (
             after < before and self.disagreement < MAX_FOLD_DIFFERENCE
         )
 
     @property
     def transfers(self) -> bool:
-        """Whether the explanation fits what it has not seen better than the base does."""
+        """Whether the explanation fits held-out data better than the base."""
         return self.after["held_out"].misfit < self.before["held_out"].misfit
 
     @property
-    def gains(self) -> bool:
-        """Whether the explanation fits better than the base anywhere, in sample or held out.
+    def fits_better(self) -> bool:
+        """Whether the explanation fits better than the base, in sample or held out.
 
-        What does not, and has log evidence all the same, only spares the line's numbers a way from
-        the data sheet.
+        Evidence without a better fit means only that line parameters stay closer to the data sheet.
         """
         return any(self.after[k].misfit < self.before[k].misfit for k in ("in_sample", "held_out"))
 
 
-def cross_validate(pool: Workers, base: Fit, best: Fit, late: Sequence | None = None) -> Validation:
-    """Folds over operating points; with one only, over its late windows `late`, else frequencies.
+def cross_validate(
+    workers: Workers, base: Fit, best: Fit, late: Sequence | None = None
+) -> Validation:
+    """Cross-validate the base and the best fit.
 
-    Every fold's fits start from the whole fits: they are close, and the folds differ in data only.
+    The folds are operating points. With a single one, `late`, its late windows, are held out, or
+    else blocks of frequencies. Every fold starts from the modes of the whole fits: the folds differ
+    in their data only.
     """
-    observations = pool.observations
-    count = len(observations)
     fits = [base, best]
+    observations = workers.observations
+    count = len(observations)
     if count > 1:
-        folds = [[k for k in range(count) if k != left] for left in range(count)]
-        held = [[observations[left]] for left in range(count)]
-        words = tuple(f"recording {o.label}" for o in observations)
-        refitted = _refit(pool, fits, folds)
+        folds = [tuple(k for k in range(count) if k != left) for left in range(count)]
+        held_out = [[observations[left]] for left in range(count)]
+        left_out = tuple(f"recording {o.label}" for o in observations)
+        refitted = _refit_folds(workers, fits, folds)
     elif late is not None:
-        folds, held, words = [[0]], [list(late)], ("the second half of the recording",)
-        refitted = _refit(pool, fits, folds)
+        held_out, left_out = [list(late)], ("the second half of the recording",)
+        refitted = _refit_folds(workers, fits, [(0,)])
     else:
-        folds, held, words, refitted = _frequency_folds(pool, fits)
+        held_out, left_out, refitted = _refit_frequency_folds(workers, fits)
     in_sample = [score_fit(fit, observations) for fit in fits]
     outside = []
     for which in range(2):
-        scores = [score_fit(fold[which], h, turn=True) for fold, h in zip(refitted, held)]
+        scores = [score_fit(fold[which], h, turn=True) for fold, h in zip(refitted, held_out)]
         outside.append(Score(_rms([s.misfit for s in scores]), _rms([s.theil for s in scores])))
     return Validation(
         {"in_sample": in_sample[0], "held_out": outside[0]},
         {"in_sample": in_sample[1], "held_out": outside[1]},
-        words,
-        max((_difference(best, fold[1]) for fold in refitted), default=0.0),
+        left_out,
+        max((_largest_difference(best, fold[1]) for fold in refitted), default=0.0),
     )
 
 
-def prune_by_cross_validation(pool: Workers, best: Fit, late: Sequence | None = None) -> Fit:
-    """`best` without those of its effects that do not help on data left out.
+def prune_by_cross_validation(workers: Workers, best: Fit, late: Sequence | None = None) -> Fit:
+    """`best` without the effects that do not improve the fit of held-out data.
 
-    The one whose loss costs least evidence is tried first. What no line is without stays, and what
-    is worth SURE: misfits weigh all harmonics alike, the evidence knows which are well known.
+    The effect with the least evidence is tried first. Always-present effects stay, and so do those
+    with decisive evidence: misfits weight all harmonics alike, while evidence weights each by its
+    error.
     """
     while len(best.hypothesis) > 1:
         jobs = [
-            job_without_effect(best, k, pool.base)
+            job_without_effect(best, k, workers.base)
             for k, (effect, _) in enumerate(best.hypothesis)
             if not effect.certain
         ]
-        without = max(pool.fit(jobs), key=lambda fit: fit.evidence, default=None)
-        if without is None or best.evidence - without.evidence > SURE:
+        reduced = max(workers.fit(jobs), key=lambda fit: fit.evidence, default=None)
+        if reduced is None or best.evidence - reduced.evidence > DECISIVE_LOG_BAYES_FACTOR:
             break
-        if cross_validate(pool, without, best, late).passes:
+        if cross_validate(workers, reduced, best, late).passes:
             break
-        best = without
+        best = reduced
     return best
 
 
-def _refit(pool: Workers, fits: list[Fit], folds: list[list[int]]) -> list[list[Fit]]:
-    jobs = [
-        {"hypothesis": f.hypothesis, "theta": f.twin.theta, "use": use}
-        for use in folds
-        for f in fits
-    ]
-    flat = pool.fit(jobs)
-    return [flat[2 * k : 2 * k + 2] for k in range(len(folds))]
+def _refit_folds(
+    workers: Workers, fits: Sequence[Fit], folds: Sequence[tuple[int, ...]]
+) -> list[list[Fit]]:
+    """The fits refitted to the observations with the indices of each fold."""
+    flat = workers.fit([job_from(f, observations=fold) for fold in folds for f in fits])
+    return [flat[len(fits) * k : len(fits) * (k + 1)] for k in range(len(folds))]
 
 
-def _frequency_folds(pool: Workers, fits: list[Fit]):
-    """Every second stretch of an eighth of the band left out of a single spectrum."""
-    observation = pool.observations[0]
-    part = np.floor(8 * np.arange(len(observation.frequency_hz)) / len(observation.frequency_hz))
-    held, refitted = [], []
-    for parity in (0, 1):
-        inside = part % 2 == parity
-        kept = [select_frequencies(observation, inside)]
-        rest = Workers(pool.base, kept)
-        held.append([select_frequencies(observation, ~inside)])
-        refitted.append(
-            rest.fit([{"hypothesis": f.hypothesis, "theta": f.twin.theta} for f in fits])
-        )
-    words = ("odd eighths of the band", "even eighths of the band")
-    return [[0], [0]], held, words, refitted
+def _refit_frequency_folds(workers: Workers, fits: Sequence[Fit]) -> tuple:
+    """(held-out observations, what they are, refitted fits) of two folds over a single spectrum.
 
-
-def _difference(whole: Fit, fold: Fit) -> float:
-    """Largest difference of an effect's parameter in the fold's standard deviations.
-
-    The fold's data are part of the whole's, so that the variance of the difference is the fold's
-    less the whole's; it is held above a quarter of the fold's. A parameter of which the fold knows
-    hardly more than its prior, as a pressure exponent at one pressure, cannot disagree.
+    Each fold holds out every second block of frequencies.
     """
-    worst = 0.0
+    observation = workers.observations[0]
+    count = len(observation.frequency_hz)
+    block = np.floor(FREQUENCY_BLOCKS * np.arange(count) / count)
+    held_out, refitted = [], []
+    for parity in (0, 1):
+        inside = block % 2 == parity
+        fold = Workers(workers.base, [select_frequencies(observation, inside)])
+        held_out.append([select_frequencies(observation, ~inside)])
+        refitted.append(fold.fit([job_from(f) for f in fits]))
+    return held_out, ("odd eighths of the band", "even eighths of the band"), refitted
+
+
+def _largest_difference(whole: Fit, fold: Fit) -> float:
+    """Largest difference of an effect's parameter between a fold and the whole fit.
+
+    In standard deviations. The fold's data are part of the whole's, so the variance of the
+    difference is the fold's less the whole's; it is at least a quarter of the fold's. A parameter
+    that the fold determines hardly better than its prior cannot disagree, as a pressure exponent at
+    one pressure.
+    """
+    largest = 0.0
     for p in whole.twin.parameters:
         if "@" in p.name:
             k, m = whole.twin.index[p.name], fold.twin.index[p.name]
-            own = fold.covariance[m, m]
-            if own > UNDETERMINED_VARIANCE:
+            fold_variance = fold.covariance[m, m]
+            if fold_variance > UNDETERMINED_VARIANCE:
                 continue
-            variance = max(own - whole.covariance[k, k], 0.25 * own) + 1e-4
+            variance = max(fold_variance - whole.covariance[k, k], 0.25 * fold_variance) + 1e-4
             z = abs(whole.twin.theta[k] - fold.twin.theta[m]) / np.sqrt(variance)
-            worst = max(worst, float(z))
-    return worst
+            largest = max(largest, float(z))
+    return largest
 
 
 def _rms(values: Sequence[float]) -> float:

@@ -1,10 +1,9 @@
-"""Do the data contradict themselves? Then no physics is to be looked for in them.
+"""Contradictions in the data, which no physics can explain.
 
-What no line, pump or sensor error of the library can do: a sensor that reads nothing, or the same
-as another elsewhere; a limiter's plateau; recordings that are copies; noise that is exactly zero;
-a mean pressure that grows downstream; one recording whose halves, or two of one operating point,
-are not of one state; sensors whose cables are exchanged or whose sign is turned. What the case
-reader refuses already (a stuck or plainly clipped sensor, a wrong speed or unit) never comes here.
+No line, pump or sensor error of the library makes a sensor that reads nothing or the same as
+another elsewhere, a clipping plateau, copied recordings, noise that is exactly zero, a mean
+pressure that grows downstream, or halves or repeats of one operating point in different states. The
+case reader refuses stuck or clearly clipped sensors and wrong speeds or units before this.
 """
 
 from __future__ import annotations
@@ -21,19 +20,22 @@ from rippletwin.explanation.checks.alarms import (
     drift_p_value,
 )
 
-DEAD_RIPPLE_SHARE = (
-    3e-3  # of the other sensors' ripple: no node of a line is as deep at every harmonic
-)
-SAME_RIPPLE_DIFFERENCE = 2e-3  # relative difference of two sensors' ripple that no two places have
-MIN_SENSOR_DISTANCE_IN_WAVES = 0.05  # of the shortest wave: closer sensors may read the same
-NOISELESS_VARIANCE_RATIO = 1e-20  # variance over power; single precision leaves 1e-14
+DEAD_RIPPLE_SHARE = 3e-3
+"""Ripple of a dead sensor relative to the others: no node of a line is as deep at all harmonics."""
+SAME_RIPPLE_DIFFERENCE = 2e-3  # relative, of two sensors; two places differ by more
+MIN_SENSOR_DISTANCE_IN_WAVELENGTHS = 0.05  # of the shortest; closer sensors may read the same
+MAX_WAVE_SPEED = 2000.0  # m/s; no oil line has more, so that wavelengths are not underestimated
+NOISELESS_VARIANCE_RATIO = 1e-20  # of variance to power; single precision leaves 1e-14
+MIN_MEAN_SHARE = 0.3  # of the load pressure; a lower mean is that of an AC-coupled sensor
 MAX_PRESSURE_GROWTH = 0.25  # of the mean pressure: well above any sensor's gain error
-CHANGED_RIPPLE_SHARE = (
-    0.15  # of the ripple, between parts or repeats of one state: more than drift by degrees
-)
-WAVE_SPEED_DRIFT = 0.005  # relative wave speed between repeats: two kelvin of oil
-PASSAGES_BEFORE_DECAY = 3.0  # of the line that a wave makes before it has died away
-PLATEAU_CROWDING = 8.0  # times as many samples in the outermost 2 % of the range as in the next
+CHANGED_RIPPLE_SHARE = 0.15
+"""Change of the ripple between halves or repeats of one state: more than slow drift makes."""
+SAME_SPEED = 0.005  # relative, between recordings of one operating point
+SAME_PRESSURE = 0.01  # relative, between recordings of one operating point
+WAVE_SPEED_DRIFT = 0.005  # relative, between repeats: two kelvin of oil temperature
+PASSAGES_BEFORE_DECAY = 3.0  # passages of the line before a wave has decayed
+EDGE_SHARE = 0.02  # of a signal's range, at either end
+PLATEAU_CROWDING = 8.0  # of samples within EDGE_SHARE of the end over those in the next EDGE_SHARE
 PLATEAU_SHARE = 0.03  # of all samples
 
 
@@ -44,14 +46,19 @@ def find_contradictions(
     early: Sequence = (),
     late: Sequence = (),
 ) -> str:
-    """What contradicts what, in words; "" where nothing does.
+    """The contradictions in words, separated by semicolons; "" if there are none.
 
-    `recordings` as read, `observations` of them with all their orders, `early` and `late` of the
-    halves of periodic ones. Any of them may be left out, and is not looked at then.
+    recordings    as read
+    observations  of the recordings, with all orders
+    early, late   observations of the two halves of periodic recordings
+
+    What is left out is not checked.
     """
     delay = rig.delay
     pressures = [o for o in observations if o.kind != "input_impedance"]
-    reasons = [find_clipping_plateau(r, s, row) for r in recordings for s, row in _rows(rig, r)]
+    reasons = [
+        find_clipping_plateau(r, sensor, row) for r in recordings for sensor, row in _rows(rig, r)
+    ]
     reasons += [
         check(o)
         for o in pressures
@@ -69,7 +76,7 @@ def find_contradictions(
 
 
 def find_dead_sensor(o) -> str:
-    """A sensor without the ripple that the others read."""
+    """A sensor without the ripple that the others measure."""
     energy = np.sum(np.abs(o.values) ** 2, axis=1)
     if len(energy) < 2 or o.values.shape[1] < 4:
         return ""
@@ -80,32 +87,35 @@ def find_dead_sensor(o) -> str:
         energy[quiet] < DEAD_RIPPLE_SHARE**2 * others
         or energy[quiet] < 1.5 * noise < DEAD_RIPPLE_SHARE * others
     ):
-        return f"sensor {o.sensors[quiet].name} reads no ripple in {o.label}: it is dead"
+        return f"sensor {o.sensors[quiet].name} measures no ripple in {o.label}: it is dead"
     return ""
 
 
 def find_duplicated_sensors(o) -> str:
-    """Two sensors far apart that read the same, but perhaps for a factor."""
+    """Two distant sensors with the same signal, up to a factor."""
+    shortest_wavelength = MAX_WAVE_SPEED / o.frequency_hz[-1]
     for a, b in combinations(range(len(o.values)), 2):
         x, y = o.values[a], o.values[b]
-        apart = abs(o.sensors[a].position - o.sensors[b].position)
-        if apart * o.frequency_hz[-1] / 2000.0 < MIN_SENSOR_DISTANCE_IN_WAVES or len(x) < 4:
+        distance = abs(o.sensors[a].position - o.sensors[b].position)
+        too_close = distance < MIN_SENSOR_DISTANCE_IN_WAVELENGTHS * shortest_wavelength
+        if too_close or len(x) < 4:
             continue
         factor = np.sum(np.conj(x) * y).real / max(np.sum(np.abs(x) ** 2), 1e-300)
         if np.linalg.norm(y - factor * x) < SAME_RIPPLE_DIFFERENCE * np.linalg.norm(y):
             names = f"{o.sensors[a].name} and {o.sensors[b].name}"
-            return f"sensors {names} read the same in {o.label} though {apart:.2f} m apart"
+            return f"sensors {names} measure the same in {o.label} though {distance:.2f} m apart"
     return ""
 
 
 def find_noiseless_sensor(o) -> str:
-    """A measurement that repeats itself to the last digit: a copy of a period, or a simulation."""
+    """A sensor without noise: its signal is a copied period or a simulation."""
     variance = np.einsum("fss->s", o.covariance).real
     power = np.sum(np.abs(o.values) ** 2, axis=1)
     silent = np.flatnonzero(variance <= NOISELESS_VARIANCE_RATIO * power)
     if len(silent) == 0:
         return ""
-    return f"sensor {o.sensors[silent[0]].name} has no noise at all in {o.label}: no measurement"
+    name = o.sensors[silent[0]].name
+    return f"sensor {name} has no noise at all in {o.label}, so it is no measurement"
 
 
 def find_growing_mean_pressure(o) -> str:
@@ -113,7 +123,7 @@ def find_growing_mean_pressure(o) -> str:
     order = np.argsort([s.position for s in o.sensors])
     mean = np.asarray(o.mean, float)[order] if np.size(o.mean) == len(order) else np.zeros(1)
     scale = o.load_pressure or float(np.max(np.abs(mean)))
-    if len(mean) < 2 or np.min(mean) < 0.3 * scale or scale <= 0:  # coupled without its mean
+    if len(mean) < 2 or np.min(mean) < MIN_MEAN_SHARE * scale or scale <= 0:
         return ""
     k = int(np.argmax(np.diff(mean)))
     if np.diff(mean)[k] < MAX_PRESSURE_GROWTH * scale:
@@ -126,61 +136,64 @@ def find_growing_mean_pressure(o) -> str:
 
 
 def find_copied_recordings(a, b) -> str:
-    """Two recordings with the same numbers."""
+    """Two recordings with identical values."""
     if a.values.shape == b.values.shape and np.allclose(a.values, b.values, rtol=1e-9, atol=0.0):
         return f"{b.label} is a copy of {a.label}"
     return ""
 
 
 def find_changed_state(early, late, delay: float) -> str:
-    """Halves of one recording that differ by far more than noise."""
+    """Two halves of a recording that differ by far more than noise."""
     if early.orders is None or drift_p_value([early], [late], delay)[0] > DRIFT_SIGNIFICANCE:
         return ""
     early, late = at_common_orders(early, late)
-    relative = _relative(*aligned_difference(early, late, delay), early)
-    if relative < CHANGED_RIPPLE_SHARE:
+    difference, variance = aligned_difference(early, late, delay)
+    excess = max(np.sum(np.abs(difference) ** 2) - np.sum(variance), 0.0)
+    change = float(np.sqrt(excess / np.sum(np.abs(early.values) ** 2)))
+    if change < CHANGED_RIPPLE_SHARE:
         return ""
-    return f"the ripple of {early.label} changes by {relative:.0%} between its halves"
+    return f"the ripple of {early.label} changes by {change:.0%} between its halves"
 
 
 def find_incompatible_recordings(observations: Sequence, delay: float) -> str:
-    """A recording unlike all others of its operating point.
+    """Recordings that differ from all others of their operating point.
 
-    Oil is never twice at one temperature: half a per cent of wave speed is allowed for, which
-    leaves the low harmonics to speak. With two recordings nobody knows which is wrong.
+    The oil temperature is never the same twice, so a change of wave speed by WAVE_SPEED_DRIFT is
+    allowed; its phase grows with frequency, and the low harmonics decide. Of two recordings it is
+    not known which one is wrong.
     """
     periodic = [o for o in observations if o.orders is not None and o.speed_hz]
-    unlike = {}
+    differs = {}
     for a, b in combinations(range(len(periodic)), 2):
         x, y = periodic[a], periodic[b]
-        if abs(x.speed_hz / y.speed_hz - 1) > 0.005 or not _near(x.load_pressure, y.load_pressure):
+        if not _same_operating_point(x, y):
             continue
         x, y = at_common_orders(x, y)
         phase = 2 * np.pi * x.frequency_hz * PASSAGES_BEFORE_DECAY * delay * WAVE_SPEED_DRIFT
-        gap, variance = aligned_difference(x, y, delay)
+        difference, variance = aligned_difference(x, y, delay)
         power = np.sum(np.abs(x.values) ** 2, axis=0)
         allowed = np.sum(variance, axis=0) + phase**2 * power
-        left = np.maximum(np.sum(np.abs(gap) ** 2, axis=0) - 2.0 * allowed, 0.0)
-        excess = float(np.sqrt(np.sum(left) / np.sum(power)))
-        unlike.setdefault(a, []).append(excess > CHANGED_RIPPLE_SHARE)
-        unlike.setdefault(b, []).append(excess > CHANGED_RIPPLE_SHARE)
-    odd = [k for k, against in unlike.items() if all(against)]
-    if not odd:
+        excess = np.maximum(np.sum(np.abs(difference) ** 2, axis=0) - 2.0 * allowed, 0.0)
+        change = float(np.sqrt(np.sum(excess) / np.sum(power)))
+        differs.setdefault(a, []).append(change > CHANGED_RIPPLE_SHARE)
+        differs.setdefault(b, []).append(change > CHANGED_RIPPLE_SHARE)
+    outliers = [k for k, comparisons in differs.items() if all(comparisons)]
+    if not outliers:
         return ""
-    names = " and ".join(periodic[k].label for k in odd)
-    if len(odd) == 1:
-        return f"{names} is unlike every other recording of its operating point"
-    return f"{names} are of one operating point and unlike each other"
+    labels = " and ".join(periodic[k].label for k in outliers)
+    if len(outliers) == 1:
+        return f"{labels} differs from every other recording of its operating point"
+    return f"{labels} are of one operating point but differ from each other"
 
 
 def find_clipping_plateau(recording, sensor: str, row: np.ndarray) -> str:
-    """A limiter with noise behind it: samples crowd at one end of the range, beyond any sinusoid.
+    """A clipped signal with noise: samples crowd at one end of the range.
 
-    A sinusoid has 2.4 times as many samples in the outermost 2 % of its range as in the next (the
-    arcsine law), noise fewer.
+    A sinusoid has 2.4 times as many samples in the outermost 2 % of its range as in the next 2 %
+    (arcsine law), and noise has fewer.
     """
     low, high = float(np.min(row)), float(np.max(row))
-    step = 0.02 * (high - low)
+    step = EDGE_SHARE * (high - low)
     if step == 0:
         return ""
     for side, x in (("top", high - row), ("bottom", row - low)):
@@ -191,16 +204,15 @@ def find_clipping_plateau(recording, sensor: str, row: np.ndarray) -> str:
 
 
 def _rows(rig, recording) -> list:
+    """(sensor's name, samples) of each sensor of a recording."""
     if recording.pressure is None:
         return []
     return [(s.name, row) for s, row in zip(rig.sensors, recording.pressure)]
 
 
-def _relative(gap: np.ndarray, variance: np.ndarray, o) -> float:
-    """Norm of a difference over that of the ripple, the variance expected taken off."""
-    excess = max(np.sum(np.abs(gap) ** 2) - np.sum(variance), 0.0)
-    return float(np.sqrt(excess / np.sum(np.abs(o.values) ** 2)))
-
-
-def _near(a: float | None, b: float | None) -> bool:
-    return a == b or (a is not None and b is not None and abs(a / b - 1) < 0.01)
+def _same_operating_point(a, b) -> bool:
+    """Whether two periodic observations have one speed and one load pressure."""
+    if abs(a.speed_hz / b.speed_hz - 1) > SAME_SPEED:
+        return False
+    p, q = a.load_pressure, b.load_pressure
+    return p == q or (p is not None and q is not None and abs(p / q - 1) < SAME_PRESSURE)

@@ -1,8 +1,8 @@
-"""The sheet or the physics: what a free data sheet would make of the data without an effect.
+"""Prior sensitivity: would an effect be needed if the data sheet were not trusted?
 
-Recalibration swallows physics. Where a fit without an accepted effect does nearly as well once the
-line's numbers may go anywhere, what speaks for the effect is the data sheet, and how far the fit
-has to leave it says how firmly.
+Recalibrated parameters can absorb missing physics. Each accepted effect is left out and the line is
+refitted with wide priors. If that fit is nearly as good, only the data sheet supports the effect,
+and the distance of the fit from the data sheet says how firmly.
 """
 
 from __future__ import annotations
@@ -17,30 +17,39 @@ from rippletwin.calibration.misfit import score_fit
 from rippletwin.calibration.posterior import MIN_MODEL_ERROR
 from rippletwin.case.model import Rig, Uncertainty
 from rippletwin.explanation.checks import alarms
-from rippletwin.explanation.fit_jobs import Workers, common_coordinates
-from rippletwin.explanation.thresholds import ACCEPT
+from rippletwin.explanation.fit_jobs import (
+    Continuation,
+    FitJob,
+    FromTheta,
+    Workers,
+    common_coordinates,
+)
+from rippletwin.explanation.thresholds import (
+    MIN_LOG_BAYES_FACTOR,
+    PULL_ALARM,
+    WIDE_PRIOR_MISFIT_RATIO,
+)
 from rippletwin.twin.parameters import coordinates
 from rippletwin.twin.twin import Twin
 
-WIDENING, MAX_WIDENED_SD = 20.0, 0.3  # times the stated uncertainty, and at most (relative, or m)
-RIVAL_MISFIT_RATIO = 2.0
-"""Times the accepted misfit: a fit as good as this could be taken for the explanation; one whose
-misfit is smaller by as much, what is below the model error aside, shows that it is none."""
+WIDENING = 20.0  # factor on the stated uncertainty
+MAX_WIDENED_SD = 0.3  # relative, or m for a sensor's position
 
 
 @dataclass(frozen=True)
-class WithoutEffect:
-    """A fit without one effect, the data sheet being free.
+class PriorSensitivity:
+    """A fit without one effect and with wide priors.
 
-    effect     name of what was left out
-    evidence   log evidence lost with it, the data sheet as stated; None where nothing fits so
-    misfit     relative, in sample, the data sheet free
-    parameter  the line's parameter that goes furthest from the sheet
-    value, nominal   its values, `unit`
-    pull       how far that is, in standard deviations as stated
-    rivals     whether the fit is nearly as good as the accepted one, or hardly any evidence is lost
-    refutes    whether it is so much better, and so far from the sheet, that what is accepted cannot
-               be what is missing
+    effect     name of the effect that is left out
+    evidence   log evidence lost without it, with priors as stated; None if nothing fits
+    misfit     relative, in sample, with wide priors
+    parameter  line parameter that moves furthest from the data sheet
+    value      its fitted value, `unit`
+    nominal    its value on the data sheet, `unit`
+    pull       its distance from the data sheet in standard deviations as stated
+    rivals     whether this fit is nearly as good as the accepted one, or little evidence is lost
+    refutes    whether this fit is so much better, and so far from the data sheet, that the effect
+               cannot be what is missing
     """
 
     effect: str
@@ -56,73 +65,81 @@ class WithoutEffect:
 
 
 def compare_without_each_effect(
-    pool: Workers, base: Fit, accepted: Fit
-) -> tuple[WithoutEffect, ...]:
-    """`WithoutEffect` of every accepted effect; the others stay. `base` is the fit without any.
+    workers: Workers, base: Fit, accepted: Fit
+) -> tuple[PriorSensitivity, ...]:
+    """`PriorSensitivity` of every accepted effect; `base` is the fit without any.
 
-    Each is first fitted with the sheet as stated, by continuation, which finds the valley; from
-    there, and from where the accepted fit is, the sheet is let go.
+    The hypothesis without the effect is first fitted with priors as stated, by continuation, which
+    finds the local mode. From there and from the accepted fit it is refitted with wide priors.
     """
     rests = [accepted.without(k) for k in range(len(accepted.hypothesis))]
-    held = [base]
+    stated_fits = [base]
     if len(rests) > 1:
-        held = pool.fit(
-            [{"hypothesis": r, "starts": [common_coordinates(accepted, r)]} for r in rests]
+        stated_fits = workers.fit(
+            [FitJob(rest, Continuation((common_coordinates(accepted, rest),))) for rest in rests]
         )
-    reached = score_fit(accepted, pool.observations).misfit
-    found = []
-    free = refit_with_wide_priors(pool, held, accepted)
-    for (effect, _), stated, (misfit, fit) in zip(accepted.hypothesis, held, free):
-        theta = coordinates(pool.base.parameters, fit.twin.values())
-        pull, name = alarms.largest_pull(replace(fit, twin=pool.base.with_(theta=theta)))
-        parameter = pool.base.parameters[pool.base.index[name]]
+    accepted_misfit = score_fit(accepted, workers.observations).misfit
+    wide_fits = refit_with_wide_priors(workers, stated_fits, accepted)
+    line = workers.base
+    results = []
+    for (effect, _), stated, (misfit, wide) in zip(accepted.hypothesis, stated_fits, wide_fits):
+        theta = coordinates(line.parameters, wide.twin.values())
+        pull, name = alarms.largest_pull(replace(wide, twin=line.with_(theta=theta)))
+        parameter = line.parameters[line.index[name]]
         lost = accepted.evidence - stated.evidence
-        found.append(
-            WithoutEffect(
+        results.append(
+            PriorSensitivity(
                 effect=effect.name,
                 evidence=lost if np.isfinite(lost) else None,
                 misfit=misfit,
                 parameter=parameter.name,
-                value=fit.twin.values()[parameter.name],
+                value=wide.twin.values()[parameter.name],
                 nominal=parameter.nominal,
                 unit=parameter.unit,
                 pull=pull,
-                rivals=misfit < RIVAL_MISFIT_RATIO * reached or lost < ACCEPT,
-                refutes=pull > alarms.PULL_ALARM
-                and RIVAL_MISFIT_RATIO * max(misfit, MIN_MODEL_ERROR) < reached,
+                rivals=misfit < WIDE_PRIOR_MISFIT_RATIO * accepted_misfit
+                or lost < MIN_LOG_BAYES_FACTOR,
+                # A misfit below the model error says nothing.
+                refutes=pull > PULL_ALARM
+                and WIDE_PRIOR_MISFIT_RATIO * max(misfit, MIN_MODEL_ERROR) < accepted_misfit,
             )
         )
-    return tuple(found)
+    return tuple(results)
 
 
 def refit_with_wide_priors(
-    pool: Workers, held: Sequence[Fit], accepted: Fit
+    workers: Workers, fits: Sequence[Fit], accepted: Fit
 ) -> list[tuple[float, Fit]]:
-    """(misfit, fit) of each of `held` fitted again with a sheet that is hardly known, from where
-    it is and from where `accepted` is: the one that misfits less, for that is what is asked."""
+    """(misfit, fit) of each of `fits` refitted with wide priors.
+
+    Each starts from its mode and from that of `accepted`; the one with the smaller misfit is taken.
+    """
     jobs = []
-    for fit in held:
-        old = fit.twin
+    for fit in fits:
+        twin = fit.twin
         base = Twin(
-            widen_priors(old.rig),
-            pool.observations,
-            friction=old.friction,
-            source_sd=old.source_sd,
-            guessed_load=old.guessed_load,
-            uncertain_pump=old.uncertain_pump,
+            widen_priors(twin.rig),
+            workers.observations,
+            friction=twin.friction,
+            source_sd=twin.source_sd,
+            guessed_load=twin.guessed_load,
+            uncertain_pump=twin.uncertain_pump,
         )
         parameters = base.with_(effects=fit.hypothesis).parameters
-        job = {"base": base, "hypothesis": fit.hypothesis, "source_free": fit.source_free}
-        jobs += [
-            {**job, "theta": coordinates(parameters, twin.values())}
-            for twin in (old, accepted.twin)
-        ]
-    found = [(score_fit(fit, pool.observations).misfit, fit) for fit in pool.fit(jobs)]
-    return [min(pair, key=lambda f: f[0]) for pair in zip(found[::2], found[1::2])]
+        for start in (twin, accepted.twin):
+            theta = coordinates(parameters, start.values())
+            jobs.append(
+                FitJob(fit.hypothesis, FromTheta(theta), base=base, source_free=fit.source_free)
+            )
+    refits = [(score_fit(fit, workers.observations).misfit, fit) for fit in workers.fit(jobs)]
+    return [min(pair, key=lambda refit: refit[0]) for pair in zip(refits[::2], refits[1::2])]
 
 
 def widen_priors(rig: Rig) -> Rig:
-    """The rig with LOOSER times the stated uncertainty, at most MOST, nowhere less than stated."""
+    """The rig with WIDENING times the stated uncertainty, at most MAX_WIDENED_SD.
+
+    Nowhere less than stated.
+    """
     stated = {f.name: getattr(rig.uncertainty, f.name) for f in fields(Uncertainty)}
-    free = {name: max(sd, min(WIDENING * sd, MAX_WIDENED_SD)) for name, sd in stated.items()}
-    return replace(rig, uncertainty=Uncertainty(**free))
+    wide = {name: max(sd, min(WIDENING * sd, MAX_WIDENED_SD)) for name, sd in stated.items()}
+    return replace(rig, uncertainty=Uncertainty(**wide))

@@ -1,4 +1,4 @@
-"""Exchanged sensors and inverted signs."""
+"""Swapped sensors and inverted signs: wiring errors that look like missing physics."""
 
 from __future__ import annotations
 
@@ -11,47 +11,49 @@ import numpy as np
 from rippletwin.calibration.frequency_continuation import fit_hypothesis
 from rippletwin.calibration.posterior import MIN_MODEL_ERROR
 from rippletwin.explanation.search.stepwise_search import Search
-from rippletwin.explanation.thresholds import ACCEPT
+from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
+from rippletwin.twin.twin import Twin
 
-MAX_EXPLAINED_MODEL_ERROR = (
-    10.0 * MIN_MODEL_ERROR
-)  # model error that no explanation of sound data leaves
+MAX_EXPLAINED_MODEL_ERROR = 10.0 * MIN_MODEL_ERROR
+"""Relative model error above which the explanation of correctly wired data is implausible."""
 
 
-def find_swapped_sensors(base_twin, observations: Sequence, search: Search) -> str:
-    """Sensors exchanged or turned in sign: data changed so need no missing physics.
+def find_swapped_sensors(base: Twin, observations: Sequence, search: Search) -> str:
+    """Two swapped sensors or a sensor with inverted sign, in words; "" if there are none.
 
-    Each exchange of two sensors and each turned sign is undone and the paper's line fitted; it is
-    believed where that is better, by the evidence an effect must add, than the best explanation of
-    the data as they are. Not asked where the search found a fair fit: it costs some fits.
+    Each swap and each inversion is undone and the line without effects is fitted. It is reported if
+    its evidence exceeds that of the best explanation of the data as they are by as much as an
+    effect must add. The check costs several fits, so it runs only where the search left a large
+    model error.
     """
-    count = len(base_twin.rig.sensors)
+    sensors = base.rig.sensors
     pressures = all(o.kind != "input_impedance" for o in observations)
-    if search.best.model_error <= MAX_EXPLAINED_MODEL_ERROR or count < 2 or not pressures:
+    if search.best.model_error <= MAX_EXPLAINED_MODEL_ERROR or len(sensors) < 2 or not pressures:
         return ""
-    tried = {}
-    names = [s.name for s in base_twin.rig.sensors]
+    evidence = {
+        fault: fit_hypothesis(base, (), corrected).evidence
+        for fault, corrected in _corrected_wirings(sensors, observations).items()
+    }
+    best = max(evidence, key=evidence.get)
+    return best if evidence[best] > search.best.evidence + MIN_LOG_BAYES_FACTOR else ""
+
+
+def _corrected_wirings(sensors: Sequence, observations: Sequence) -> dict[str, list]:
+    """The observations with each possible wiring fault undone, by the fault in words."""
+    count, corrected = len(sensors), {}
     for a, b in combinations(range(count), 2):
         order = list(range(count))
         order[a], order[b] = b, a
-        changed = [
+        corrected[f"sensors {sensors[a].name} and {sensors[b].name} are exchanged"] = [
             replace(o, values=o.values[order], covariance=o.covariance[:, order][:, :, order])
             for o in observations
         ]
-        tried[f"sensors {names[a]} and {names[b]} are exchanged"] = changed
     for k in range(count):
         sign = np.where(np.arange(count) == k, -1.0, 1.0)
-        changed = [
+        corrected[f"the sign of sensor {sensors[k].name} is inverted"] = [
             replace(
-                o,
-                values=o.values * sign[:, None],
-                covariance=o.covariance * np.outer(sign, sign),
+                o, values=o.values * sign[:, None], covariance=o.covariance * np.outer(sign, sign)
             )
             for o in observations
         ]
-        tried[f"sensor {names[k]} has its sign turned"] = changed
-    evidence = {
-        words: fit_hypothesis(base_twin, (), changed).evidence for words, changed in tried.items()
-    }
-    best = max(evidence, key=evidence.get)
-    return best if evidence[best] > search.best.evidence + ACCEPT else ""
+    return corrected

@@ -1,11 +1,11 @@
-"""What was found, without a name: the missing quantity against frequency.
+"""The missing quantity against frequency, without reference to a named effect.
 
 An effect changes one quantity of the line: the admittance of a shunt at a point, the impedance or
-admittance of a stretch per metre, what a sensor reads, what the pump or the load lets through. The
-data say at every frequency alone how much of that change they ask for; the named law has to pass
-through those points. Flat and real: a leak. In proportion to jw: a compliance. Through zero: a
-resonator. As (1 + j) sqrt(w): a boundary layer. A negative real part: not passive, so the source
-or a sensor.
+admittance per metre of a segment, the factor of a sensor, or the admittance at the pump or load. At
+every frequency alone, the data determine how much of that change they need. The law of a named
+effect must pass through these points. A flat and real law is a leak. A law in proportion to jw is a
+compliance. A law through zero is a resonator. A law as (1 + j) sqrt(w) is a boundary layer. A
+negative real part is not passive, so it belongs to the source or a sensor.
 """
 
 from __future__ import annotations
@@ -17,22 +17,27 @@ import numpy as np
 
 from rippletwin.calibration.fit import Fit, posterior_at_fit
 from rippletwin.calibration.posterior import Posterior
-from rippletwin.line.frequency_domain.line_network import Network
-from rippletwin.twin.effects.passive_network import one_port
+from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
+from rippletwin.twin.effects.base import LineState
 from rippletwin.twin.forward_model import ForwardModel, reflection
 
-PROBE_SHARE = 1e-4
-RETARDATIONS = np.geomspace(2e-5, 5e-3, 9)  # s, of a compliance that relaxes
+PROBE_SHARE = 1e-4  # of the change by an effect, for finite differences
+RETARDATION_TIMES = np.geomspace(2e-5, 5e-3, 9)  # s, of a relaxing compliance
+MAX_PASSIVITY_HZ = 1e5
+MAX_UNEXPLAINED_SHARE = 0.3  # of the weighted power of an immittance that follows a simple law
+PENALTY_FOR_TIME_CONSTANT = 2.0
+"""Factor on what a law with a time constant leaves: with one parameter more it must do better."""
 
 
 @dataclass(frozen=True)
 class MissingImmittance:
-    """One quantity that the base line lacks, in SI units.
+    """One quantity that the line without an effect lacks, in SI units.
 
     quantity, where   in words; `unit` is the quantity's
     frequency_hz      (F,)
-    law               (F,) what the fit's effect makes of it
-    points, sd        (F,) what the data ask for at each frequency alone, and how well they know it
+    law               (F,) the quantity by the fitted effect
+    points, sd        (F,) the quantity by the data at each frequency alone, and its standard
+                      deviation
     """
 
     quantity: str
@@ -44,13 +49,13 @@ class MissingImmittance:
     sd: np.ndarray
 
     @property
-    def words(self) -> str:
-        """The simple law that the points follow."""
+    def law_in_words(self) -> str:
+        """The simple law that the points follow, in words."""
         return describe_law(self.frequency_hz, self.points, 1.0 / np.maximum(self.sd, 1e-300) ** 2)
 
 
-def observable_of(posterior: Posterior, network: Network) -> np.ndarray:
-    """What a network would be seen as, (S, F): pressures, or reflection coefficients."""
+def observable_of(posterior: Posterior, network: FrequencyDomainLine) -> np.ndarray:
+    """The observed quantity of a network, (S, F): pressures, or reflection coefficients."""
     twin = posterior.twin
     if posterior.observations[0].kind != "input_impedance":
         return network.readings()
@@ -67,7 +72,7 @@ def observable_of(posterior: Posterior, network: Network) -> np.ndarray:
 def whitened_columns(posterior: Posterior, prediction: np.ndarray, moved: Sequence) -> np.ndarray:
     """Whitened differences (..., S, F) of predictions `moved` (..., S, F) from `prediction`.
 
-    A free source goes with each of them at its most likely amplitude.
+    A free source keeps its most likely amplitude at `prediction`.
     """
     h = posterior.best_source(prediction)
     amplitude = h / np.where(prediction == 0, 1.0, prediction)
@@ -78,23 +83,23 @@ def whitened_columns(posterior: Posterior, prediction: np.ndarray, moved: Sequen
 
 
 def missing_immittance(
-    fit: Fit, observations: Sequence, which: int = -1
+    fit: Fit, observations: Sequence, effect_index: int = -1
 ) -> MissingImmittance | None:
-    """What the effect `which` of a fit adds to the line; None for a fit without effects.
+    """What one effect of a fit adds to the line; None for a fit without effects.
 
-    All else is held as fitted. With law Y and points Y (1 + e), the e of each frequency is the
-    least-squares answer over the sensors of a model linear about the fit.
+    Everything else is fixed at the fit. With law Y and points Y (1 + e), e is the least-squares
+    solution at each frequency, over the sensors, of a model linear in e.
     """
     if not fit.hypothesis:
         return None
     posterior = posterior_at_fit(fit, observations)
     twin, theta = fit.twin, fit.twin.theta
-    effect, place, values = twin.effect_values(theta)[which]
+    effect, place, values = twin.effect_values(theta)[effect_index]
     without, changed = _networks(posterior, effect, place, values)
-    found = _changed_quantity(without, changed)
-    if found is None:
+    difference = _changed_quantity(without, changed)
+    if difference is None:
         return None
-    quantity, where, unit, change = found
+    quantity, where, unit, change = difference
     whole = observable_of(posterior, changed)
     probe = observable_of(posterior, _interpolate_networks(without, changed, 1.0 + PROBE_SHARE))
     prediction = posterior.predict(theta)
@@ -113,15 +118,16 @@ def missing_immittance(
     )
 
 
-def _networks(posterior: Posterior, effect, place, values) -> tuple[Network, Network]:
-    """The fit's line without one effect and with it, the load's state held where an orifice is."""
+def _networks(
+    posterior: Posterior, effect, place, values
+) -> tuple[FrequencyDomainLine, FrequencyDomainLine]:
+    """The fitted line without one effect and with it; an orifice keeps its fitted state."""
     twin, forward = posterior.twin, posterior.forward
     rest = tuple(pair for pair in twin.effects if pair != (effect, place))
     other = twin.with_(effects=rest)
     theta = np.array([twin.theta[twin.index[p.name]] for p in other.parameters])
     without = ForwardModel(other, posterior.observations).network(theta)
-    orifice = twin.rig.load.kind == "orifice"
-    if orifice:
+    if twin.rig.load.kind == "orifice":
         without = replace(without, load=forward.network(twin.theta).load)
     changed = replace(
         without,
@@ -129,48 +135,50 @@ def _networks(posterior: Posterior, effect, place, values) -> tuple[Network, Net
         shunt=without.shunt.copy(),
         inserts=list(without.inserts),
     )
-    line = forward._line_state(twin.arrays(twin.theta))
-    effect.apply(changed, line, values, place)
+    state = forward.line_state(twin.arrays(twin.theta))
+    effect.apply(changed, state, values, place)
     return without, changed
 
 
-def _changed_quantity(without: Network, changed: Network):
-    """(words, where, unit, change (F,)) of the first quantity in which two networks differ."""
+def _changed_quantity(without: FrequencyDomainLine, changed: FrequencyDomainLine):
+    """(quantity, where, unit, change (F,)) of the first quantity in which two networks differ."""
 
     def over(x):
         return np.broadcast_to(np.asarray(x, complex), without.s.shape)
 
     change = over(changed.source_admittance) - over(without.source_admittance)
     if np.any(change):
-        return "admittance beside the pump's flow", "source", "m3/(Pa s)", change
+        return "admittance parallel to the pump's flow", "source", "m3/(Pa s)", change
     shape = (len(without.sensor_positions), len(without.s))
     factor = np.broadcast_to(changed.sensor_factor, shape) / np.broadcast_to(
         without.sensor_factor, shape
     )
     if np.any(factor != 1.0):
         row = int(np.argmax(np.sum(np.abs(factor - 1.0), axis=1)))
-        return "reading over pressure, less one", f"sensor {row + 1}", "1", factor[row] - 1.0
-    for name, unit, words in (
+        return "relative error of the reading", f"sensor {row + 1}", "1", factor[row] - 1.0
+    for name, unit, quantity in (
         ("series", "Pa s/m4", "series impedance per metre"),
         ("shunt", "m2/(Pa s)", "shunt admittance per metre"),
     ):
         change = getattr(changed, name) - getattr(without, name)
         moved = np.flatnonzero(np.any(change, axis=1))
         if len(moved):
-            return words, f"segment {moved[0] + 1}", unit, change[moved[0]]
+            return quantity, f"segment {moved[0] + 1}", unit, change[moved[0]]
     new = [i for i in changed.inserts if not any(i is old for old in without.inserts)]
     if new:
         x, kind, value = new[0]
-        unit, word = ("m3/(Pa s)", "admittance") if kind == "shunt" else ("Pa s/m3", "impedance")
-        return f"{kind} {word}", f"{float(x):.2f} m from the pump", unit, over(value)
+        unit, name = ("m3/(Pa s)", "admittance") if kind == "shunt" else ("Pa s/m3", "impedance")
+        return f"{kind} {name}", f"{float(x):.2f} m from the pump", unit, over(value)
     if changed.load is not without.load:
         (p1, q1), (p0, q0) = changed.load_state(), without.load_state()
         return "impedance of the load", "load", "Pa s/m3", over(p1 / q1) - over(p0 / q0)
     return None
 
 
-def _interpolate_networks(without: Network, changed: Network, share: float) -> Network:
-    """The network with `share` of every change; 1 is `changed`."""
+def _interpolate_networks(
+    without: FrequencyDomainLine, changed: FrequencyDomainLine, share: float
+) -> FrequencyDomainLine:
+    """The network with `share` of every change: 0 is `without`, 1 is `changed`."""
 
     def mix(a, b):
         return a + share * (b - a)
@@ -196,55 +204,59 @@ def _interpolate_networks(without: Network, changed: Network, share: float) -> N
 def describe_law(
     frequency_hz: np.ndarray, immittance: np.ndarray, weight: np.ndarray | None = None
 ) -> str:
-    """Which simple law an immittance (F,) follows, in words; weights are 1/sqrt(w) by default."""
+    """The simple law that an immittance (F,) follows, in words.
+
+    `weight` (F,) is 1/sqrt(w) by default.
+    """
     w = 2 * np.pi * np.asarray(frequency_hz)
     weight = 1.0 / np.sqrt(w) if weight is None else np.asarray(weight)
-    simple = {
-        "flat and real, as a leak or a resistance": [np.ones_like(w) + 0j],
-        "in proportion to jw, as a compliance or an inertance": [1j * w],
-        "as 1/jw, through an inertance or a compliance": [1 / (1j * w)],
-        "as (1 + j) sqrt(w), a boundary layer": [(1 + 1j) * np.sqrt(w)],
-        "as jw/(1 + jw tau), a compliance that relaxes": [
-            1j * w / (1 + 1j * w * tau) for tau in RETARDATIONS
-        ],
+    time_constant_law = "proportional to jw/(1 + jw tau), like a relaxing compliance"
+    shapes_by_law = {
+        "flat and real, like a leak or a resistance": [np.ones_like(w) + 0j],
+        "proportional to jw, like a compliance or an inertance": [1j * w],
+        "proportional to 1/jw, like a series inertance or compliance": [1 / (1j * w)],
+        "proportional to (1 + j) sqrt(w), like a boundary layer": [(1 + 1j) * np.sqrt(w)],
+        time_constant_law: [1j * w / (1 + 1j * w * tau) for tau in RETARDATION_TIMES],
     }
-    whole = float(np.sum(weight * np.abs(immittance) ** 2))
-    left = {}
-    for number, (words, shapes) in enumerate(simple.items()):
-        scales = [
-            max(np.sum(weight * np.conj(s) * immittance).real, 0.0)
-            / np.sum(weight * np.abs(s) ** 2)
-            for s in shapes
-        ]
-        rest = [
-            float(np.sum(weight * np.abs(immittance - c * s) ** 2)) for c, s in zip(scales, shapes)
-        ]
-        # A law with one number more must do clearly better.
-        left[words] = min(rest) * (2.0 if number == len(simple) - 1 else 1.0)
-    best = min(left, key=left.get)
-    if left[best] < 0.3 * whole:
+    residuals = {
+        law: min(_power_left(immittance, shape, weight) for shape in shapes)
+        for law, shapes in shapes_by_law.items()
+    }
+    residuals[time_constant_law] *= PENALTY_FOR_TIME_CONSTANT
+    best = min(residuals, key=residuals.get)
+    if residuals[best] < MAX_UNEXPLAINED_SHARE * np.sum(weight * np.abs(immittance) ** 2):
         return best
-    order = np.argsort(w)
-    if np.sum((weight * immittance.real)[immittance.real < 0]) < -0.5 * np.sum(
-        weight * np.abs(immittance.real)
-    ):
-        return "with a negative real part: not passive, so the source or a sensor"
-    sign = np.sign(immittance.imag[order])
+    real = weight * immittance.real
+    if np.sum(real[real < 0]) < -0.5 * np.sum(np.abs(real)):
+        return "negative real part: not passive, so of the source or a sensor"
+    sign = np.sign(immittance.imag[np.argsort(w)])
     if np.any(np.diff(sign) != 0):
-        return "through zero, as a resonator"
-    return "by no simple law"
+        return "imaginary part through zero, like a resonator"
+    return "no simple law"
 
 
-def is_passive(fit: Fit, which: int = -1) -> bool:
-    """Whether a nameless network's immittance is positive real, as fitted.
+def _power_left(immittance: np.ndarray, shape: np.ndarray, weight: np.ndarray) -> float:
+    """Weighted power of an immittance (F,) less its best multiple >= 0 of `shape` (F,)."""
+    inner = np.sum(weight * np.conj(shape) * immittance).real
+    scale = max(inner, 0.0) / np.sum(weight * np.abs(shape) ** 2)
+    return float(np.sum(weight * np.abs(immittance - scale * shape) ** 2))
 
-    Re Y(s) >= 0 for Re s >= 0 (Brune 1931, J. Math. Phys. 10:191): looked at along the imaginary
-    axis and a grid of the right half-plane up to 100 kHz. Raises ValueError for a named effect.
+
+def is_passive(fit: Fit, effect_index: int = -1) -> bool:
+    """Whether the fitted immittance of a passive network is positive real.
+
+    Re Y(s) >= 0 for Re s >= 0 (Brune 1931, J. Math. Phys. 10:191), checked along the imaginary
+    axis and on a grid of the right half-plane up to 100 kHz. Raises ValueError for a named effect.
     """
-    effect, _, values = fit.twin.effect_values(fit.twin.theta)[which]
+    twin = fit.twin
+    effect, place, values = twin.effect_values(twin.theta)[effect_index]
     if effect.named:
-        raise ValueError(f"{effect.name} is no nameless network")
-    w = 2 * np.pi * np.geomspace(0.1, 1e5, 400)
+        raise ValueError(f"{effect.name} is a named effect, not a passive network")
+    w = 2 * np.pi * np.geomspace(0.1, MAX_PASSIVITY_HZ, 400)
     s = np.concatenate([1j * w, *(w * (np.tan(a) + 1j) * np.cos(a) for a in (0.3, 0.9, 1.5))])
-    immittance = one_port(s, values, 1.0)
+    v, fluid = twin.arrays(twin.theta), twin.rig.fluid
+    state = LineState(fluid.density, v.viscosity, v.diameters, v.wave_speeds, v.lengths)
+    line = FrequencyDomainLine(s, v.lengths, series=np.ones((len(v.lengths), len(s))), shunt=None)
+    effect.apply(line, state, values, place)
+    (immittance,) = (insert.immittance for insert in line.inserts)
     return bool(np.all(immittance.real >= -1e-9 * np.abs(immittance)))

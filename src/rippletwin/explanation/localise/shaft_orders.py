@@ -1,206 +1,226 @@
-"""Lines at shaft orders that equal pistons at even speed do not make.
+"""Order analysis: ripple at shaft orders that are no multiples of the number of pistons.
 
-The nominal pump has none, so they are no matter of fitting the line: the line as it was explained
-tells what flow at the pump they come from, and whether one flow accounts for every sensor. A shaft
-that turns unevenly makes sidebands of the piston orders; what is left is spread of the pistons.
-What the sidebands have, the piston orders lack: at high orders a small swing takes most of them,
-and the line must be fitted with the ripple that such a shaft delivers.
+Equal pistons on an evenly turning shaft have none, so these orders are not fitted with the line.
+The accepted twin tells which flow at the pump they need, and whether one flow accounts for every
+sensor. A shaft that turns unevenly modulates the phase of the flow, which makes sidebands of the
+piston orders (Randall 2011, Vibration-based Condition Monitoring, sec. 3.3). What modulation does
+not account for is a spread between the pistons.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.special import chdtrc
 
-from rippletwin.case.model import FlowRipple
-from rippletwin.harmonics import flow_harmonics, peak_amplitudes, phase_modulate
+from rippletwin.explanation.thresholds import (
+    MIN_COHERENT_SHARE,
+    MIN_SHAFT_ORDER_LEVEL,
+    MODULATION_SHARE,
+    SHAFT_ORDER_SIGNIFICANCE,
+)
+from rippletwin.harmonics import peak_amplitudes, phase_modulate
 from rippletwin.spectra.frequency_selection import select_below
 from rippletwin.twin.forward_model import ForwardModel
 from rippletwin.twin.twin import Twin
 
-LINE_MODEL_ERROR = (
-    0.02  # of the lines, where no orifice couples them: the line's own error and more
-)
-MIN_RELATIVE_LEVEL = 0.01  # of the ripple: below it the lines are no effect worth a name
-LEVEL_SIGNIFICANCE = 1e-6
-MODULATION_SHARE = 0.9  # of the lines' energy that modulation must explain to be the name
-ROUGH_MODULATION_SHARE = 0.7  # the same by a line that is only calibrated: it may be off by as much
-MIN_PHASE_CHANGE = 0.02  # rad at the highest order: below it a swing told anew changes nothing
-LOW_PISTON_ORDERS = (
-    4,
-    12,
-    1000,
-)  # piston orders up to which modulation is first sought as a small one
+LINE_MODEL_ERROR = 0.02
+"""Relative error of the twin at shaft orders, per sensor and order. It is larger than at the piston
+orders: there the load is fitted with all products of harmonics, here it is linear."""
+PISTON_ORDER_LIMITS = (4, 12, 1000)
+"""Piston orders up to which a modulation is first estimated as a small one."""
 
 
 @dataclass(frozen=True)
 class ShaftOrders:
-    """Lines at other orders than the pistons'.
+    """Ripple at shaft orders that are no multiples of the number of pistons.
 
-    relative    their norm over the ripple's, both at the sensors
-    p_value     of noise alone making them
-    coherent    share of their energy that one flow at the pump accounts for
+    level       its norm over that of the whole ripple, both at the sensors
+    p_value     of noise alone
+    coherence   share of its energy that one flow at the pump accounts for
     name        "speed_fluctuation", "piston_spread" or None
-    value       modulation of the shaft angle in rad, or spread over the mean flow, rms
-    modulation  b of each recording by its label: the shaft is ahead by Re(b exp(j t)), rad
+    value       amplitude of the modulation in rad, or rms spread of the flow over the mean flow
+    interval    95 % interval of `value`; None where it is not known
+    modulation  complex amplitude b of each recording by its label: the shaft leads an even rotation
+                by Re(b exp(j t)) rad at angle t
     """
 
-    relative: float
+    level: float
     p_value: float
-    coherent: float
+    coherence: float
     name: str | None
     value: float
     modulation: Mapping[str, complex] = field(default_factory=dict)
+    interval: tuple[float, float] | None = None
 
 
 def shaft_order_level(
     observations: Sequence, pistons: int, highest_hz: float
 ) -> tuple[float, float] | None:
-    """Norm of the lines at other orders over the ripple's, and the probability that noise alone
-    makes them; None where no observation has such orders."""
-    data = _with_shaft_orders(observations, pistons, highest_hz)
-    if not data:
+    """`level` and `p_value` of `ShaftOrders`; None where no observation has such orders."""
+    recordings = with_shaft_orders(observations, pistons, highest_hz)
+    if not recordings:
         return None
-    lines = energy = chi = 0.0
-    count = 0
-    for o, off in data:
-        power = np.abs(o.values[:, off]) ** 2
-        variance = _variance(o)[:, off]
+    signal = energy = chi_squared = 0.0
+    degrees_of_freedom = 0
+    for o, is_shaft_order in recordings:
+        power = np.abs(o.values[:, is_shaft_order]) ** 2
+        variance = _noise_variance(o)[:, is_shaft_order]
         energy += np.sum(np.abs(o.values) ** 2)
-        lines += max(np.sum(power) - np.sum(variance), 0.0)
-        chi += 2 * np.sum(power / variance)
-        count += 2 * power.size
-    return float(np.sqrt(lines / energy)), float(chdtrc(count, chi))
+        signal += max(np.sum(power) - np.sum(variance), 0.0)
+        chi_squared += 2 * np.sum(power / variance)
+        degrees_of_freedom += 2 * power.size
+    return float(np.sqrt(signal / energy)), float(chdtrc(degrees_of_freedom, chi_squared))
 
 
 def analyse_shaft_orders(
-    twin: Twin, observations: Sequence, highest_hz: float, share: float = MODULATION_SHARE
+    twin: Twin,
+    observations: Sequence,
+    highest_hz: float,
+    modulation_share: float = MODULATION_SHARE,
 ) -> ShaftOrders | None:
-    """Judge the periodic observations with all their orders; None where there are none. Modulation
-    that accounts for `share` of the lines' energy is the name."""
+    """Analyse the shaft orders of periodic observations; None where there are none.
+
+    They are named a speed fluctuation if phase modulation accounts for `modulation_share` of their
+    energy.
+    """
     pistons = twin.rig.pump.get("pistons")
-    found = shaft_order_level(observations, pistons, highest_hz) if pistons else None
-    if found is None:
+    level_and_p = shaft_order_level(observations, pistons, highest_hz) if pistons else None
+    if level_and_p is None:
         return None
-    relative, p = found
-    explained = lines = modulated = flows = 0.0
-    modulation, spread = {}, []
-    for o, off in _with_shaft_orders(observations, pistons, highest_hz):
-        orders = np.asarray(o.orders, int)
-        unit = _response(twin, o)
-        power = np.mean(np.abs(o.values) ** 2, axis=0)
-        weight = 1.0 / (_variance(o) + (LINE_MODEL_ERROR**2 * power)[None])
-        flow = np.sum(weight * np.conj(unit) * o.values, 0) / np.sum(weight * np.abs(unit) ** 2, 0)
-        left = o.values - unit * flow
-        lines += np.sum(np.abs(o.values[:, off]) ** 2)
-        explained += np.sum(np.abs(left[:, off]) ** 2)
-        point = twin.operating_point(o)
-        even = np.zeros(orders.max() + 1, complex)
-        at = orders[~off]
-        even[at] = flow[~off]
-        if point.ripple is not None:
-            even[at] = ForwardModel(twin, [o]).source.at(twin.theta)[0][~off]
-        even[0] = point.mean_flow
-        b, rest, whole = _fit_modulation(even, orders, off, flow, unit, pistons)
-        modulation[o.label] = b
-        modulated += rest
-        flows += whole
-        spread.append(
-            float(np.sqrt(0.5 * np.sum(np.abs(flow[orders < pistons]) ** 2)) / point.mean_flow)
-        )
-    coherent = 1.0 - float(explained / max(lines, 1e-300))
+    level, p_value = level_and_p
+    energy = incoherent = pump_energy = unmodulated = 0.0
+    modulation, spreads = {}, []
+    for o, is_shaft_order in with_shaft_orders(observations, pistons, highest_hz):
+        forward = ForwardModel(twin, [o])
+        (response,) = forward.unit_response(twin.theta)
+        flow = estimate_flow(o.values, response, variance_about_twin(o))
+        residual = o.values - response * flow
+        energy += np.sum(np.abs(o.values[:, is_shaft_order]) ** 2)
+        incoherent += np.sum(np.abs(residual[:, is_shaft_order]) ** 2)
+        even = even_spectrum(forward, twin.theta, flow, is_shaft_order)
+        fitted = fit_modulation(even, o.orders, is_shaft_order, flow, response, pistons)
+        modulation[o.label] = fitted.modulation
+        unmodulated += fitted.energy_left
+        pump_energy += fitted.energy
+        spreads.append(relative_spread(o.orders, flow, pistons, even[0].real))
+    coherence = 1.0 - float(incoherent / max(energy, 1e-300))
     name, value = None, 0.0
-    if relative > MIN_RELATIVE_LEVEL and p < LEVEL_SIGNIFICANCE and coherent > 0.5:
-        by_speed = modulated < (1.0 - share) * flows
-        name = "speed_fluctuation" if by_speed else "piston_spread"
-        value = float(np.mean(np.abs(list(modulation.values())) if by_speed else spread))
-    return ShaftOrders(relative, p, coherent, name, value, modulation)
+    if (
+        level > MIN_SHAFT_ORDER_LEVEL
+        and p_value < SHAFT_ORDER_SIGNIFICANCE
+        and coherence > MIN_COHERENT_SHARE
+    ):
+        is_modulation = unmodulated < (1.0 - modulation_share) * pump_energy
+        name = "speed_fluctuation" if is_modulation else "piston_spread"
+        value = float(np.mean(np.abs(list(modulation.values())) if is_modulation else spreads))
+    return ShaftOrders(level, p_value, coherence, name, value, modulation)
 
 
-def modulation_differs(
-    one: ShaftOrders | None, other: ShaftOrders | None, observations: Sequence
-) -> bool:
-    """Whether a shaft turns so differently by two judgements that the ripple tells."""
-    one, other = _modulation_of(one), _modulation_of(other)
-    top = {o.label: np.max(o.orders) for o in observations if o.orders is not None}
-    return any(
-        top.get(label, 0.0) * abs(one.get(label, 0.0) - other.get(label, 0.0)) > MIN_PHASE_CHANGE
-        for label in {*one, *other}
-    )
+def estimate_flow(values: np.ndarray, response: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    """Least-squares flow (F,) at the pump from readings, responses and variances (S, F)."""
+    weight = 1.0 / variance
+    square = np.sum(weight * np.abs(response) ** 2, axis=0)
+    return np.sum(weight * np.conj(response) * values, axis=0) / square
 
 
-def with_phase_modulation(observations: Sequence, shaft: ShaftOrders | None) -> list:
-    """The observations with the ripple that a shaft delivers which turns as `shaft` says."""
-    swing = _modulation_of(shaft)
-    return [
-        o
-        if o.flow_ripple is None or o.label not in swing
-        else replace(o, flow_ripple=modulate_ripple(o.flow_ripple, swing[o.label]))
-        for o in observations
-    ]
+def even_spectrum(
+    forward: ForwardModel, theta: np.ndarray, flow: np.ndarray, is_shaft_order: np.ndarray
+) -> np.ndarray:
+    """Spectrum (K,) of the pump's flow on an evenly turning shaft, from order 0, the mean.
+
+    `forward` has one recording. At the piston orders the spectrum is that of the nominal ripple at
+    `theta`, or the estimated `flow` (F,) if there is none.
+    """
+    (o,) = forward.observations
+    orders, point = np.asarray(o.orders, int), forward.twin.operating_point(o)
+    even = np.zeros(orders.max() + 1, complex)
+    at_pistons = flow if point.ripple is None else forward.source.at(theta)[0]
+    even[orders[~is_shaft_order]] = at_pistons[~is_shaft_order]
+    even[0] = point.mean_flow
+    return even
 
 
-def _modulation_of(shaft: ShaftOrders | None) -> Mapping[str, complex]:
-    """Modulation of the recordings of a shaft that swings; empty of one that does not."""
-    return shaft.modulation if shaft is not None and shaft.name == "speed_fluctuation" else {}
+def relative_spread(orders, flow: np.ndarray, pistons: int, mean_flow: float) -> float:
+    """Rms of the flow (F,) below the first piston order over the mean flow."""
+    below = np.asarray(orders, int) < pistons
+    return float(np.sqrt(0.5 * np.sum(np.abs(flow[below]) ** 2)) / mean_flow)
 
 
-def modulate_ripple(ripple: FlowRipple, modulation: complex) -> FlowRipple:
-    """The flow ripple of a shaft that is ahead of even turning by Re(b exp(j t)) rad at angle t."""
-    count = max(len(ripple.flow) // 2, 8)
-    spectrum = flow_harmonics(ripple, np.arange(count))
-    flow = phase_modulate(spectrum, modulation, 4 * count)
-    angle = 360.0 * np.arange(len(flow)) / len(flow)
-    return replace(ripple, angle_deg=angle, flow=flow, swing=modulation)
+class Modulation(NamedTuple):
+    """A fitted modulation (rad), and the pressure energy at shaft orders with it removed and
+    altogether."""
+
+    modulation: complex
+    energy_left: float
+    energy: float
 
 
-def _with_shaft_orders(observations: Sequence, pistons: int, highest_hz: float) -> list[tuple]:
-    """(observation, which of its orders are no multiple of `pistons`) where there are any."""
-    data = [select_below(o, highest_hz) for o in observations if o.orders is not None]
-    data = [(o, np.asarray(o.orders) % pistons != 0) for o in data]
-    return [(o, off) for o, off in data if np.any(off)]
+def fit_modulation(
+    even: np.ndarray,
+    orders: np.ndarray,
+    is_shaft_order: np.ndarray,
+    flow: np.ndarray,
+    response: np.ndarray,
+    pistons: int,
+    start: complex | None = None,
+) -> Modulation:
+    """Fit the modulation b to the flow at shaft orders.
+
+    even (K,)          spectrum of the flow on an even shaft
+    orders, flow (F,)  at all orders, with response (S, F) of the sensors to a unit flow
+    start              an estimate of b, which then takes one step; by default b is sought from
+                       several linear estimates
+
+    The piston orders only determine the size of the whole ripple: the impedance of the line may be
+    wrong by some per cent, and b would be wrong by as much. The objective has several minima in b.
+    Low orders alone give linear estimates from which a descent finds the right one.
+    """
+    orders = np.asarray(orders, int)
+    root = np.sqrt(np.sum(np.abs(response) ** 2, axis=0))
+    target = root * flow
+
+    def residual(b):
+        modulated = peak_amplitudes(phase_modulate(even, complex(*b), 4 * len(even)))
+        modelled = root * modulated[orders]
+        at_pistons = modelled[~is_shaft_order]
+        size = np.vdot(at_pistons, target[~is_shaft_order]).real
+        size /= np.vdot(at_pistons, at_pistons).real
+        rest = target[is_shaft_order] - size * modelled[is_shaft_order]
+        return np.concatenate([rest.real, rest.imag])
+
+    if start is None:
+        unmodulated, step = residual((0, 0)), 1e-6
+        slope = [(residual(d) - unmodulated) / step for d in ((step, 0), (0, step))]
+        slope, starts = np.stack(slope, axis=1), []
+        for limit in PISTON_ORDER_LIMITS:
+            low = np.tile(orders[is_shaft_order] < limit * pistons, 2)
+            starts.append(np.linalg.lstsq(-slope[low], unmodulated[low], rcond=None)[0])
+        solutions = [least_squares(residual, b, x_scale=1e-3) for b in starts]
+    else:
+        one_step = least_squares(residual, (start.real, start.imag), x_scale=1e-3, max_nfev=2)
+        solutions = [one_step]
+    best = min(solutions, key=lambda solution: solution.cost)
+    energy = float(np.sum(np.abs(target[is_shaft_order]) ** 2))
+    return Modulation(complex(*best.x), 2.0 * float(best.cost), energy)
 
 
-def _variance(o) -> np.ndarray:
+def with_shaft_orders(observations: Sequence, pistons: int, highest_hz: float) -> list[tuple]:
+    """(observation, mask (F,) of orders that are no multiple of `pistons`) where there are any."""
+    selected = [select_below(o, highest_hz) for o in observations if o.orders is not None]
+    pairs = [(o, np.asarray(o.orders) % pistons != 0) for o in selected]
+    return [(o, is_shaft_order) for o, is_shaft_order in pairs if np.any(is_shaft_order)]
+
+
+def _noise_variance(o) -> np.ndarray:
+    """Noise variance (S, F) of an observation."""
     return np.einsum("fss->sf", o.covariance).real
 
 
-def _response(twin: Twin, observation) -> np.ndarray:
-    """Readings (S, F) for unit flow at every order, the orifice linear."""
-    forward = ForwardModel(twin, [observation])
-    forward.source.flow = np.ones_like(forward.source.flow)
-    forward._orifice = None
-    return forward(twin.theta)[0]
-
-
-def _fit_modulation(even, orders, off, flow, unit, pistons):
-    """Best modulation b, and the pressure energy at other orders with and without it taken off.
-
-    even (K,) is the flow's spectrum at even speed from order 0; orders, flow (F,) and unit (S, F)
-    are what there is, at piston orders too where not `off` (F,). Those tell only how large the
-    whole ripple is: the impedance that the line was given may be some per cent wrong, and b would
-    be as much. Far from its value b has other minima, so that it is first sought where it is small:
-    at low orders.
-    """
-    root = np.sqrt(np.sum(np.abs(unit) ** 2, axis=0))
-    target = root * flow
-
-    def left(b):
-        swing = root * peak_amplitudes(phase_modulate(even, complex(*b), 4 * len(even)))[orders]
-        pumped = swing[~off]
-        size = np.vdot(pumped, target[~off]).real / np.vdot(pumped, pumped).real
-        rest = target[off] - size * swing[off]
-        return np.concatenate([rest.real, rest.imag])
-
-    none, step, found = left((0, 0)), 1e-6, []
-    slope = np.stack([(left(d) - none) / step for d in ((step, 0), (0, step))], axis=1)
-    for most in LOW_PISTON_ORDERS:
-        low = np.tile(orders[off] < most * pistons, 2)
-        start = np.linalg.lstsq(-slope[low], none[low], rcond=None)[0]
-        found.append(least_squares(left, start, x_scale=1e-3))
-    best = min(found, key=lambda f: f.cost)
-    return complex(*best.x), 2.0 * float(best.cost), float(np.sum(np.abs(target[off]) ** 2))
+def variance_about_twin(o) -> np.ndarray:
+    """Variance (S, F) of an observation about the twin: noise and LINE_MODEL_ERROR."""
+    return _noise_variance(o) + LINE_MODEL_ERROR**2 * np.mean(np.abs(o.values) ** 2, axis=0)

@@ -1,1 +1,1 @@
-"""Stepwise search over effects and their places."""
+"""Which effects explain the data? Stepwise selection over the effect library, by evidence."""

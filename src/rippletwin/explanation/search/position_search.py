@@ -1,8 +1,8 @@
-"""Where along the line an accepted effect may sit: one valley after the other.
+"""Search over local modes along the position of an accepted effect.
 
-An effect that may be anywhere has as many valleys as the line has waves. The one that a search ends
-in may be wrong, for the line that the effect was first put on had been bent to do without it; and
-another may do as well, which few sensors cannot tell.
+The posterior of a position has about one local mode per wavelength along the line. The stepwise
+search may end in a wrong one, because the effect was added to a line whose parameters were biased
+by its absence. With few sensors several positions may fit equally well.
 """
 
 from __future__ import annotations
@@ -12,60 +12,67 @@ from collections.abc import Sequence
 import numpy as np
 
 from rippletwin.calibration.fit import Fit
-from rippletwin.explanation.fit_jobs import Workers, rank_by_evidence, transfer_theta
-from rippletwin.explanation.search.stepwise_moves import MIN_GAIN
-from rippletwin.explanation.thresholds import EQUIVALENT
+from rippletwin.explanation.fit_jobs import (
+    FitJob,
+    FromTheta,
+    Workers,
+    rank_by_evidence,
+    transfer_theta,
+)
+from rippletwin.explanation.search.stepwise_moves import MIN_IMPROVEMENT
+from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR
 
-STARTS_PER_WAVE = 2  # on the shortest wave: as many valleys
-MIN_DISTANCE_IN_WAVES = 0.25  # of the shortest wave, by which two seats differ
-
-
-def move_to_best_position(pool: Workers, best: Fit) -> tuple[Fit, list[Fit]]:
-    """`best`, or what it becomes in a better seat, and the fits with one effect in another seat
-    within EQUIVALENT of it, best first."""
-    found = fit_other_positions(pool, best)
-    if found and found[0].evidence > best.evidence + MIN_GAIN:
-        return move_to_best_position(pool, found[0])
-    return best, [f for f in found if f.evidence > best.evidence - EQUIVALENT]
+STARTS_PER_WAVELENGTH = 2  # on the shortest wavelength, which has about as many local modes
+MIN_DISTANCE_IN_WAVELENGTHS = 0.25  # of the shortest wavelength, between two distinct positions
 
 
-def fit_other_positions(pool: Workers, best: Fit) -> list[Fit]:
-    """Fits with each effect that may be anywhere begun at every wave along the line, all else as it
-    is, best first: none of them where `best` is, no two of them the same.
+def move_to_best_position(workers: Workers, best: Fit) -> tuple[Fit, list[Fit]]:
+    """The fit with the best positions, and the equivalent fits at other positions, best first.
 
-    None of a line that stores beyond proportion, where each would take long.
+    Equivalent are those within EQUIVALENT_LOG_BAYES_FACTOR of it.
+    """
+    others = fit_other_positions(workers, best)
+    if others and others[0].evidence > best.evidence + MIN_IMPROVEMENT:
+        return move_to_best_position(workers, others[0])
+    return best, [f for f in others if f.evidence > best.evidence - EQUIVALENT_LOG_BAYES_FACTOR]
+
+
+def fit_other_positions(workers: Workers, best: Fit) -> list[Fit]:
+    """Fits with one effect started at every wavelength along the line, best first.
+
+    The list has neither `best` nor two fits at the same positions. It is empty for a line with
+    nonlinear compliance, where each fit would take long.
     """
     if best.has_nonlinear_compliance:
         return []
-    waves = best.twin.rig.delay * max(o.frequency_hz[-1] for o in pool.observations)
-    count, apart = (
-        int(np.ceil(STARTS_PER_WAVE * waves)),
-        MIN_DISTANCE_IN_WAVES * best.twin.rig.length / waves,
-    )
-    taken = [positions_of_effects(best)]
+    highest_hz = max(o.frequency_hz[-1] for o in workers.observations)
+    wavelengths = best.twin.rig.delay * highest_hz  # on the line
+    count = int(np.ceil(STARTS_PER_WAVELENGTH * wavelengths))
+    min_distance = MIN_DISTANCE_IN_WAVELENGTHS * best.twin.rig.length / wavelengths
     jobs = []
     for k, (effect, place) in enumerate(best.hypothesis):
         if place.element != "position":
             continue
         hypothesis = (*best.without(k), (effect, place))
-        at = pool.base.with_(effects=hypothesis).index[f"{effect.name}@{place}.position"]
-        start = transfer_theta(best, hypothesis, pool.base)
-        prior = best.twin.parameters[best.twin.index[f"{effect.name}@{place}.position"]].prior
+        name = f"{effect.name}@{place}.position"
+        index = workers.base.with_(effects=hypothesis).index[name]
+        start = transfer_theta(best, hypothesis, workers.base)
+        prior = best.twin.parameters[best.twin.index[name]].prior
         for share in (np.arange(count) + 0.5) / count:
             theta = start.copy()
-            theta[at] = prior.coordinate(prior.centre + prior.scale * share)
-            jobs.append({"hypothesis": hypothesis, "theta": theta, "exact": False})
-    found = []
-    for fit in rank_by_evidence(pool.fit(jobs)):
-        here = positions_of_effects(fit)
-        if all(any(abs(here[n] - p[n]) > apart for n in here) for p in taken):
-            taken.append(here)
-            found.append(fit)
-    return found
+            theta[index] = prior.coordinate(prior.centre + prior.scale * share)
+            jobs.append(FitJob(hypothesis, FromTheta(theta, exact=False)))
+    distinct, known = [], [positions_of_effects(best)]
+    for fit in rank_by_evidence(workers.fit(jobs)):
+        positions = positions_of_effects(fit)
+        if all(any(abs(positions[n] - p[n]) > min_distance for n in positions) for p in known):
+            known.append(positions)
+            distinct.append(fit)
+    return distinct
 
 
 def positions_of_effects(fit: Fit) -> dict[str, float]:
-    """Positions (m) of effects that may be anywhere, by the effect's name."""
+    """Fitted positions (m) of the effects that may be anywhere, by the effect's name."""
     values = fit.twin.values()
     return {
         effect.name: values[f"{effect.name}@{place}.position"]
@@ -75,11 +82,11 @@ def positions_of_effects(fit: Fit) -> dict[str, float]:
 
 
 def equivalent_positions(best: Fit, others: Sequence[Fit]) -> tuple[tuple[str, ...], ...]:
-    """Of each effect of `best` that `others` have in other seats, all of them: "name at x m"."""
-    found = []
+    """For each effect that `others` have elsewhere than `best`: its positions, "name at x m"."""
+    classes = []
     for name, x in positions_of_effects(best).items() if others else ():
         moved = [f for f in others if f.hypothesis[-1][0].name == name]
         if moved:
-            places = sorted([x, *(positions_of_effects(f)[name] for f in moved)])
-            found.append(tuple(f"{name} at {x:.2f} m" for x in places))
-    return tuple(found)
+            positions = sorted([x, *(positions_of_effects(f)[name] for f in moved)])
+            classes.append(tuple(f"{name} at {x:.2f} m" for x in positions))
+    return tuple(classes)

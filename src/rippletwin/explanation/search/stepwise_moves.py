@@ -1,4 +1,4 @@
-"""Steps from one explanation to the next: an effect more, another in its place, one less."""
+"""Moves of the stepwise search: add an effect, exchange one for another, simplify one, drop one."""
 
 from __future__ import annotations
 
@@ -9,170 +9,182 @@ import numpy as np
 from rippletwin.calibration.fit import Fit, Hypothesis
 from rippletwin.calibration.posterior import MIN_MODEL_ERROR
 from rippletwin.explanation.fit_jobs import (
+    Continuation,
+    FitJob,
+    NearFit,
     Workers,
     common_coordinates,
+    job_from,
     job_without_effect,
     progress_callback,
     rank_by_evidence,
     scan_starts,
 )
-from rippletwin.explanation.thresholds import ACCEPT, GOOD, needed_of
+from rippletwin.explanation.thresholds import (
+    GOOD_MODEL_ERROR,
+    MIN_LOG_BAYES_FACTOR,
+    min_log_bayes_factor,
+)
 
-MAX_EFFECTS = 4  # effects at a time
-SUBSTITUTES_TRIED = 10  # single effects tried in the place of another
-MAX_MODEL_ERROR_FOR_EXACT_MODE = (
-    10.0 * MIN_MODEL_ERROR
-)  # relative model error from which derivatives of storage lead to the mode
-MIN_GAIN = 1.0  # log evidence by which what is put in the place of another, or elsewhere, is better
-END_LIMITS = {"line_volume": (("load_volume", None), ("source_impedance", "volume"))}
-"""Effects at any place, and what they are at the line's ends: name and form."""
+MAX_EFFECTS = 4  # in one hypothesis
+EXCHANGE_ROUNDS = 2
+SUBSTITUTES_TRIED = 10  # best single effects tried in the place of another
+MAX_MODEL_ERROR_FOR_EXACT_MODE = 10.0 * MIN_MODEL_ERROR
+"""Relative model error below which derivatives of the nonlinear compliance lead to the mode."""
+MIN_IMPROVEMENT = 1.0  # log evidence by which an exchange or another position must be better
+SPECIAL_CASES = {"line_volume": (("load_volume", None), ("source_impedance", "volume"))}
+"""Effects at any position, and what they are at the ends of the line: name and form."""
 
 
-def fit_extensions(pool: Workers, best: Fit, found: Sequence, progress) -> list[Fit]:
-    """`best` with each of the candidates besides that it has not, best first; none beyond MOST."""
+def fit_extensions(workers: Workers, best: Fit, candidates: Sequence, progress) -> list[Fit]:
+    """Fits of `best` with each further candidate added, best first; none beyond MAX_EFFECTS."""
     if len(best.hypothesis) >= MAX_EFFECTS:
         return []
-    rig = pool.base.rig
-    jobs = [
-        extension_job(best, candidate, rig)
-        for candidate in found
-        if candidate not in best.hypothesis
-    ]
-    tell = progress_callback(progress, f"{len(best.hypothesis) + 1} effects", len(jobs))
-    fits = rank_by_evidence(pool.fit(jobs, tell))
-    if fits and best.model_error > GOOD and fits[0].model_error > GOOD:
-        # What is there may be right as it is, though far from all.
-        near = pool.fit([{"hypothesis": f.hypothesis, "fit": best} for f in fits])
+    rig = workers.base.rig
+    jobs = [extension_job(best, c, rig) for c in candidates if c not in best.hypothesis]
+    report = progress_callback(progress, f"{len(best.hypothesis) + 1} effects", len(jobs))
+    fits = rank_by_evidence(workers.fit(jobs, report))
+    if fits and best.model_error > GOOD_MODEL_ERROR and fits[0].model_error > GOOD_MODEL_ERROR:
+        # The present effects may be correct but incomplete: start near their fit too.
+        near = workers.fit([FitJob(f.hypothesis, NearFit(best)) for f in fits])
         fits = rank_by_evidence([max(pair, key=lambda f: f.evidence) for pair in zip(fits, near)])
-    return rank_at_exact_modes(pool, best, fits)
+    return rank_at_exact_modes(workers, best, fits)
 
 
-def extension_job(best: Fit, candidate, rig) -> dict:
+def extension_job(best: Fit, candidate, rig) -> FitJob:
     """The job that adds a candidate to a fit.
 
-    Where the fit is still poor its parameters are bent, and the fit starts from nominal again with
-    its effects where they were; where it is good the candidate starts from it.
+    A good fit is extended from its mode. The parameters of a poor fit are biased by what is
+    missing, so the extension starts from nominal values again.
     """
     hypothesis = (*best.hypothesis, candidate)
-    if best.model_error > GOOD:
+    if best.model_error > GOOD_MODEL_ERROR:
         return restart_job(best, hypothesis, rig)
-    return {"hypothesis": hypothesis, "fit": best}
+    return FitJob(hypothesis, NearFit(best))
 
 
-def restart_job(best: Fit, hypothesis: Hypothesis, rig) -> dict:
-    """The job that fits from nominal again, effects in common starting where they were."""
+def restart_job(best: Fit, hypothesis: Hypothesis, rig) -> FitJob:
+    """The job that fits by continuation, with the effects in common at their fitted coordinates."""
     kept = common_coordinates(best, hypothesis)
-    return {
-        "hypothesis": hypothesis,
-        "starts": [{**kept, **start} for start in scan_starts(rig, hypothesis)],
-    }
+    starts = tuple({**kept, **start} for start in scan_starts(rig, hypothesis))
+    return FitJob(hypothesis, Continuation(starts))
 
 
-def exchange_effects(pool: Workers, best: Fit, singles: Sequence[Fit], rounds: int = 2) -> Fit:
-    """Put another effect in the place of each while that is better and the fit still poor.
+def exchange_effects(workers: Workers, best: Fit, single_effect_fits: Sequence[Fit]) -> Fit:
+    """Exchange one effect for another as long as that is better and the fit is poor.
 
-    The first effect taken in does the work of all that are missing; once others are there it may
-    be the wrong one. What stands in is the best few single effects.
+    The first effect of a search stands in for everything that is missing. Once others are present
+    it may be the wrong one. The substitutes are the best single effects.
     """
-    for _ in range(rounds):
-        if len(best.hypothesis) < 2 or best.model_error <= GOOD:
+    for _ in range(EXCHANGE_ROUNDS):
+        if len(best.hypothesis) < 2 or best.model_error <= GOOD_MODEL_ERROR:
             break
-        stand_ins = [f.hypothesis[0] for f in singles[:SUBSTITUTES_TRIED]]
+        substitutes = [f.hypothesis[0] for f in single_effect_fits[:SUBSTITUTES_TRIED]]
         jobs = []
         for k in range(len(best.hypothesis)):
             jobs += [
-                restart_job(best, (*best.without(k), c), pool.base.rig)
-                for c in stand_ins
-                if c not in best.hypothesis
+                restart_job(best, (*best.without(k), substitute), workers.base.rig)
+                for substitute in substitutes
+                if substitute not in best.hypothesis
             ]
-        better = rank_by_evidence(pool.fit(jobs))
-        if not better or better[0].evidence < best.evidence + MIN_GAIN:
+        fits = rank_by_evidence(workers.fit(jobs))
+        if not fits or fits[0].evidence < best.evidence + MIN_IMPROVEMENT:
             break
-        best = better[0]
+        best = fits[0]
     return best
 
 
-def fit_substitutes(pool: Workers, best: Fit, found: Sequence) -> list[Fit]:
-    """`best` with each of several effects exchanged for every other on the same element, and for
-    itself anywhere else, best first: those that might be taken for it were never tried beside what
-    was taken in after it, or from a line still far off. What no line is without is known to be
-    there."""
+def fit_substitutes(workers: Workers, best: Fit, candidates: Sequence) -> list[Fit]:
+    """Fits with one of several effects exchanged, best first.
+
+    Each effect is exchanged for every other on the same element and for itself at every other
+    place. These were not tried beside effects that were accepted later. An effect that is always
+    present is not exchanged.
+    """
     members = best.hypothesis if len(best.hypothesis) > 1 else ()
     jobs = [
-        {"hypothesis": (*best.without(k), candidate), "fit": best}
+        FitJob((*best.without(k), candidate), NearFit(best))
         for k, (effect, place) in enumerate(members)
-        for candidate in found
+        for candidate in candidates
         if candidate[1].element == place.element or candidate[0].name == effect.name
         if candidate not in best.hypothesis and not effect.certain
     ]
-    return rank_by_evidence(pool.fit(jobs))
+    return rank_by_evidence(workers.fit(jobs))
 
 
-def simplify_effects(pool: Workers, best: Fit, found: Sequence) -> Fit:
-    """Put in the place of each effect one that it contains, unless that costs ACCEPT.
+def simplify_effects(workers: Workers, best: Fit, candidates: Sequence) -> Fit:
+    """Replace each effect by a special case of it unless that costs MIN_LOG_BAYES_FACTOR.
 
-    What the larger has besides is physics of its own, which has to be worth as much as any other.
+    What the general effect has besides is further physics, which needs as much evidence as any.
     """
     for k, member in enumerate(best.hypothesis):
         rest = best.without(k)
         jobs = [
-            {"hypothesis": (*rest, c), "fit": best}
-            for c in found
-            if c not in rest and _contains(member, c, pool.base.rig)
+            FitJob((*rest, candidate), NearFit(best))
+            for candidate in candidates
+            if candidate not in rest and _contains(member, candidate, workers.base.rig)
         ]
-        for fit in rank_by_evidence(pool.fit(jobs))[:1]:
-            if fit.evidence > best.evidence - ACCEPT:
-                return simplify_effects(pool, fit, found)
+        for fit in rank_by_evidence(workers.fit(jobs))[:1]:
+            if fit.evidence > best.evidence - MIN_LOG_BAYES_FACTOR:
+                return simplify_effects(workers, fit, candidates)
     return best
 
 
-def _contains(member, other, rig) -> bool:
-    """Whether an effect is a special case of another: of its equations, or where it may be."""
-    (effect, place), (less, where) = member, other
-    if effect is not less:
-        return (less.name, where.form) in END_LIMITS.get(effect.name, ())
-    names = [{p.name for p in e.parameters(rig, at)} for e, at in (member, other)]
-    return place.element == where.element and names[1] < names[0]
+def _contains(general, special, rig) -> bool:
+    """Whether an effect at its place is a special case of another, by its equations or place."""
+    (effect, place), (special_effect, special_place) = general, special
+    if effect is not special_effect:
+        special_cases = SPECIAL_CASES.get(effect.name, ())
+        return (special_effect.name, special_place.form) in special_cases
+    names = {p.name for p in effect.parameters(rig, place)}
+    special_names = {p.name for p in special_effect.parameters(rig, special_place)}
+    return place.element == special_place.element and special_names < names
 
 
-def drop_needless_effects(pool: Workers, best: Fit) -> Fit:
-    """Drop every effect that the others have made needless."""
+def drop_needless_effects(workers: Workers, best: Fit) -> Fit:
+    """Drop every effect whose evidence the other effects have taken over, the weakest first."""
     while len(best.hypothesis) > 1:
-        fits = pool.fit(
-            [job_without_effect(best, k, pool.base) for k in range(len(best.hypothesis))]
+        fits = workers.fit(
+            [job_without_effect(best, k, workers.base) for k in range(len(best.hypothesis))]
         )
-        losses = [
-            best.evidence - fit.evidence - needed_of(effect)
+        margins = [
+            best.evidence - fit.evidence - min_log_bayes_factor(effect)
             for fit, (effect, _) in zip(fits, best.hypothesis)
         ]
-        weakest = int(np.argmin(losses))
-        if losses[weakest] >= 0:
+        weakest = int(np.argmin(margins))
+        if margins[weakest] >= 0:
             break
         best = fits[weakest]
     return best
 
 
-def refit_at_exact_mode(pool: Workers, best: Fit) -> Fit:
-    """The fit at its exact mode, where that takes derivatives of what the line stores: what is
-    added to a fit that stopped short of it would be taken for what is missing."""
-    return _exact(pool, [best])[0]
+def refit_at_exact_mode(workers: Workers, best: Fit) -> Fit:
+    """`best` at its exact mode.
+
+    With nonlinear compliance a fit may stop short of its mode. An effect that is added then could
+    gain evidence that belongs to the mode.
+    """
+    return _refit_nonlinear(workers, [best])[0]
 
 
-def rank_at_exact_modes(pool: Workers, best: Fit, step: list[Fit]) -> list[Fit]:
-    """A step's fits as they can be held against each other, best first: where the newest effect is
-    the first that stores something, its mode is narrow, and a fit that stopped short of it may have
-    lost all that the effect is worth. Far from the mode, where that takes long, nothing is lost."""
+def rank_at_exact_modes(workers: Workers, best: Fit, fits: list[Fit]) -> list[Fit]:
+    """The extensions `fits` of `best`, best first, near-optimal ones refitted at their exact modes.
+
+    The mode of the first effect with nonlinear compliance is narrow, and a fit that stops short of
+    it may lose all of the effect's evidence. Poor fits are far from their modes: they take long and
+    lose nothing by this.
+    """
     if best.has_nonlinear_compliance:
-        return step
-    near = [f for f in step if f.model_error <= MAX_MODEL_ERROR_FOR_EXACT_MODE]
-    return rank_by_evidence(
-        [*_exact(pool, near), *(f for f in step if f.model_error > MAX_MODEL_ERROR_FOR_EXACT_MODE)]
-    )
+        return fits
+    near = [f for f in fits if f.model_error <= MAX_MODEL_ERROR_FOR_EXACT_MODE]
+    far = [f for f in fits if f.model_error > MAX_MODEL_ERROR_FOR_EXACT_MODE]
+    return rank_by_evidence([*_refit_nonlinear(workers, near), *far])
 
 
-def _exact(pool: Workers, fits: Sequence[Fit]) -> list[Fit]:
-    """The fits, at their exact mode those of lines that store beyond proportion."""
-    storing = [f for f in fits if f.has_nonlinear_compliance]
-    again = pool.fit([{"hypothesis": f.hypothesis, "theta": f.twin.theta} for f in storing])
-    better = {id(f): new for f, new in zip(storing, again)}
-    return [better.get(id(f), f) for f in fits]
+def _refit_nonlinear(workers: Workers, fits: Sequence[Fit]) -> list[Fit]:
+    """The fits, those with nonlinear compliance refitted at their exact modes."""
+    nonlinear = [f for f in fits if f.has_nonlinear_compliance]
+    refits = {
+        id(f): new for f, new in zip(nonlinear, workers.fit([job_from(f) for f in nonlinear]))
+    }
+    return [refits.get(id(f), f) for f in fits]

@@ -1,4 +1,8 @@
-"""Search over hypotheses: every effect at every place, then pairs and triples, by evidence."""
+"""Stepwise search over hypotheses: single effects, then up to four together, by evidence.
+
+Each round adds the best candidate, drops, exchanges and simplifies what it made needless, and moves
+effects along the line. The search ends when no extension adds enough evidence.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +10,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from rippletwin.calibration.fit import Fit
-from rippletwin.explanation.fit_jobs import Workers, progress_callback, rank_by_evidence
+from rippletwin.explanation.fit_jobs import (
+    FitJob,
+    FromTheta,
+    Workers,
+    progress_callback,
+    rank_by_evidence,
+)
 from rippletwin.explanation.search.position_search import move_to_best_position
 from rippletwin.explanation.search.single_effects import fit_single_effects
 from rippletwin.explanation.search.stepwise_moves import (
-    MIN_GAIN,
+    MIN_IMPROVEMENT,
     drop_needless_effects,
     exchange_effects,
     fit_extensions,
@@ -18,120 +28,145 @@ from rippletwin.explanation.search.stepwise_moves import (
     refit_at_exact_mode,
     simplify_effects,
 )
-from rippletwin.explanation.thresholds import ACCEPT, CERTAIN, needed
+from rippletwin.explanation.thresholds import (
+    MIN_LOG_BAYES_FACTOR,
+    MIN_LOG_BAYES_FACTOR_ALWAYS_PRESENT,
+    min_log_bayes_factor_of_newest,
+)
+from rippletwin.twin.effects import library
 from rippletwin.twin.effects.base import Effect, Place
-from rippletwin.twin.effects.library import candidates
 
-RIVAL_MARGIN = 4.0 * ACCEPT  # log evidence within which a rival is worth another look
+RIVAL_MARGIN = 4.0 * MIN_LOG_BAYES_FACTOR
+"""Log evidence below the best within which a resumed search refits a rival."""
+SHAFT_ORDER_EFFECTS = ("piston_spread", "speed_fluctuation")
+"""Effects at shaft orders that are not fitted; `localise.shaft_orders` looks for them."""
 
 
 def applicable_candidates(
     rig, observations: Sequence, named: bool = True
 ) -> list[tuple[Effect, Place]]:
-    """The candidates that these data can say anything about."""
+    """The effects at their places that these observations can show.
+
+    An input impedance shows neither source nor sensors. Entrained air needs a mean pressure, hence
+    a periodic recording.
+    """
     kinds = {o.kind for o in observations}
-    found = []
-    for effect, place in candidates(rig, named):
+    applicable = []
+    for effect, place in library.candidates(rig, named):
         if kinds == {"input_impedance"} and effect.element in ("source", "sensor"):
             continue
         if effect.name == "entrained_air" and "periodic" not in kinds:
             continue
-        if effect.name in ("piston_spread", "speed_fluctuation"):
-            continue  # act at shaft orders that are not fitted, see `shaft_orders`
-        found.append((effect, place))
-    return found
+        if effect.name in SHAFT_ORDER_EFFECTS:
+            continue
+        applicable.append((effect, place))
+    return applicable
 
 
-@dataclass
+@dataclass(frozen=True)
 class Search:
-    """What the search found.
+    """Result of the search.
 
-    base     the paper's line, fitted
-    singles  every effect at every place alone, best first
-    best     the accepted hypothesis (may be the base)
-    rivals   fits of every step that took effects in or could have: alternatives to `best`
-    others   passive networks that compete, best first
-    seats    `best` with an effect elsewhere along the line that does as well, best first
+    base                the line without effects, fitted
+    single_effect_fits  every effect at every place alone, best first
+    best                the accepted hypothesis, which may be the base
+    rivals              fits of every round in which an effect was or could have been accepted
+    passive_networks    passive networks without a name that compete with `best`, best first
+    other_positions     `best` with one effect at another, equivalent position, best first
     """
 
     base: Fit
-    singles: list[Fit]
+    single_effect_fits: list[Fit]
     best: Fit
     rivals: list[Fit] = field(default_factory=list)
     passive_networks: list[Fit] = field(default_factory=list)
     other_positions: list[Fit] = field(default_factory=list)
 
-    def gain(self, fit: Fit) -> float:
-        """Log evidence over the base."""
+    def log_bayes_factor(self, fit: Fit) -> float:
+        """Log evidence of a fit less that of the base."""
         return fit.evidence - self.base.evidence
 
 
 def search_effects(
-    pool: Workers, progress: Callable[[str, int, int], None] | None = None
+    workers: Workers, progress: Callable[[str, int, int], None] | None = None
 ) -> Search:
-    """Forward and backward steps over the library, from the base; see `Search`."""
-    found = applicable_candidates(pool.base.rig, pool.observations)
-    base, singles = fit_single_effects(pool, found, progress)
-    return _stepwise(pool, Search(base, singles, base, singles), found, progress)
+    """Search the effect library stepwise, from the line without effects."""
+    candidates = applicable_candidates(workers.base.rig, workers.observations)
+    base, fits = fit_single_effects(workers, candidates, progress)
+    return _search_stepwise(workers, Search(base, fits, base, fits), candidates, progress)
 
 
-def resume_search(pool: Workers, past: Search, progress=None) -> Search:
-    """The search on data that differ little from those of `past`: its fits from where they ended,
-    and steps from its best, of which what has become needless is dropped first."""
+def resume_search(workers: Workers, past: Search, progress=None) -> Search:
+    """Resume a search on observations that differ little from those of `past`.
+
+    All its fits start from their modes. Effects of its best hypothesis that have become needless
+    are dropped before the search goes on.
+    """
     close = [f for f in past.rivals if past.best.evidence - f.evidence < RIVAL_MARGIN]
-    fits = [past.base, *past.singles, past.best, *close]
+    fits = [past.base, *past.single_effect_fits, past.best, *close]
     exact = {id(f) for f in close if not set(past.best.hypothesis) < set(f.hypothesis)}
-    jobs = [
-        {"hypothesis": f.hypothesis, "theta": f.twin.theta, "exact": id(f) in exact} for f in fits
-    ]
-    tell = progress_callback(progress, "again", len(jobs))
-    base, *rest = pool.fit(jobs, tell)
-    count = len(past.singles)
-    singles, best, rivals = (
-        rank_by_evidence(rest[:count]),
-        rest[count],
-        rank_by_evidence(rest[count + 1 :]),
-    )
-    found = applicable_candidates(pool.base.rig, pool.observations)
-    best = refit_at_exact_mode(
-        pool,
-        simplify_effects(
-            pool, exchange_effects(pool, drop_needless_effects(pool, best), singles), found
-        ),
-    )
-    return _stepwise(pool, Search(base, singles, best, rivals), found, progress)
+    jobs = [FitJob(f.hypothesis, FromTheta(f.twin.theta, id(f) in exact)) for f in fits]
+    base, *refits = workers.fit(jobs, progress_callback(progress, "resumed search", len(jobs)))
+    count = len(past.single_effect_fits)
+    single_effect_fits = rank_by_evidence(refits[:count])
+    best, rivals = refits[count], rank_by_evidence(refits[count + 1 :])
+    candidates = applicable_candidates(workers.base.rig, workers.observations)
+    best = _revise(workers, best, single_effect_fits, candidates)
+    search = Search(base, single_effect_fits, best, rivals)
+    return _search_stepwise(workers, search, candidates, progress)
 
 
-def _stepwise(pool: Workers, begun: Search, found: Sequence, progress) -> Search:
-    """Steps forward and back from `begun.best`, with the candidates `found`."""
-    base, singles = begun.base, begun.singles
-    best, rivals, step = begun.best, begun.rivals, singles
+def _search_stepwise(workers: Workers, start: Search, candidates: Sequence, progress) -> Search:
+    """Go on from `start.best` until no candidate and no other position adds enough evidence."""
+    single_effect_fits, best, rivals = start.single_effect_fits, start.best, start.rivals
+    extensions = single_effect_fits
     if best.hypothesis:
-        step = fit_extensions(pool, best, found, progress)
+        extensions = fit_extensions(workers, best, candidates, progress)
     while True:
-        new = _accepted_extension(best, step)
-        if new is None:
-            moved, seats = move_to_best_position(pool, best)
+        extended = _accepted_extension(best, extensions)
+        if extended is None:
+            moved, other_positions = move_to_best_position(workers, best)
             if moved is best:
                 break
             best = moved
         else:
-            best, rivals = new, rivals if step is singles else [*rivals, *step]
-            best = simplify_effects(
-                pool, exchange_effects(pool, drop_needless_effects(pool, best), singles), found
-            )
-            best = refit_at_exact_mode(pool, best)
-        step = fit_extensions(pool, best, found, progress)
-    close = fit_substitutes(pool, best, found)
-    if close and close[0].evidence > best.evidence + MIN_GAIN:
-        best, seats = move_to_best_position(pool, close[0])
-    return Search(base, singles, best, [*rivals, *close], other_positions=seats)
+            if extensions is not single_effect_fits:
+                rivals = [*rivals, *extensions]
+            best = _revise(workers, extended, single_effect_fits, candidates)
+        extensions = fit_extensions(workers, best, candidates, progress)
+    substitutes = fit_substitutes(workers, best, candidates)
+    if substitutes and substitutes[0].evidence > best.evidence + MIN_IMPROVEMENT:
+        best, other_positions = move_to_best_position(workers, substitutes[0])
+    return Search(
+        start.base,
+        single_effect_fits,
+        best,
+        [*rivals, *substitutes],
+        other_positions=other_positions,
+    )
 
 
-def _accepted_extension(best: Fit, step: Sequence[Fit]) -> Fit | None:
-    """The fit of a step that goes on from `best`; None where none adds what is needed."""
-    if step and step[0].evidence - best.evidence >= needed(step[0]):
-        return step[0]
-    # What no line is without is taken in with something else, never alone.
-    certain = [f for f in step if f.hypothesis[-1][0].certain] if best.hypothesis else []
-    return certain[0] if certain and certain[0].evidence - best.evidence >= CERTAIN else None
+def _revise(workers: Workers, best: Fit, single_effect_fits: list[Fit], candidates) -> Fit:
+    """Drop, exchange and simplify effects of a new hypothesis, and refit it at its exact mode."""
+    best = drop_needless_effects(workers, best)
+    best = exchange_effects(workers, best, single_effect_fits)
+    best = simplify_effects(workers, best, candidates)
+    return refit_at_exact_mode(workers, best)
+
+
+def _accepted_extension(best: Fit, extensions: Sequence[Fit]) -> Fit | None:
+    """The extension with which the search goes on; None if none adds enough evidence.
+
+    An always-present effect is accepted only together with another effect.
+    """
+    if extensions:
+        gain = extensions[0].evidence - best.evidence
+        if gain >= min_log_bayes_factor_of_newest(extensions[0]):
+            return extensions[0]
+    if not best.hypothesis:
+        return None
+    for fit in extensions:
+        if fit.hypothesis[-1][0].certain:
+            gain = fit.evidence - best.evidence
+            return fit if gain >= MIN_LOG_BAYES_FACTOR_ALWAYS_PRESENT else None
+    return None

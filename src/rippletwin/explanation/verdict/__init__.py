@@ -1,1 +1,1 @@
-"""The verdict: decision, its file, its summary text, and the recording proposed next."""
+"""What is reported? The decision, the verdict's file and summary, and the next experiment."""

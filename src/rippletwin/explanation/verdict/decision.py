@@ -1,46 +1,51 @@
-"""From fits to a verdict: what is named, what cannot be told apart, what has no name."""
+"""The decision: from the fits and checks to one of six verdicts, with abstention.
+
+A name is given only to an explanation that leaves no more than the model error, has plausible
+parameters and holds on held-out data. Otherwise nothing is missing, or the verdict is
+`unexplained`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rippletwin.calibration.fit import Fit
-from rippletwin.calibration.posterior import MIN_MODEL_ERROR
-from rippletwin.explanation.checks.alarms import PULL_ALARM, Alarms, largest_effect_pull
+from rippletwin.explanation.checks.alarms import Alarms, largest_effect_pull
 from rippletwin.explanation.checks.bootstrap import NullDistribution
 from rippletwin.explanation.checks.cross_validation import Validation
-from rippletwin.explanation.checks.prior_sensitivity import WithoutEffect
+from rippletwin.explanation.checks.prior_sensitivity import PriorSensitivity
 from rippletwin.explanation.search.position_search import equivalent_positions
 from rippletwin.explanation.search.stepwise_search import Search
-from rippletwin.explanation.thresholds import ACCEPT, EQUIVALENT, GOOD, SURE
+from rippletwin.explanation.thresholds import (
+    DECISIVE_LOG_BAYES_FACTOR,
+    EQUIVALENT_LOG_BAYES_FACTOR,
+    GOOD_MODEL_ERROR,
+    MAX_MODEL_ERROR_TO_NAME,
+    MIN_LOG_BAYES_FACTOR,
+    PULL_ALARM,
+)
+from rippletwin.twin.effects.base import Place
 
 VERDICTS = ("consistent", "named", "ambiguous", "unexplained", "calibration_only", "bad_data")
 
-"""Log evidence within which two explanations cannot be told apart: twenty to one."""
-
-MAX_MODEL_ERROR_TO_NAME = 2.0 * MIN_MODEL_ERROR
-"""Relative model error above which no name is given. What the source and the sensors are uncertain
-by is no part of it: with the true effect it comes down to its least, and what looks alike stops
-above (docs/explain.md)."""
-
 
 @dataclass(frozen=True)
-class Judgement:
-    """The verdict and what it rests on.
+class Decision:
+    """The verdict and its basis.
 
-    verdict      one of VERDICTS
-    accepted     the fit whose twin later stages use
-    equivalents  names that cannot be told apart, each list one class
-    reason       for bad data: what contradicts what
+    verdict        one of VERDICTS
+    accepted       the fit whose twin later stages use
+    equivalents    classes of effect names that cannot be told apart
+    contradiction  for `bad_data`: what contradicts what, in words
     """
 
     verdict: str
     accepted: Fit
-    equivalents: tuple[tuple[str, ...], ...] = field(default=())
-    reason: str = ""
+    equivalents: tuple[tuple[str, ...], ...] = ()
+    contradiction: str = ""
 
 
 def decide(
@@ -48,134 +53,146 @@ def decide(
     alarms: Alarms,
     validation: Validation | None,
     contradiction: str = "",
-    by_chance: NullDistribution | None = None,
-) -> Judgement:
-    """Weigh the search's best explanation against the base, its rivals and the nameless networks.
+    null_distribution: NullDistribution | None = None,
+) -> Decision:
+    """Compare the best explanation with the base, the passive networks and the checks.
 
-    `contradiction` says why the data contradict themselves, if they do; `by_chance` what draws
-    without an effect gave, where they were asked for.
+    validation         of the best explanation; None if nothing is explained
+    contradiction      why the data contradict themselves, if they do
+    null_distribution  of the evidence without an effect, if it was asked for
     """
-    best, other = search.best, search.passive_networks[0] if search.passive_networks else None
+    best = search.best
     if contradiction:
-        return Judgement("bad_data", search.base, reason=contradiction)
-    nameless = other is not None and other.evidence > best.evidence + evidence_needed_over(
-        best, search
-    )
-    if nameless:
-        return Judgement("unexplained", other)
+        return Decision("bad_data", search.base, contradiction=contradiction)
+    network = search.passive_networks[0] if search.passive_networks else None
+    if network is not None:
+        if network.evidence > best.evidence + evidence_needed_by_network(best):
+            return Decision("unexplained", network)
     if not best.hypothesis:
         return _nothing_missing(best, alarms)
-    if by_chance is not None and search.gain(best) < by_chance.threshold:
+    log_bayes_factor = search.log_bayes_factor(best)
+    if null_distribution is not None and log_bayes_factor < null_distribution.threshold:
         return _nothing_missing(search.base, alarms)
     fails = validation is not None and not validation.passes
-    if fails and "misfit" not in alarms.ringing:
-        weak = search.gain(best) < SURE
-        if not weak and not validation.gains:
-            # It fits nothing better: the data sheet alone speaks for it, and that may be off.
+    if fails and "misfit" not in alarms.raised:
+        weak = log_bayes_factor < DECISIVE_LOG_BAYES_FACTOR
+        if not weak and not validation.fits_better:
+            # The evidence comes from the data sheet alone, which may be off.
             return _nothing_missing(search.base, alarms, "calibration_only")
         if weak or not validation.transfers:
-            # A line that fits without it, and data left out that speak against it: an absorber.
+            # The line fits without this effect and held-out data contradict it: it only absorbs
+            # error.
             return _nothing_missing(search.base, alarms)
-    if (
-        best.model_error > MAX_MODEL_ERROR_TO_NAME
-        or largest_effect_pull(best) > PULL_ALARM
-        or fails
-    ):
-        # Without a name it is modelled all the same, by whatever describes the data best.
-        stands_in = other is not None and other.evidence > best.evidence
-        return Judgement("unexplained", other if stands_in else best)
+    is_implausible = (
+        best.model_error > MAX_MODEL_ERROR_TO_NAME or largest_effect_pull(best) > PULL_ALARM
+    )
+    if is_implausible or fails:
+        # The twin takes the best description all the same.
+        use_network = network is not None and network.evidence > best.evidence
+        return Decision("unexplained", network if use_network else best)
     classes = equivalent_effects(search)
-    return Judgement("ambiguous" if classes else "named", best, classes)
+    return Decision("ambiguous" if classes else "named", best, classes)
 
 
-def withdraw_refuted_name(judgement: Judgement, without: Sequence[WithoutEffect]) -> Judgement:
-    """The judgement once it is known what a free data sheet would make of the data `without` each
-    accepted effect: no name is left where one of them refutes it.
+def withdraw_refuted_name(
+    decision: Decision, prior_sensitivity: Sequence[PriorSensitivity]
+) -> Decision:
+    """`decision` without names if a fit with wide priors refutes one of them.
 
-    What the explanation leaves in the data has then been put down to the ripple's error, and is
-    nothing of the kind: one number of the line, far from the sheet, accounts for it. Which is
-    missing neither the sheet nor the library says.
+    The residual was attributed to the ripple's error, but moving one line parameter far from the
+    data sheet explains it better. Neither the data sheet nor the library says what is missing.
     """
-    if judgement.verdict in ("named", "ambiguous") and any(w.refutes for w in without):
-        return replace(judgement, verdict="unexplained", equivalents=())
-    return judgement
+    is_named = decision.verdict in ("named", "ambiguous")
+    if is_named and any(sensitivity.refutes for sensitivity in prior_sensitivity):
+        return replace(decision, verdict="unexplained", equivalents=())
+    return decision
 
 
-def _nothing_missing(base: Fit, alarms: Alarms, verdict: str = "consistent") -> Judgement:
-    """The line alone, if no alarm says that it does not fit; `verdict` where none rings."""
-    if "misfit" in alarms.ringing or "drift" in alarms.ringing:
-        return Judgement("unexplained", base)
-    calibrated = {"pull", "disagreement"} & set(alarms.ringing)
-    return Judgement("calibration_only" if calibrated else verdict, base)
+def _nothing_missing(base: Fit, alarms: Alarms, verdict: str = "consistent") -> Decision:
+    """The line alone: `verdict`, or `unexplained` if an alarm says that it does not fit."""
+    if "misfit" in alarms.raised or "drift" in alarms.raised:
+        return Decision("unexplained", base)
+    off_data_sheet = {"pull", "disagreement"} & set(alarms.raised)
+    return Decision("calibration_only" if off_data_sheet else verdict, base)
 
 
-def evidence_needed_over(best: Fit, search: Search) -> float:
-    """Log evidence by which a nameless network must beat the best named explanation.
+def evidence_needed_by_network(best: Fit) -> float:
+    """Log evidence by which a passive network must exceed the best named explanation.
 
-    Where the named one is as good as can be believed the nameless has nothing to add.
+    Infinite where that is a good fit, to which a network adds nothing.
     """
     if not best.hypothesis:
-        return ACCEPT
-    return np.inf if best.model_error <= GOOD else EQUIVALENT
+        return MIN_LOG_BAYES_FACTOR
+    return np.inf if best.model_error <= GOOD_MODEL_ERROR else EQUIVALENT_LOG_BAYES_FACTOR
 
 
 def equivalent_effects(search: Search) -> tuple[tuple[str, ...], ...]:
-    """Classes of effect names: each of an accepted effect and of what does as well in its place."""
-    found = [tuple(sorted({own, *(name for _, name in r)})) for (own, _), r in _substitutes(search)]
-    return tuple(names for names in found if len(names) > 1)
+    """Classes of effect names: an accepted effect and those that fit equally well in its place."""
+    classes = [
+        tuple(sorted({name, *(effect.name for effect, _, _ in substitutes)}))
+        for (name, _), substitutes in _equivalent_substitutes(search)
+    ]
+    return tuple(names for names in classes if len(names) > 1)
 
 
 def equivalent_places(search: Search) -> tuple[tuple[str, ...], ...]:
-    """Classes of places at which one effect does alike, as of two sensors' gains of which only the
-    ratio is seen, or along the line: "name at place" each. The effect has a name all the same."""
-    found = []
-    for (own, place), stand_ins in _substitutes(search):
-        at = {f"{own} at {where}" for (fit, where), name in stand_ins if name == own}
-        found.append(tuple(sorted({f"{own} at {place}", *at})))
+    """Classes of places at which one effect fits equally well, "name at place" each.
+
+    For example the gains of two sensors, of which only the ratio is known, or positions along the
+    line. The effect is named all the same.
+    """
+    classes = []
+    for (name, place), substitutes in _equivalent_substitutes(search):
+        others = {f"{name} at {where}" for effect, where, _ in substitutes if effect.name == name}
+        classes.append(tuple(sorted({f"{name} at {place}", *others})))
     return (
-        *(names for names in found if len(names) > 1),
-        *equivalent_positions(search.best, _current_positions(search)),
+        *(places for places in classes if len(places) > 1),
+        *equivalent_positions(search.best, _fits_at_other_positions(search)),
     )
 
 
 def rival_fits(search: Search) -> list[Fit]:
-    """Fits as good as the best explanation that differ from it in one effect, or in its place."""
-    others = [fit for _, stand_ins in _substitutes(search) for (fit, _), _ in stand_ins]
-    return [*others, *_current_positions(search)]
+    """Fits equivalent to the best explanation that differ from it in one effect or its place."""
+    substitutes = [
+        fit for _, substitutes in _equivalent_substitutes(search) for _, _, fit in substitutes
+    ]
+    return [*substitutes, *_fits_at_other_positions(search)]
 
 
-def _current_positions(search: Search) -> list[Fit]:
-    """The search's seats that are still those of its best explanation."""
+def _fits_at_other_positions(search: Search) -> list[Fit]:
+    """The other positions of the search that still belong to its best hypothesis."""
     return [f for f in search.other_positions if set(f.hypothesis) == set(search.best.hypothesis)]
 
 
-def _substitutes(search: Search) -> list[tuple[tuple, list[tuple]]]:
-    """Of each accepted effect (name, place) the fits within EQUIVALENT of the best explanation that
-    have another effect or place for it, as ((fit, place), name).
+def _equivalent_substitutes(search: Search) -> list[tuple[tuple[str, Place], list[tuple]]]:
+    """For each accepted effect (name, place): equivalent fits with another effect in its place.
 
-    What no line is without is known to be there; what could do its work besides is no rival.
+    As (effect, place, fit). An always-present effect has none: it is known to be there, whatever
+    else could do its work.
     """
-    best, found = search.best, []
+    best, table = search.best, []
     for k, own in enumerate(best.hypothesis):
         if own[0].certain:
             continue
-        rest, others = set(best.without(k)), []
+        rest, substitutes = set(best.without(k)), []
         for fit in search.rivals:
-            close = best.evidence - fit.evidence < EQUIVALENT
-            other = set(fit.hypothesis) - rest
-            if close and rest < set(fit.hypothesis) and len(other) == 1 and own not in other:
-                ((effect, place),) = other
-                others.append(((fit, place), effect.name))
-        found.append(((own[0].name, own[1]), others))
-    return found
+            is_close = best.evidence - fit.evidence < EQUIVALENT_LOG_BAYES_FACTOR
+            others = set(fit.hypothesis) - rest
+            if is_close and rest < set(fit.hypothesis) and len(others) == 1 and own not in others:
+                ((effect, place),) = others
+                substitutes.append((effect, place, fit))
+        table.append(((own[0].name, own[1]), substitutes))
+    return table
 
 
-def probabilities(search: Search, accepted: Fit) -> dict[str, float]:
-    """Posterior probability of each accepted effect, all hypotheses tried being equally likely
-    beforehand but for the number of places of an effect."""
+def posterior_probabilities(search: Search, accepted: Fit) -> dict[str, float]:
+    """Posterior probability of each accepted effect among all hypotheses that were tried.
+
+    All of them have the same prior probability.
+    """
     fits: list[Fit] = [
         search.base,
-        *search.singles,
+        *search.single_effect_fits,
         *search.rivals,
         *search.passive_networks,
         accepted,

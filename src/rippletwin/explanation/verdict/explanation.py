@@ -5,54 +5,57 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rippletwin.calibration.fit import Fit
-from rippletwin.explanation.checks import alarms
+from rippletwin.case.model import Rig
+from rippletwin.explanation.checks.alarms import Alarms
 from rippletwin.explanation.checks.bootstrap import NullDistribution
-from rippletwin.explanation.checks.cross_validation import (
-    Validation,
-)
-from rippletwin.explanation.checks.prior_sensitivity import (
-    WithoutEffect,
-)
-from rippletwin.explanation.localise import free_corrections
-from rippletwin.explanation.localise.shaft_orders import (
-    ShaftOrders,
-)
+from rippletwin.explanation.checks.cross_validation import Validation
+from rippletwin.explanation.checks.prior_sensitivity import PriorSensitivity
+from rippletwin.explanation.localise.free_corrections import MismatchLocation
+from rippletwin.explanation.localise.shaft_orders import ShaftOrders
 from rippletwin.explanation.search.stepwise_search import Search
-from rippletwin.explanation.thresholds import ACCEPT
-from rippletwin.explanation.verdict.decision import Judgement
+from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
+from rippletwin.explanation.verdict.decision import Decision
 from rippletwin.twin.twin import Twin
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """All that was found; `rippletwin.explanation.verdict.verdict_file` writes it down.
+    """Everything that was found; `verdict_file` writes it.
 
-    observations are as fitted; single holds the base fitted to each of them alone, shaft what the
-    shaft orders say that are no multiples of the pistons' number, blind the fits that know nothing
-    of the source (`fits_to_compare`), located where the base lacks something,
-    without what a free data sheet would make of the data without each accepted effect, chance the
-    draws without an effect where they were asked for.
+    observations       as fitted
+    search             base, best explanation and rivals
+    alarms             of the base fit
+    validation         cross-validation of base and explanation
+    decision           the verdict and the accepted fit
+    point_fits         the base fitted to each observation alone; empty for a single one
+    source_free_fits   fits with an unknown source (`source_free_fits.fits_to_compare`)
+    prior_sensitivity  fits with wide priors without each accepted effect
+    shaft_orders       ripple at orders that are no multiples of the number of pistons
+    location           where the base lacks something; None where that cannot be said
+    null_distribution  of the evidence without an effect, if it was asked for
     """
 
-    rig: object
+    rig: Rig
     observations: tuple
-    alarms: alarms.Alarms
     search: Search
-    judgement: Judgement
+    alarms: Alarms
     validation: Validation
-    single: tuple[Fit, ...]
-    shaft: ShaftOrders | None = None
-    blind: tuple[Fit, ...] = ()
-    located: free_corrections.Located | None = None
-    without: tuple[WithoutEffect, ...] = ()
-    chance: NullDistribution | None = None
+    decision: Decision
+    point_fits: tuple[Fit, ...]
+    source_free_fits: tuple[Fit, ...] = ()
+    prior_sensitivity: tuple[PriorSensitivity, ...] = ()
+    shaft_orders: ShaftOrders | None = None
+    location: MismatchLocation | None = None
+    null_distribution: NullDistribution | None = None
 
     @property
-    def threshold(self) -> float:
+    def min_log_bayes_factor(self) -> float:
         """Log evidence that an effect must add to be named."""
-        return ACCEPT if self.chance is None else max(ACCEPT, self.chance.threshold)
+        if self.null_distribution is None:
+            return MIN_LOG_BAYES_FACTOR
+        return max(MIN_LOG_BAYES_FACTOR, self.null_distribution.threshold)
 
     @property
     def twin(self) -> Twin:
         """The corrected twin, which later stages use."""
-        return self.judgement.accepted.twin
+        return self.decision.accepted.twin

@@ -1,4 +1,4 @@
-"""Elements and stretches of the line in words."""
+"""Elements and intervals of the line in words."""
 
 from __future__ import annotations
 
@@ -10,7 +10,11 @@ from rippletwin.explanation.localise.free_corrections import element_extent
 
 
 def element_and_extent(rig, effect, place, parameters: dict) -> tuple[str, list[float]]:
-    """Element and interval along the line (m) at which an effect acts."""
+    """Element and interval along the line (m) at which an effect acts.
+
+    An effect at a position acts in a segment if the whole 95 % interval is in it, otherwise between
+    two sensors.
+    """
     ends = np.cumsum([s.length for s in rig.line])
     starts = ends - [s.length for s in rig.line]
     if "position" in parameters:
@@ -24,15 +28,15 @@ def element_and_extent(rig, effect, place, parameters: dict) -> tuple[str, list[
 
 
 def stretch_between_sensors(rig, low: float, high: float) -> str:
-    """The stretch between sensors, pump and load that holds an interval."""
+    """The stretch between pump, sensors and load that contains an interval."""
     marks = [("pump", 0.0), *((s.name, s.position) for s in rig.sensors), ("load", rig.length)]
-    marks.sort(key=lambda m: m[1])
+    marks.sort(key=lambda mark: mark[1])
     left = [name for name, x in marks if x <= low] or ["pump"]
     right = [name for name, x in marks if x >= high] or ["load"]
     return f"between {left[-1]} and {right[0]}"
 
 
 def join_words(words: Sequence[str]) -> str:
-    """Words in a row as in a sentence."""
+    """Words as in a sentence: "a, b and c"."""
     words = list(words)
     return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]

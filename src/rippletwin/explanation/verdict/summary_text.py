@@ -1,163 +1,215 @@
-"""The verdict in a paragraph for an engineer."""
+"""The verdict as a paragraph for an engineer."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rippletwin.explanation.checks import alarms
-from rippletwin.explanation.localise import source_free_fits
-from rippletwin.explanation.verdict.decision import MAX_MODEL_ERROR_TO_NAME, equivalent_places
+from rippletwin.explanation.checks.alarms import largest_pull
+from rippletwin.explanation.localise.shaft_orders import ShaftOrders
+from rippletwin.explanation.localise.source_free_fits import compare_evidence
+from rippletwin.explanation.thresholds import MAX_MODEL_ERROR_TO_NAME, PULL_ALARM
+from rippletwin.explanation.verdict.decision import equivalent_places
 from rippletwin.explanation.verdict.explanation import Explanation
 from rippletwin.explanation.verdict.places import element_and_extent, join_words
 
-SAME_VALUE = 0.05  # relative; mean pressures closer than this are one
+SAME_PRESSURE = 0.05  # relative; mean pressures closer than this count as one
+SOURCE_FREE_SHARE = 0.2  # of the evidence that must remain if the source is unknown
 OPENINGS = {
-    "consistent": "The recordings are what the twin predicts within the data sheet's tolerances.",
-    "calibration_only": "The line's nominal values are off by more than their stated tolerances, "
-    "but no physics is missing: use the calibrated values and look at the data sheet.",
+    "consistent": "The recordings agree with the twin within the tolerances of the data sheet.",
+    "calibration_only": "No physics is missing, but nominal values of the line are outside their "
+    "stated tolerances: use the calibrated values and check the data sheet.",
 }
 
 
-def summary_text(e: Explanation, result: dict, found: list[dict], base) -> str:
-    """One paragraph an engineer can act on."""
-    kind, fit = result["verdict"], result["fit"]
-    before, after = fit["before"]["held_out"], fit["after"]["held_out"]
-    words = [OPENINGS.get(kind, "")]
-    names = [f"{f['effect'].name.replace('_', ' ')} at the {_place(e, f)}" for f in found]
-    if kind == "named" and not found:  # what was named acts at shaft orders alone
-        words = ["At the pistons' harmonics the twin lacks nothing."]
-    elif kind in ("named", "ambiguous"):
-        words = [
-            f"The twin lacks {join_words(names)}: with it the misfit on data it has not seen goes "
-            f"from {before:.1%} to {after:.1%} of the measured ripple."
-        ]
-        numbers = {}
-        for f in found:
-            for name, p in f["parameters"].items():
-                low, high = p["ci95"]
-                unit = "" if p["unit"] == "1" else f" {p['unit']}"
-                numbers[
-                    f"{name.replace('_', ' ').capitalize()} {p['value']:.3g}{unit} "
-                    f"({low:.3g} to {high:.3g})."
-                ] = None
-            if f["effect"].certain:
-                numbers[
-                    f"{f['effect'].name.replace('_', ' ').capitalize()} is taken in because no "
-                    "such line is without it, unless data speak against it."
-                ] = None
-        words += numbers
-        words += _against_the_sheet(e, ", which is what rejects it.")
-        words += is_air_at_one_pressure(
-            [f["effect"].name for f in found], [o.load_pressure for o in e.observations]
+def summary_text(e: Explanation, result: dict, entries: Sequence[dict]) -> str:
+    """One paragraph that an engineer can act on.
+
+    result   the verdict's other keys (`verdict_file.verdict_dict`)
+    entries  the effects of the accepted fit (`profile_intervals.effect_intervals`)
+    """
+    verdict = result["verdict"]
+    if verdict == "bad_data":
+        return " ".join(
+            [f"The data contradict themselves: {e.decision.contradiction}.", *_drift(e), *_pulls(e)]
         )
-        if kind == "ambiguous":
-            classes = "; ".join(join_words(names) for names in result["equivalents"])
-            words.append(f"These recordings cannot tell apart {classes}.")
-    elif kind == "unexplained":
-        words = [
-            "Something is missing that no effect of the library explains"
-            + (f"; it is seen at the {_place(e, found[0])}" if found else "")
-            + "."
-        ]
-        if "stand_in" in result:
-            words.append(
-                f"A {result['stand_in']['form']}, {_passive(result)}, stands in for it: misfit on "
-                f"unseen data {before:.1%} to {after:.1%}. What is missing goes "
-                f"{result['stand_in']['follows']}."
-            )
-        elif found:
-            unaccounted = ""
-            if e.judgement.accepted.model_error > MAX_MODEL_ERROR_TO_NAME:
-                unaccounted = ", which the pump and the sensors do not account for"
-            words.append(
-                f"Of what has a name {join_words(names)} comes nearest: misfit on unseen data "
-                f"{before:.1%} to {after:.1%}{unaccounted}."
-            )
-            words += _against_the_sheet(e, ".")
-    if kind in ("named", "ambiguous", "unexplained") and result["next_recording"]:
-        words.append(f"Next: {result['next_recording']}.")
-    if kind in ("named", "ambiguous") and found:
+    sentences = []
+    if verdict in OPENINGS:
+        sentences.append(OPENINGS[verdict])
+    elif verdict == "unexplained":
+        sentences += _unexplained(e, result, entries)
+    elif entries:
+        sentences += _named(e, result, entries)
+    else:  # what is named acts at shaft orders alone
+        sentences.append("At the piston orders nothing is missing.")
+    if result["next_recording"]:
+        sentences.append(f"Next recording: {result['next_recording']}.")
+    if verdict in ("named", "ambiguous") and entries:
         if equivalent_places(e.search):
-            words.append("Its place or form cannot be told: see equivalents.")
-        words.append(_without_source(e))
-    words.append(_pump(result["pump"]))
-    if kind == "bad_data":
-        words = [f"The data contradict themselves: {e.judgement.reason}."]
-    if e.shaft is not None and e.shaft.name is not None:
-        words.append(
-            f"Shaft-order lines of {e.shaft.relative:.1%} of the ripple show "
-            f"{e.shaft.name.replace('_', ' ')}: they resemble a single-piston fault."
-        )
-    if "drift" in e.alarms.ringing:
-        words.append(f"Early and late windows of {e.alarms.drift[1]} differ: the state drifted.")
-    # Without an alarm `calibration_only` rests on the sheet; disagreeing points are another cause.
-    off_the_sheet = kind == "calibration_only" and not e.alarms.ringing
-    told = "pull" in e.alarms.ringing or off_the_sheet
-    if told and not e.judgement.accepted.hypothesis:
-        size, name = e.alarms.pull
-        words.append(f"{name} is {size:.1f} standard deviations from the data sheet.")
-    pulled = alarms.largest_pull(e.judgement.accepted)
-    if e.judgement.accepted.hypothesis and pulled[0] > alarms.PULL_ALARM:
-        words.append(f"Check {pulled[1]}: {pulled[0]:.1f} standard deviations from the data sheet.")
-    return " ".join(word for word in words if word)
+            sentences.append("Its place or form is not determined: see equivalents.")
+        sentences += _source_free(e)
+    sentences += _pump(result["pump"])
+    sentences += _shaft_orders(e.shaft_orders)
+    sentences += _drift(e)
+    sentences += _pulls(e, is_off_data_sheet=verdict == "calibration_only" and not e.alarms.raised)
+    return " ".join(sentences)
 
 
-def _pump(numbers: dict) -> str:
-    """What the ripple says of the pump, where that is not what the data sheet says."""
-    off = [n for n in numbers.values() if not n["ci95"][0] <= n["sheet"] <= n["ci95"][1]]
-    if not off:
-        return ""
-    modulus, timing = numbers["bulk_modulus"], numbers["port_timing"]
-    turned = timing["value"] - timing["sheet"]
-    return (
-        f"The ripple is that of a pump with a bulk modulus of {modulus['value']:.3g} Pa (sheet "
-        f"{modulus['sheet']:.3g}) and its port plate {abs(turned):.2f} deg "
-        f"{'late' if turned > 0 else 'early'}."
+def _named(e: Explanation, result: dict, entries: Sequence[dict]) -> list[str]:
+    """Which effects are missing, their parameters, and what else would fit."""
+    before, after = (result["fit"][which]["held_out"] for which in ("before", "after"))
+    names = [_effect_and_place(e, entry) for entry in entries]
+    pronoun = "it" if len(names) == 1 else "them"
+    sentences = [
+        f"The twin lacks {join_words(names)}. With {pronoun} the misfit on held-out data goes from "
+        f"{before:.1%} to {after:.1%} of the measured ripple."
+    ]
+    for entry in entries:
+        sentences += [_parameter(name, p) for name, p in entry["parameters"].items()]
+        if entry["effect"].certain:
+            sentences.append(
+                f"{_words(entry['effect'].name).capitalize()} is always present, so it is included "
+                "unless the data contradict it."
+            )
+    sentences = list(dict.fromkeys(sentences))  # two effects may act through one parameter
+    sentences += _data_sheet_rivals(e)
+    sentences += liquid_like_air(
+        [entry["effect"].name for entry in entries], [o.load_pressure for o in e.observations]
     )
+    if result["verdict"] == "ambiguous":
+        classes = "; ".join(join_words(names) for names in result["equivalents"])
+        sentences.append(f"These recordings cannot discriminate between {classes}.")
+    return sentences
 
 
-def _against_the_sheet(e: Explanation, end: str) -> list[str]:
-    """Where the data alone would do without an effect, and only the data sheet says no."""
+def _unexplained(e: Explanation, result: dict, entries: Sequence[dict]) -> list[str]:
+    """Where something is missing, and what describes it best."""
+    before, after = (result["fit"][which]["held_out"] for which in ("before", "after"))
+    where = f"; it acts at the {_place(e, entries[0])}" if entries else ""
+    sentences = [f"Something is missing that no effect of the library explains{where}."]
+    misfits = f"the misfit on held-out data goes from {before:.1%} to {after:.1%}"
+    if "stand_in" in result:
+        network = result["stand_in"]
+        passive = "passive" if network["passive"] else "not passive"
+        sentences.append(f"A {network['form']} ({passive}) takes its place in the twin: {misfits}.")
+        sentences.append(f"The missing quantity against frequency: {network['follows']}.")
+    elif entries:
+        names = join_words([_effect_and_place(e, entry) for entry in entries])
+        rest = ""
+        if e.decision.accepted.model_error > MAX_MODEL_ERROR_TO_NAME:
+            rest = "; errors of the pump's ripple and of the sensors do not account for the rest"
+        sentences.append(f"The best description in the library is {names}: {misfits}{rest}.")
+        sentences += _data_sheet_rivals(e)
+    return sentences
+
+
+def _parameter(name: str, parameter: dict) -> str:
+    """A parameter's value and interval."""
+    low, high = parameter["ci95"]
+    unit = "" if parameter["unit"] == "1" else f" {parameter['unit']}"
+    name = _words(name).capitalize()
+    return f"{name}: {parameter['value']:.3g}{unit} (95 % interval {low:.3g} to {high:.3g})."
+
+
+def _pump(parameters: dict) -> list[str]:
+    """The pump's parameters, if one of their intervals excludes the data sheet's value."""
+    if all(p["ci95"][0] <= p["sheet"] <= p["ci95"][1] for p in parameters.values()):
+        return []
+    modulus, timing = parameters["bulk_modulus"], parameters["port_timing"]
+    late = timing["value"] - timing["sheet"]
     return [
-        f"Without {w.effect.replace('_', ' ')} a fit at {w.misfit:.1%} would be had with "
-        f"{w.parameter} at {w.value:.3g} {w.unit}, {w.pull:.0f} standard deviations from the "
-        f"data sheet{end}"
-        for w in e.without
-        if w.rivals and w.pull > alarms.PULL_ALARM
+        f"The ripple indicates a bulk modulus of {modulus['value']:.3g} Pa in the pump (data sheet "
+        f"{modulus['sheet']:.3g} Pa) and ports that open {abs(late):.2f} deg "
+        f"{'late' if late > 0 else 'early'}."
     ]
 
 
-def is_air_at_one_pressure(names: Sequence[str], pressures: Sequence[float | None]) -> list[str]:
-    """What else accepted effects `names` may be where all `pressures` (Pa) are one: air is any
-    liquid that yields less the more it is pressed. What tells their laws apart is how that goes
-    on from one pressure to another."""
+def _data_sheet_rivals(e: Explanation) -> list[str]:
+    """Fits without an effect that only the data sheet rejects."""
+    return [
+        f"Without {_words(s.effect)} the line would fit to {s.misfit:.1%} with {s.parameter} at "
+        f"{s.value:.3g} {s.unit}. That is {s.pull:.0f} standard deviations from the data sheet, "
+        "and only the data sheet rejects it."
+        for s in e.prior_sensitivity
+        if s.rivals and s.pull > PULL_ALARM
+    ]
+
+
+def liquid_like_air(names: Sequence[str], pressures: Sequence[float | None]) -> list[str]:
+    """A warning where accepted effects `names` include entrained air at one pressure (Pa).
+
+    Only the change with pressure discriminates air from any liquid that stiffens.
+    """
     known = [p for p in pressures if p is not None]
-    if "entrained_air" not in names or not known or max(known) > (1 + SAME_VALUE) * min(known):
+    if "entrained_air" not in names or not known or max(known) > (1 + SAME_PRESSURE) * min(known):
         return []
     return [
-        "At one mean pressure any liquid that stiffens as it is compressed would do as well as "
-        "air: record at another."
+        "At a single mean pressure any liquid that stiffens under compression fits as well as "
+        "entrained air: record at another pressure."
     ]
 
 
-def _passive(result: dict) -> str:
-    return "passive" if result["stand_in"]["passive"] else "not passive"
+def _source_free(e: Explanation) -> list[str]:
+    """Whether the accepted effects are also seen if the source is unknown."""
+    for row in compare_evidence(e.search, e.source_free_fits):
+        if row["effects"] == e.decision.accepted.label:
+            if row["source_free"] > SOURCE_FREE_SHARE * row["informed"]:
+                return ["The evidence remains if the source is assumed unknown."]
+            return [
+                "The evidence rests on the stated source: it vanishes if the source is assumed "
+                "unknown."
+            ]
+    return []
 
 
-def _without_source(e: Explanation) -> str:
-    """What a fit that knows nothing of the source says of the accepted effects."""
-    for row in source_free_fits.compare_evidence(e.search, e.blind):
-        if row["effects"] == e.judgement.accepted.label:
-            if row["source_free"] > 0.2 * row["informed"]:
-                return "It stands in a fit that is blind to the source too."
-            return "Blind to the source it is not seen: it acts at the pump or only there is known."
-    return ""
+def _shaft_orders(shaft_orders: ShaftOrders | None) -> list[str]:
+    """What the shaft orders indicate."""
+    if shaft_orders is None or shaft_orders.name is None:
+        return []
+    name = {"speed_fluctuation": "a speed fluctuation", "piston_spread": "a spread of the pistons"}
+    return [
+        f"Shaft orders between the piston orders have {shaft_orders.level:.1%} of the ripple and "
+        f"indicate {name[shaft_orders.name]}. They resemble a fault of a single piston."
+    ]
+
+
+def _drift(e: Explanation) -> list[str]:
+    """The recording whose state changed, if any."""
+    if "drift" not in e.alarms.raised:
+        return []
+    return [f"The two halves of {e.alarms.drift[1]} differ: the state drifted."]
+
+
+def _pulls(e: Explanation, is_off_data_sheet: bool = False) -> list[str]:
+    """Parameters that are far from the data sheet.
+
+    `is_off_data_sheet` says that the verdict rests on the data sheet alone; otherwise a parameter
+    of the base must raise the alarm.
+    """
+    accepted = e.decision.accepted
+    if not accepted.hypothesis:
+        pull, name = e.alarms.pull
+        if "pull" in e.alarms.raised or is_off_data_sheet:
+            return [f"{name} is {pull:.1f} standard deviations from the data sheet."]
+        return []
+    pull, name = largest_pull(accepted)
+    if pull > PULL_ALARM:
+        return [f"Check {name}: it is {pull:.1f} standard deviations from the data sheet."]
+    return []
+
+
+def _effect_and_place(e: Explanation, entry: dict) -> str:
+    return f"{_words(entry['effect'].name)} at the {_place(e, entry)}"
 
 
 def _place(e: Explanation, entry: dict) -> str:
+    """Element at which an effect acts, with its position in metres if it has one."""
     element, (low, high) = element_and_extent(
         e.rig, entry["effect"], entry["place"], entry["parameters"]
     )
     if "position" in entry["parameters"]:
         return f"line, {low:.2f} to {high:.2f} m from the pump ({element})"
     return element
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")

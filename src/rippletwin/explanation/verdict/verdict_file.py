@@ -1,4 +1,4 @@
-"""verdict.json: the explanation in the words of the contract, written whole or not at all."""
+"""verdict.json and twin.json: the explanation as plain data with fixed keys."""
 
 from __future__ import annotations
 
@@ -9,104 +9,140 @@ from pathlib import Path
 
 import numpy as np
 
-from rippletwin.explanation.checks import alarms
-from rippletwin.explanation.checks.profile_intervals import effect_intervals, pump_numbers
-from rippletwin.explanation.localise import residual_bands, source_free_fits
+from rippletwin.explanation.checks.alarms import evidence_p_value
+from rippletwin.explanation.checks.profile_intervals import effect_intervals, pump_intervals
+from rippletwin.explanation.localise import residual_bands
 from rippletwin.explanation.localise.missing_immittance import is_passive, missing_immittance
-from rippletwin.explanation.verdict import next_experiment
-from rippletwin.explanation.verdict.decision import equivalent_places, probabilities, rival_fits
+from rippletwin.explanation.localise.shaft_orders import ShaftOrders
+from rippletwin.explanation.localise.source_free_fits import compare_evidence
+from rippletwin.explanation.verdict.decision import (
+    equivalent_places,
+    posterior_probabilities,
+    rival_fits,
+)
 from rippletwin.explanation.verdict.explanation import Explanation
+from rippletwin.explanation.verdict.next_experiment import (
+    propose_recording,
+    propose_sensor_position,
+)
 from rippletwin.explanation.verdict.places import element_and_extent, stretch_between_sensors
 from rippletwin.explanation.verdict.summary_text import summary_text
 from rippletwin.twin import twin_file
 
-WIDE_INTERVAL = 0.15  # of the line: a position less well known asks for one more sensor
+WIDE_INTERVAL = 0.15  # of the line's length; a wider one asks for one more sensor
+NOTHING_MISSING = ("consistent", "calibration_only")
 
 
 def verdict_dict(explanation: Explanation) -> dict:
     """The verdict as plain data, with the keys of verdict.json."""
     e = explanation
-    judgement, base = e.judgement, e.search.base
-    accepted = judgement.accepted
-    found = (
-        effect_intervals(accepted)
-        if judgement.verdict in ("named", "ambiguous", "unexplained")
-        else []
-    )
-    chances = probabilities(e.search, accepted)
-    present = judgement.verdict not in ("consistent", "calibration_only")
-    tried = len(e.search.singles) + 1
-    gain = max([0.0, *(e.search.gain(f) for f in e.search.singles), e.search.gain(accepted)])
-    named = [entry for entry in found if entry["effect"].named]
-    effects = [
+    decision = e.decision
+    verdict, shaft_effects = decision.verdict, _shaft_effects(e)
+    if shaft_effects and verdict in NOTHING_MISSING:
+        verdict = "named"
+    entries = []
+    if verdict in ("named", "ambiguous", "unexplained"):
+        entries = effect_intervals(decision.accepted)
+    effects = shaft_effects
+    if verdict in ("named", "ambiguous"):
+        effects = [*_line_effects(e, entries), *shaft_effects]
+    places = equivalent_places(e.search) if verdict in ("named", "ambiguous") else ()
+    result = {
+        "verdict": verdict,
+        "mismatch": _mismatch(e, verdict, entries),
+        "effects": effects,
+        "equivalents": [list(names) for names in (*decision.equivalents, *places)],
+        "next_recording": _next_recording(e, places),
+        "fit": _fit_scores(e),
+        "without": [asdict(sensitivity) for sensitivity in e.prior_sensitivity],
+        "pump": pump_intervals(decision.accepted),
+        "sentence": "",
+    }
+    if verdict == "unexplained" and entries and not entries[-1]["effect"].named:
+        result["stand_in"] = _stand_in(e, entries[-1])
+    result["sentence"] = summary_text(e, result, entries)
+    return result
+
+
+def _line_effects(e: Explanation, entries: list[dict]) -> list[dict]:
+    """The named effects of the accepted fit."""
+    probabilities = posterior_probabilities(e.search, e.decision.accepted)
+    return [
         {
             "name": entry["effect"].name,
             "element": entry["place"].element,
             "parameters": entry["parameters"],
-            "probability": chances[entry["effect"].name],
+            "probability": probabilities[entry["effect"].name],
         }
-        for entry in named
-        if judgement.verdict != "unexplained"
+        for entry in entries
+        if entry["effect"].named
     ]
-    shaft = e.shaft.name if e.shaft is not None else None
-    kind = judgement.verdict
-    if shaft is not None:
-        unit = "rad" if shaft == "speed_fluctuation" else "1"
-        # The sampling error of a mean over recordings is far below what the pump itself varies.
-        amplitude = {"value": e.shaft.value, "ci95": [0.8 * e.shaft.value, 1.2 * e.shaft.value]}
-        effects.append(
-            {
-                "name": shaft,
-                "element": "source",
-                "parameters": {"amplitude": {**amplitude, "unit": unit}},
-                "probability": 1.0 - e.shaft.p_value,
-            }
-        )
-        if kind in ("consistent", "calibration_only"):
-            kind = "named"
-        present = True
-    alike = equivalent_places(e.search) if kind in ("named", "ambiguous") else ()
-    next_words = _next_recording(e, alike)
-    result = {
-        "verdict": kind,
-        "mismatch": {
-            "present": present,
-            "p_value": alarms.evidence_p_value(gain, tried)
-            if e.chance is None
-            else e.chance.p_value(gain),
-            "where": _where(e, found) if present else None,
-        },
-        "effects": effects,
-        "equivalents": [list(names) for names in (*judgement.equivalents, *alike)],
-        "next_recording": next_words,
-        "fit": _fit(e),
-        "without": [asdict(each) for each in e.without],
-        "pump": pump_numbers(accepted),
-        "sentence": "",
+
+
+def _shaft_effects(e: Explanation) -> list[dict]:
+    """The effect at shaft orders, if there is one.
+
+    Data that contradict themselves establish no effect, and neither do shaft orders while something
+    else is unexplained: the twin that interprets them is incomplete.
+    """
+    shaft_orders = e.shaft_orders
+    if shaft_orders is None or shaft_orders.name is None:
+        return []
+    if e.decision.verdict in ("bad_data", "unexplained"):
+        return []
+    return [_shaft_effect(shaft_orders)]
+
+
+def _shaft_effect(shaft_orders: ShaftOrders) -> dict:
+    """It has no `probability`: no evidence was calculated for it."""
+    amplitude = {"value": shaft_orders.value}
+    if shaft_orders.interval is not None:
+        amplitude["ci95"] = list(shaft_orders.interval)
+    amplitude["unit"] = "rad" if shaft_orders.name == "speed_fluctuation" else "1"
+    return {
+        "name": shaft_orders.name,
+        "element": "source",
+        "parameters": {"amplitude": amplitude},
     }
-    if kind == "unexplained" and found and not found[-1]["effect"].named:
-        result["stand_in"] = _stand_in(e, found[-1])
-    if e.chance is not None:
-        result["mismatch"]["by_chance"] = {
-            "draws": len(e.chance.gains),
-            "largest": max(e.chance.gains),
-            "threshold": e.chance.threshold,
+
+
+def _mismatch(e: Explanation, verdict: str, entries: list[dict]) -> dict:
+    """Whether something is missing, how surely, and where."""
+    search, null_distribution = e.search, e.null_distribution
+    fits = [*search.single_effect_fits, e.decision.accepted]
+    largest = max([0.0, *(search.log_bayes_factor(f) for f in fits)])
+    is_present = verdict not in NOTHING_MISSING
+    if null_distribution is None:
+        p_value = evidence_p_value(largest, len(search.single_effect_fits) + 1)
+    else:
+        p_value = null_distribution.p_value(largest)
+    mismatch = {
+        "present": is_present,
+        "p_value": p_value,
+        "where": _where(e, entries) if is_present else None,
+    }
+    if null_distribution is not None:
+        mismatch["by_chance"] = {
+            "draws": len(null_distribution.log_bayes_factors),
+            "largest": max(null_distribution.log_bayes_factors),
+            "threshold": null_distribution.threshold,
         }
-    result["sentence"] = summary_text(e, result, found, base)
-    return result
+    return mismatch
 
 
-def _where(e: Explanation, found: list[dict]) -> dict:
-    base = e.search.base
+def _where(e: Explanation, entries: list[dict]) -> dict:
+    """Element, interval, frequency bands, angles and operating points of the mismatch."""
+    base, location = e.search.base, e.location
     element, position = "line", [0.0, float(e.rig.length)]
-    located = e.located
-    if not found and e.shaft is not None and e.shaft.name is not None:
+    if entries:
+        first = entries[0]
+        element, position = element_and_extent(
+            e.rig, first["effect"], first["place"], first["parameters"]
+        )
+    elif _shaft_effects(e):
         element, position = "source", [0.0, 0.0]
-    elif found:
-        spans = [element_and_extent(e.rig, f["effect"], f["place"], f["parameters"]) for f in found]
-        element, position = spans[0]
-    elif located is not None:
-        element, position = located.element, list(located.position)
+    elif location is not None:
+        element, position = location.element, list(location.position)
         if element == "position":
             element = stretch_between_sensors(e.rig, *position)
     where = {
@@ -116,52 +152,51 @@ def _where(e: Explanation, found: list[dict]) -> dict:
         "crank_angle_deg": residual_bands.residual_crank_angles(base, e.observations),
         "conditions": residual_bands.residual_conditions(base, e.observations),
     }
-    if located is not None:
-        where["one_element_free"] = located.gains
+    if location is not None:
+        where["one_element_free"] = location.log_bayes_factors
         if len(e.rig.sensors) > 2:
             where["interior_misfit"] = {
                 which: [
-                    float(np.sqrt(np.mean(error**2)))
-                    for error in residual_bands.interior_test(e.observations, fit)
+                    float(np.sqrt(np.mean(misfit**2)))
+                    for misfit in residual_bands.interior_misfit(fit, e.observations)
                 ]
-                for which, fit in (("before", base), ("after", e.judgement.accepted))
+                for which, fit in (("before", base), ("after", e.decision.accepted))
             }
-    if e.blind:
-        where["source_informed_and_free"] = source_free_fits.compare_evidence(e.search, e.blind)
+    if e.source_free_fits:
+        where["source_informed_and_free"] = compare_evidence(e.search, e.source_free_fits)
     return where
 
 
-def _next_recording(e: Explanation, alike: tuple) -> str | None:
-    """What to record to tell rivals apart, or to narrow where a nameless network sits."""
-    kind, accepted = e.judgement.verdict, e.judgement.accepted
-    if kind == "ambiguous" or alike:
-        proposal = next_experiment.propose_recording(accepted, rival_fits(e.search), e.observations)
-        return None if proposal is None else str(proposal)
-    if kind == "unexplained" and accepted.hypothesis:
+def _next_recording(e: Explanation, places: tuple) -> str | None:
+    """The recording that discriminates between rivals, or narrows a passive network's position."""
+    verdict, accepted = e.decision.verdict, e.decision.accepted
+    proposal = None
+    if verdict == "ambiguous" or places:
+        proposal = propose_recording(accepted, rival_fits(e.search), e.observations)
+    elif verdict == "unexplained" and accepted.hypothesis:
         effect, place = accepted.hypothesis[-1]
         if effect.named:
             return None
         low, high = effect_intervals(accepted)[-1]["parameters"]["position"]["ci95"]
         if high - low > WIDE_INTERVAL * e.rig.length:
-            proposal = next_experiment.propose_sensor_position(
-                accepted, e.observations, place.form, low, high
-            )
-            return None if proposal is None else str(proposal)
-    return None
+            proposal = propose_sensor_position(accepted, e.observations, place.form, low, high)
+    return None if proposal is None else str(proposal)
 
 
 def _stand_in(e: Explanation, entry: dict) -> dict:
-    """The nameless network that the corrected twin has."""
-    found = missing_immittance(e.judgement.accepted, e.observations)
+    """The passive network of the corrected twin."""
+    missing = missing_immittance(e.decision.accepted, e.observations)
     return {
         "form": f"{entry['place'].form} one-port",
-        "passive": is_passive(e.judgement.accepted),
+        "passive": is_passive(e.decision.accepted),
         "parameters": entry["parameters"],
-        "follows": None if found is None else found.words,
+        "follows": None if missing is None else missing.law_in_words,
     }
 
 
-def _fit(e: Explanation) -> dict:
+def _fit_scores(e: Explanation) -> dict:
+    """Misfits and model errors of the base ("before") and the accepted fit ("after")."""
+
     def scores(which):
         return {k: float(v.misfit) for k, v in which.items()} | {
             f"theil_{k}": float(v.theil) for k, v in which.items()
@@ -172,7 +207,7 @@ def _fit(e: Explanation) -> dict:
         "after": scores(e.validation.after),
         "model_error": {
             "before": float(e.search.base.model_error),
-            "after": float(e.judgement.accepted.model_error),
+            "after": float(e.decision.accepted.model_error),
         },
         "left_out": list(e.validation.left_out),
         "parameters_agree_within_sd": float(e.validation.disagreement),
@@ -180,19 +215,19 @@ def _fit(e: Explanation) -> dict:
 
 
 def write_verdict(explanation: Explanation, folder: str | Path) -> dict:
-    """Write verdict.json and twin.json into `folder` (made if needed); returns the verdict.
+    """Write verdict.json and twin.json into `folder`, made if needed; returns the verdict.
 
     Each file appears whole or not at all.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     result = verdict_dict(explanation)
-    _write(folder / "twin.json", twin_file.to_dict(explanation.twin))
-    _write(folder / "verdict.json", result)
+    _write_json(folder / "twin.json", twin_file.to_dict(explanation.twin))
+    _write_json(folder / "verdict.json", result)
     return result
 
 
-def _write(path: Path, data: dict) -> None:
+def _write_json(path: Path, data: dict) -> None:
     text = json.dumps(data, indent=1, default=_plain, allow_nan=False)
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
@@ -207,4 +242,4 @@ def _plain(value):
         return value.item()
     if isinstance(value, np.ndarray):
         return value.tolist()
-    raise TypeError(f"{type(value)} is no plain data")
+    raise TypeError(f"{type(value)} cannot be written as JSON")

@@ -1,7 +1,8 @@
 """The line in the frequency domain: a source, segments in a row, inserts between them, a load.
 
-`Network` is a mutable description at given s: the effects of `rippletwin.twin.effects` change its
-arrays and append inserts, then it is asked for pressures, impedances or transfer matrices.
+`FrequencyDomainLine` is a mutable description at given s: the effects of
+`rippletwin.twin.effects` change its arrays and append inserts; then it is asked for pressures,
+impedances or transfer matrices.
 
 Every answer comes from one sweep from the load to the pump in wave variables. Inside a segment
 
@@ -33,7 +34,7 @@ class Insert(NamedTuple):
 
 
 @dataclass
-class Network:
+class FrequencyDomainLine:
     """Source, line and load at the F values of `s`; SI units, peak amplitudes.
 
     s                  (F,) 1/s, not zero
@@ -82,11 +83,11 @@ class Network:
 
         Beside an insert it is the value on the pump's side. Raises ValueError outside the line.
         """
-        return self._respond(positions)[0]
+        return self.respond(positions)[0]
 
     def flow_at(self, positions: np.ndarray) -> np.ndarray:
         """Flow towards the load at `positions` (S,): (S, F) m3/s; beside an insert, pump's side."""
-        return self._respond(positions)[1]
+        return self.respond(positions)[1]
 
     def input_impedance(self) -> np.ndarray:
         """p/q at x = 0 looking at the line, (F,) Pa s/m3, inserts at x = 0 included."""
@@ -135,7 +136,7 @@ class Network:
         stop = end if stop is None else stop
         edges = np.clip(np.concatenate([[0.0], np.cumsum(self.lengths)]), start, stop)
         inserts = [i for i in self.inserts if start <= i[0] < stop or i[0] == stop == end]
-        part = Network(
+        part = FrequencyDomainLine(
             s=self.s,
             lengths=np.diff(edges),
             series=self.series,
@@ -145,7 +146,7 @@ class Network:
         _, _, entry, decay = part._sweep([(1.0, 0.0), (0.0, 1.0)])
         return (entry / decay).transpose(2, 1, 0)
 
-    def _respond(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def respond(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pressure and flow (S, F) at `positions` with the network's own source and load."""
         pressure, flow, entry, decay = self._sweep([self.load_state()], positions)
         own, *drained = entry[:, 1] + self.source_admittance * entry[:, 0]
@@ -221,7 +222,7 @@ _ENTER, _WALK, _RECORD, _SHUNT, _SERIES, _DRAIN = range(6)
 
 @njit(cache=True, error_model="numpy")
 def _sweep(series, shunt, plan, values, load, leaving, stops):
-    """Follow `plan` at every frequency for every load state; see `Network._sweep`."""
+    """Follow `plan` at every frequency for every load state; see `FrequencyDomainLine._sweep`."""
     states, count = load.shape[0], load.shape[2]
     pressure = np.empty((stops, states, count), np.complex128)
     flow = np.empty((stops, states, count), np.complex128)

@@ -16,8 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from scipy.fft import irfft, next_fast_len, rfft
+from scipy.fft import next_fast_len
 
+from rippletwin.harmonics import one_period, peak_amplitudes
 from rippletwin.line.frequency_domain.anderson_acceleration import AndersonMixing
 from rippletwin.line.frequency_domain.prescribed_outflows import FundamentalSolutions
 
@@ -128,11 +129,9 @@ class NonlinearComplianceSolver:
 def _share(law, pressure, harmonic, samples):
     """Harmonics (cells, H) of the share stored, for those of the pressure; `law` (cells, 1 + K)
     holds P and the c_k."""
-    spectrum = np.zeros((len(pressure), samples // 2 + 1), complex)
-    spectrum[:, harmonic] = 0.5 * samples * pressure
-    wave = irfft(spectrum, samples)
+    wave = one_period(pressure, samples, harmonic)
     _follow(law, wave)
-    return rfft(wave)[:, harmonic] * (2.0 / samples)
+    return peak_amplitudes(wave)[:, harmonic]
 
 
 @njit(cache=True)

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rippletwin.line.time_domain.line_elements import Element, Line, Pipe, capacitance
+from rippletwin.line.time_domain.line_elements import Element, Pipe, TimeDomainLine, capacitance
 
 SHORTEST = 3  # cells
 TOUCH = 1e-9  # m: closer than this is the same place
@@ -41,7 +41,7 @@ def cells_of(pipe: Pipe, dt: float) -> float:
     return round(cells) if abs(cells - round(cells)) < 1e-9 * max(cells, 1) else cells
 
 
-def discretise(line: Line, dt: float) -> tuple[list[Pipe], list[float], list[list]]:
+def discretise(line: TimeDomainLine, dt: float) -> tuple[list[Pipe], list[float], list[list]]:
     """Segments cut where elements are: pipes, their starts, and the rungs before each and last."""
     edges = np.concatenate([[0.0], np.cumsum([p.length for p in line.pipes])])
     if any(not 0.0 <= i.position <= edges[-1] * (1 + 1e-12) for i in line.inserts):
@@ -69,7 +69,7 @@ def discretise(line: Line, dt: float) -> tuple[list[Pipe], list[float], list[lis
     return pipes, starts, joints
 
 
-def _pi_section(piece: Pipe, line: Line) -> list[Element]:
+def _pi_section(piece: Pipe, line: TimeDomainLine) -> list[Element]:
     """A piece much shorter than the wave, its wall elastic and yielding."""
     piece, area = piece.linear(line.density), 0.25 * np.pi * piece.diameter**2
     half = 0.5 * area * piece.length / (line.density * piece.wave_speed**2)

@@ -10,13 +10,13 @@ import numpy as np
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
 from rippletwin.line.time_domain import moc_kernel, weighting_functions
 from rippletwin.line.time_domain.discretisation import TOUCH, bilinear, cells_of, discretise
-from rippletwin.line.time_domain.line_elements import ENDS, Branch, Line
+from rippletwin.line.time_domain.line_elements import ENDS, Branch, TimeDomainLine
 
 
 class Grid:
     """Pipes, junctions and their state as flat arrays. Raises ValueError as `moc.simulate`."""
 
-    def __init__(self, line: Line):
+    def __init__(self, line: TimeDomainLine):
         self.line, self.dt = line, line.period / len(line.flow)
         self.mean = float(np.mean(line.flow))
         self.pipes, self.starts, joints = discretise(line, self.dt)

@@ -1,7 +1,8 @@
 """What a line in the time domain is made of; `method_of_characteristics` sets it in motion.
 
-`Line` is the counterpart of `chain.Network`: a mutable description of source, pipes, elements and
-load that the effects of `rippletwin.twin.effects` change before it is simulated.
+`TimeDomainLine` is the counterpart of `line_network.FrequencyDomainLine`: a mutable description of
+source, pipes, elements and load that the effects of `rippletwin.twin.effects` change before it is
+simulated.
 """
 
 from __future__ import annotations
@@ -101,7 +102,7 @@ class End:
 
 
 @dataclass
-class Line:
+class TimeDomainLine:
     """Source, pipes, elements and load; SI units.
 
     pipes      pump first

@@ -22,9 +22,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rippletwin.harmonics import peak_amplitudes
 from rippletwin.line.frequency_domain.pipe_immittance import FRICTION_LAWS
 from rippletwin.line.time_domain.grid import Grid
-from rippletwin.line.time_domain.line_elements import Line, Pipe
+from rippletwin.line.time_domain.line_elements import Pipe, TimeDomainLine
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class Transient:
 
     def harmonics(self, orders: np.ndarray) -> np.ndarray:
         """Peak complex amplitudes (S, F) of the pressure at whole `orders` (F,) of the period."""
-        return np.fft.rfft(self.pressure)[:, orders] * (2.0 / self.pressure.shape[1])
+        return peak_amplitudes(self.pressure)[:, orders]
 
 
 def steps_a_period(segments: Sequence[Pipe], period: float, at_least: int) -> int:
@@ -61,7 +62,7 @@ def steps_a_period(segments: Sequence[Pipe], period: float, at_least: int) -> in
     return int(steps[np.argmin(np.sum(rest * (1.0 - rest), axis=0))])
 
 
-def simulate(line: Line, periods: int = 60, tolerance: float = 1e-6) -> Transient:
+def simulate(line: TimeDomainLine, periods: int = 60, tolerance: float = 1e-6) -> Transient:
     """Drive the line with its periodic flow, at steps of period/M, until it repeats itself.
 
     Starts from the steady flow of the mean and stops when `tolerance` or `periods` is reached.

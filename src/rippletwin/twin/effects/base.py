@@ -2,12 +2,12 @@
 
 An effect is one file in this folder that defines `EFFECT`, an instance of `Effect`. The registry
 finds it there; nothing else changes. It says the same thing twice: `apply` mutates a network of
-the frequency domain (`Network`), `in_time` a line of the time domain
-(`rippletwin.line.time_domain.line_elements.Line`): its pipes, elements, flow or sensors.
+the frequency domain (`FrequencyDomainLine`), `apply_in_time` a line of the time domain
+(`rippletwin.line.time_domain.line_elements.TimeDomainLine`): its pipes, elements, flow or sensors.
 
 For `apply`, values may be floats or arrays of shape (B, 1) for B parameter sets at once:
 everything there is elementwise, so that a network with leading batch dimension is mutated by the
-same lines. `in_time` gets floats and a `LineState` of one operating point.
+same lines. `apply_in_time` gets floats and a `LineState` of one operating point.
 """
 
 from __future__ import annotations
@@ -18,23 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri
 
-from rippletwin.twin.priors import Prior, uniform
-
-ATMOSPHERE = 1.01325e5  # Pa; pressures of a case are above it
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A parameter of an effect: name, unit (SI), proper prior.
-
-    `scan` holds the prior's coordinates that a fit should set out from, each of them, because the
-    likelihood has several valleys along this parameter.
-    """
-
-    name: str
-    unit: str
-    prior: Prior
-    scan: tuple[float, ...] = (0.0,)
+from rippletwin.case.model import absolute
+from rippletwin.twin.parameters import Parameter
+from rippletwin.twin.priors import uniform
 
 
 @dataclass(frozen=True)
@@ -63,8 +49,7 @@ class LineState:
     viscosity        kinematic, m2/s
     friction         law of the line with all its effects, as in `segment.series_impedance`
     diameters, lengths   (n,) of m, wave_speeds (n,) of m/s: one entry a segment, pump first
-    mean_pressure    Pa absolute at the load, (F,) or scalar: of the operating point each frequency
-                     belongs to
+    mean_pressure    Pa at the load, (F,) or scalar: each frequency's own operating point's
     load_resistance  static dp/dq of the load in Pa s/m3, (F,) or scalar; None where it has none
     heat_capacity_ratio, prandtl   of a gas, else None
     orders, recording, mean_flow   shaft order, recording's number and mean flow (m3/s) of each
@@ -78,7 +63,7 @@ class LineState:
     diameters: np.ndarray
     wave_speeds: np.ndarray
     lengths: np.ndarray
-    mean_pressure: np.ndarray | float = ATMOSPHERE
+    mean_pressure: np.ndarray | float = 0.0
     load_resistance: np.ndarray | float | None = None
     heat_capacity_ratio: float | None = None
     prandtl: float | None = None
@@ -92,16 +77,16 @@ class LineState:
         """Cross section of segment k, m2."""
         return 0.25 * np.pi * self.diameters[k] ** 2
 
-    def pressure_in(self, k: int):
+    def absolute_pressure_in(self, k: int):
         """Mean pressure in the middle of segment k, Pa absolute.
 
         Steady laminar friction of the mean flow lifts it above that at the load (Hagen-Poiseuille).
         """
         if self.mean_flow is None or self.friction == "none":
-            return self.mean_pressure
+            return absolute(self.mean_pressure)
         behind = sum(self._fall(j) for j in range(k + 1, len(self.lengths)))
         rise = (0.5 * self._fall(k) + behind) * np.nan_to_num(self.mean_flow)
-        return self.mean_pressure + rise
+        return absolute(self.mean_pressure) + rise
 
     def _fall(self, k: int):
         """Pressure that a flow loses in segment k, over the flow, Pa s/m3."""
@@ -120,8 +105,9 @@ class Effect:
     source      author, year and equation or section
     parameters  (rig, place) -> tuple of Parameter
     places      rig -> tuple of Place
-    apply       (network, line: LineState, values: name -> value, place) mutates the network
-    in_time     (line: parts.Line, state: LineState, values, place) mutates the line
+    apply       (network: FrequencyDomainLine, state: LineState, values: name -> value, place)
+                mutates the network
+    apply_in_time   (line: TimeDomainLine, state: LineState, values, place) mutates the line
     named       False for a passive network that stands in for physics without a name
     certain     no real line is without it: where something is missing at all, it is taken in
                 unless the data speak against it
@@ -136,25 +122,15 @@ class Effect:
     parameters: Callable[[object, Place], tuple[Parameter, ...]]
     places: Callable[[object], tuple[Place, ...]]
     apply: Callable[[object, LineState, Mapping[str, object], Place], None]
-    in_time: Callable[[object, LineState, Mapping[str, float], Place], None]
+    apply_in_time: Callable[[object, LineState, Mapping[str, float], Place], None]
     certain: bool = False
     named: bool = True
     friction: str | None = None
-
-    def __reduce__(self):
-        """Pickled by name, for the registry has it in every process."""
-        return _by_name, (self.name,)
 
     def suits(self, rig) -> bool:
         """Whether the effect exists in the rig's medium."""
         gas = rig.fluid.heat_capacity_ratio is not None
         return self.medium == "any" or (self.medium == "gas") == gas
-
-
-def _by_name(name: str) -> Effect:
-    from rippletwin.twin.effects.library import EFFECTS
-
-    return EFFECTS[name]
 
 
 def line_place(rig) -> tuple[Place, ...]:
@@ -202,7 +178,7 @@ def segment_at(lengths: np.ndarray, position) -> int:
 def on_line(network, position):
     """`position` (m), held on the line, which a fit may have made a little shorter.
 
-    `network` is a `Network` or a `Line`.
+    `network` is a `FrequencyDomainLine` or a `TimeDomainLine`.
     """
     return np.clip(position, 0.0, network.length)
 

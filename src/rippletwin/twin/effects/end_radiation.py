@@ -1,72 +1,93 @@
-"""An open end radiates: it is a little longer than the tube, and a little lossy."""
+"""An open end radiates: it is a little longer than the tube, and a little lossy.
+
+Without a flange the sound goes into the full space, with one into half of it, so that the same flow
+out of the end meets twice the pressure in phase with it. To a long wave, k R << 1,
+
+    unflanged   Re Z_r = Zc (k R)^2/4,  delta = 0.6133 R    Levine & Schwinger 1948
+    flanged     Re Z_r = Zc (k R)^2/2,  delta = 0.8217 R    Rayleigh 1896; Norris & Sheng 1989
+
+Between the two, for a flange of finite width, both are taken as going in proportion.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from rippletwin.line.time_domain.line_elements import Element
-from rippletwin.twin.effects.base import Effect, Parameter, load_place
+from rippletwin.twin.effects.base import Effect, load_place
+from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import normal
+
+UNFLANGED, FLANGED = 0.6133, 0.8217  # end correction over the radius
+
+
+def reflection_loss(end_correction):
+    """b in |R| = 1/(1 + b (k R)^2) of an end of that `end_correction` (radii): 1/2 without a
+    flange, 1 with an infinite one, since (1 - |R|^2)/4 is Re Z_r/Zc at low frequency."""
+    flange = np.clip((end_correction - UNFLANGED) / (FLANGED - UNFLANGED), 0.0, 1.0)
+    return 0.5 + 0.5 * flange
 
 
 def radiation_impedance(s, diameter, wave_speed, density, end_correction):
-    """Z_r = Zc tanh(s delta/a + (s R/2a)^2-loss), Pa s/m3, of an unflanged or flanged end.
+    """Z_r = Zc (1 + R)/(1 - R), Pa s/m3, of an open end of that `end_correction` in radii.
 
-    The reflection is -|R0| exp(-2 s delta/a), |R0| = 1/(1 + (kR)^2/2) to second order in kR
-    (Levine & Schwinger 1948), delta = `end_correction` radii, so that |R0| <= 1: passive.
+    R = -exp(-2 s delta/a)/(1 + b (k R)^2), with `reflection_loss` b, is right to second order in
+    k R and never larger than 1: passive (the form of Silva et al. 2009, J. Sound Vib. 322:255, cut
+    off there).
     """
     radius = 0.5 * diameter
     k2 = np.abs(s * radius / wave_speed) ** 2
-    reflection = -np.exp(-2.0 * s * end_correction * radius / wave_speed) / (1.0 + 0.5 * k2)
+    phase = np.exp(-2.0 * s * end_correction * radius / wave_speed)
+    reflection = -phase / (1.0 + reflection_loss(end_correction) * k2)
     characteristic = density * wave_speed / (np.pi * radius**2)
     return characteristic * (1.0 + reflection) / (1.0 - reflection)
 
 
-def _apply(network, line, values, place):
+def radiation_element(state, end_correction) -> Element:
+    """Z_r = Zc l u/(1 + c u + (c^2 + l^2/3) u^2), u = s R/a, l = `end_correction`, c = b/(2 l).
+
+    The rational function of second order that has the first three terms of `radiation_impedance`
+    in u = 0, l u - b u^2/2 - (l u)^3/3; Re Z_r = Zc b (kR)^2/2 over a square: passive.
+    """
+    delay = 0.5 * state.diameters[-1] / state.wave_speeds[-1]
+    characteristic = state.density * state.wave_speeds[-1] / state.area(-1)
+    bend = 0.5 * reflection_loss(end_correction) / end_correction
+    return Element(
+        0.0,
+        "series",
+        (characteristic * end_correction * delay, 0.0),
+        ((bend**2 + end_correction**2 / 3.0) * delay**2, bend * delay, 1.0),
+    )
+
+
+def _apply(network, state, values, place):
     network.load = (
         "impedance",
         radiation_impedance(
             network.s,
-            line.diameters[-1],
-            line.wave_speeds[-1],
-            line.density,
+            state.diameters[-1],
+            state.wave_speeds[-1],
+            state.density,
             values["end_correction"],
         ),
     )
 
 
-def _in_time(line, state, values, place):
+def _apply_in_time(line, state, values, place):
     line.load.append(radiation_element(state, values["end_correction"]))
-
-
-def radiation_element(state, end_correction) -> Element:
-    """Z_r = Zc l u/(1 + u/(4 l) + (1/(16 l^2) + l^2/3) u^2), u = s R/a, l = `end_correction`.
-
-    The rational function of second order that has the first three terms of `radiation_impedance`
-    in u = 0, l u - u^2/4 - (l u)^3/3; Re Z_r = Zc (kR)^2/4 over a square: passive.
-    """
-    delay = 0.5 * state.diameters[-1] / state.wave_speeds[-1]
-    characteristic = state.density * state.wave_speeds[-1] / state.area(-1)
-    bend = 1.0 / (16.0 * end_correction**2) + end_correction**2 / 3.0
-    return Element(
-        0.0,
-        "series",
-        (characteristic * end_correction * delay, 0.0),
-        (bend * delay**2, delay / (4.0 * end_correction), 1.0),
-    )
 
 
 EFFECT = Effect(
     name="end_radiation",
     element="load",
     medium="gas",
-    equation="Z_load = Zc (1 + R)/(1 - R), R = -exp(-2 s delta/a)/(1 + (kR)^2/2); "
-    "delta = 0.613 R unflanged, 0.822 R flanged",
-    source="Levine & Schwinger 1948, Phys. Rev. 73:383; Norris & Sheng 1989, "
-    "J. Sound Vib. 135:85 (flanged)",
+    equation="Z_load = Zc (1 + R)/(1 - R), R = -exp(-2 s delta/a)/(1 + b (kR)^2); "
+    "delta = 0.6133 R, b = 1/2 unflanged; delta = 0.8217 R, b = 1 flanged; between in proportion",
+    source="Levine & Schwinger 1948, Phys. Rev. 73:383 (unflanged); Rayleigh 1896, The Theory of "
+    "Sound, sec. 302, and Norris & Sheng 1989, J. Sound Vib. 135:85 (flanged)",
     parameters=lambda rig, place: (Parameter("end_correction", "1", normal(0.7, 0.1)),),
     places=lambda rig: load_place(rig) if rig.load.kind == "open" else (),
     apply=_apply,
-    in_time=_in_time,
+    apply_in_time=_apply_in_time,
     certain=True,
 )

@@ -12,8 +12,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import binom
 
+from rippletwin.case.model import ATMOSPHERE
 from rippletwin.line.frequency_domain.nonlinear_compliance import Storage
-from rippletwin.twin.effects.base import ATMOSPHERE, Effect, Parameter, line_place
+from rippletwin.twin.effects.base import Effect, line_place
+from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal, normal
 
 TERMS = 6  # of the series in x = p/mean: the next is 1e-3 of the second at x = 0.3
@@ -30,17 +32,17 @@ def gas_series(gas_fraction, exponent, mean_pressure):
     return [-share * binom(-1.0 / exponent, k) for k in range(1, TERMS + 1)]
 
 
-def _apply(network, line, values, place):
-    for k in range(len(line.diameters)):
-        mean = np.broadcast_to(line.pressure_in(k), np.shape(network.shunt[k]))
+def _apply(network, state, values, place):
+    for k in range(len(state.diameters)):
+        mean = np.broadcast_to(state.absolute_pressure_in(k), np.shape(network.shunt[k]))
         first, *beyond = gas_series(values["gas_fraction"], values["polytropic_exponent"], mean)
-        network.shunt[k] = network.shunt[k] + line.area(k) * network.s * first / mean
-        network.nonlinear_compliances.append(Storage(k, line.area(k), mean, np.array(beyond)))
+        network.shunt[k] = network.shunt[k] + state.area(k) * network.s * first / mean
+        network.nonlinear_compliances.append(Storage(k, state.area(k), mean, np.array(beyond)))
 
 
-def _in_time(line, state, values, place):
+def _apply_in_time(line, state, values, place):
     for k, pipe in enumerate(line.pipes):
-        mean = float(state.pressure_in(k))
+        mean = float(state.absolute_pressure_in(k))
         series = gas_series(values["gas_fraction"], values["polytropic_exponent"], mean)
         line.pipes[k] = replace(pipe, law=(mean, *series))
 
@@ -59,5 +61,5 @@ EFFECT = Effect(
     ),
     places=line_place,
     apply=_apply,
-    in_time=_in_time,
+    apply_in_time=_apply_in_time,
 )

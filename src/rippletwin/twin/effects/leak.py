@@ -6,16 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from rippletwin.case.model import ATMOSPHERE
 from rippletwin.line.frequency_domain.line_network import Insert
 from rippletwin.line.time_domain.line_elements import Element
 from rippletwin.twin.effects.base import (
-    ATMOSPHERE,
     Effect,
-    Parameter,
     on_line,
     position_parameter,
     position_place,
 )
+from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal, uniform
 
 MOST_DRAWN = 0.5  # of the mean flow: more is no leak
@@ -23,15 +23,11 @@ REFERENCE_PRESSURE = 1e7  # Pa, at which the conductance is stated
 
 
 def leak_conductance(conductance, pressure_exponent, pressure):
-    """dq/dp, m3/(Pa s), of a leak across `pressure` (Pa) whose `conductance` is that at 10 MPa."""
+    """dq/dp, m3/(Pa s), of a leak to the atmosphere from `pressure` (Pa); `conductance` is that at
+    10 MPa. It takes the load's mean pressure, wherever the leak is."""
     # Spectra may come without a mean pressure: then as at one atmosphere.
     relative = np.maximum(pressure, ATMOSPHERE) / REFERENCE_PRESSURE
     return conductance * relative ** (-pressure_exponent)
-
-
-def _across(state):
-    """Mean pressure from the line to the atmosphere, Pa; the load's, wherever the leak is."""
-    return state.mean_pressure - ATMOSPHERE
 
 
 def drawn_share(values, state):
@@ -43,21 +39,21 @@ def drawn_share(values, state):
     """
     if not state.load_passes_flow:
         return 0.0
-    exponent, pressure = values["pressure_exponent"], _across(state)
+    exponent, pressure = values["pressure_exponent"], state.mean_pressure
     slope = leak_conductance(values["conductance"], exponent, pressure)
     return np.minimum(slope * pressure / (1.0 - exponent) / state.mean_flow, MOST_DRAWN)
 
 
-def _apply(network, line, values, place):
+def _apply(network, state, values, place):
     conductance = leak_conductance(
-        values["conductance"], values["pressure_exponent"], _across(line)
+        values["conductance"], values["pressure_exponent"], state.mean_pressure
     )
     network.inserts.append(
         Insert(on_line(network, values["position"]), "shunt", conductance + 0.0 * network.s)
     )
     kind, value = network.load
     if kind == "admittance":
-        network.load = kind, value * (1.0 - drawn_share(values, line))
+        network.load = kind, value * (1.0 - drawn_share(values, state))
 
 
 def _parameters(rig, place):
@@ -72,9 +68,9 @@ def _parameters(rig, place):
     )
 
 
-def _in_time(line, state, values, place):
+def _apply_in_time(line, state, values, place):
     conductance = leak_conductance(
-        values["conductance"], values["pressure_exponent"], _across(state)
+        values["conductance"], values["pressure_exponent"], state.mean_pressure
     )
     line.inserts.append(Element(on_line(line, values["position"]), "shunt", (conductance,)))
     # An element answers to what differs from the steady state, so the draw leaves by the source.
@@ -94,5 +90,5 @@ EFFECT = Effect(
     parameters=_parameters,
     places=position_place,
     apply=_apply,
-    in_time=_in_time,
+    apply_in_time=_apply_in_time,
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 import importlib
 import pkgutil
 
@@ -24,6 +25,14 @@ def _discover() -> dict[str, Effect]:
 
 EFFECTS: dict[str, Effect] = _discover()
 """Name -> effect, those without a name included."""
+
+
+def _by_name(name: str) -> Effect:
+    return EFFECTS[name]
+
+
+# An effect is pickled by its name: its functions may be lambdas, and every process has the library.
+copyreg.pickle(Effect, lambda effect: (_by_name, (effect.name,)))
 
 
 def candidates(rig, named: bool = True) -> list[tuple[Effect, Place]]:

@@ -6,29 +6,26 @@ from rippletwin.line.frequency_domain.line_network import Insert
 from rippletwin.line.time_domain.line_elements import capacitance
 from rippletwin.twin.effects.base import (
     Effect,
-    Parameter,
     on_line,
     position_parameter,
     position_place,
     segment_at,
 )
+from rippletwin.twin.effects.lumped_elements import volume_compliance
+from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal
 
 
-def volume_admittance(s, volume, density, wave_speed):
-    """s V/(rho a^2), m3/(Pa s)."""
-    return s * volume / (density * wave_speed**2)
-
-
-def _apply(network, line, values, place):
+def _apply(network, state, values, place):
     k = segment_at(network.lengths, values["position"])
-    admittance = volume_admittance(network.s, values["volume"], line.density, line.wave_speeds[k])
-    network.inserts.append(Insert(on_line(network, values["position"]), "shunt", admittance))
+    compliance = volume_compliance(values["volume"], state.density, state.wave_speeds[k])
+    position = on_line(network, values["position"])
+    network.inserts.append(Insert(position, "shunt", network.s * compliance))
 
 
-def _in_time(line, state, values, place):
+def _apply_in_time(line, state, values, place):
     k = segment_at([pipe.length for pipe in line.pipes], values["position"])
-    compliance = volume_admittance(1.0, values["volume"], state.density, state.wave_speeds[k])
+    compliance = volume_compliance(values["volume"], state.density, state.wave_speeds[k])
     line.inserts.append(capacitance(on_line(line, values["position"]), compliance))
 
 
@@ -44,5 +41,5 @@ EFFECT = Effect(
     ),
     places=position_place,
     apply=_apply,
-    in_time=_in_time,
+    apply_in_time=_apply_in_time,
 )

@@ -8,7 +8,9 @@ import numpy as np
 
 from rippletwin.line.frequency_domain.line_network import Insert
 from rippletwin.line.time_domain.line_elements import Element, inertance
-from rippletwin.twin.effects.base import ATMOSPHERE, Effect, Parameter, Place
+from rippletwin.twin.effects.base import Effect, Place
+from rippletwin.twin.effects.lumped_elements import second_order_lag
+from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal, normal
 
 
@@ -20,15 +22,14 @@ def _places(rig):
     return (Place("load", form="spool"), inertance) if rig.load.kind == "orifice" else (inertance,)
 
 
-def _apply(network, line, values, place):
+def _apply(network, state, values, place):
     s, end = network.s, network.length
     if place.form == "inertance":
         network.inserts.append(Insert(end, "series", s * values["inertance"]))
         return
-    w = 2.0 * np.pi * values["natural_frequency"]
-    motion = w**2 / (s**2 + 2.0 * values["damping_ratio"] * w * s + w**2)
+    motion = second_order_lag(s, values["natural_frequency"], values["damping_ratio"])
     opening = values["gain"] * motion
-    network.inserts.append(Insert(end, "shunt", opening / line.load_resistance))
+    network.inserts.append(Insert(end, "shunt", opening / state.load_resistance))
     network.opening = opening
 
 
@@ -45,12 +46,12 @@ def _parameters(rig, place):
     )
 
 
-def _in_time(line, state, values, place):
+def _apply_in_time(line, state, values, place):
     if place.form == "inertance":
         line.inserts.append(inertance(line.length, values["inertance"]))
         return
     w = 2.0 * np.pi * values["natural_frequency"]
-    drop = state.mean_pressure - ATMOSPHERE - line.end.pressure
+    drop = state.mean_pressure - line.end.pressure
     gain = values["gain"] / (
         2.0 * drop
     )  # of the share that opens: see `rippletwin.line.frequency_domain.orifice_load`
@@ -70,5 +71,5 @@ EFFECT = Effect(
     parameters=_parameters,
     places=_places,
     apply=_apply,
-    in_time=_in_time,
+    apply_in_time=_apply_in_time,
 )

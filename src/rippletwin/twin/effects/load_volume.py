@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from rippletwin.line.frequency_domain.line_network import Insert
 from rippletwin.line.time_domain.line_elements import capacitance
-from rippletwin.twin.effects.base import Effect, Parameter, load_place
-from rippletwin.twin.effects.line_volume import volume_admittance
+from rippletwin.twin.effects.base import Effect, load_place
+from rippletwin.twin.effects.lumped_elements import volume_compliance
+from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal
 
 
-def _apply(network, line, values, place):
-    admittance = volume_admittance(network.s, values["volume"], line.density, line.wave_speeds[-1])
-    network.inserts.append(Insert(network.length, "shunt", admittance))
+def _apply(network, state, values, place):
+    compliance = volume_compliance(values["volume"], state.density, state.wave_speeds[-1])
+    network.inserts.append(Insert(network.length, "shunt", network.s * compliance))
 
 
-def _in_time(line, state, values, place):
-    compliance = volume_admittance(1.0, values["volume"], state.density, state.wave_speeds[-1])
+def _apply_in_time(line, state, values, place):
+    compliance = volume_compliance(values["volume"], state.density, state.wave_speeds[-1])
     line.inserts.append(capacitance(line.length, compliance))
 
 
@@ -30,5 +31,5 @@ EFFECT = Effect(
     ),
     places=load_place,
     apply=_apply,
-    in_time=_in_time,
+    apply_in_time=_apply_in_time,
 )

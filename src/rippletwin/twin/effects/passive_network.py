@@ -12,13 +12,14 @@ import numpy as np
 
 from rippletwin.line.frequency_domain.line_network import Insert
 from rippletwin.line.time_domain.line_elements import Element
-from rippletwin.twin.effects.base import Effect, Parameter, Place, on_line, position_parameter
+from rippletwin.twin.effects.base import Effect, Place, on_line, position_parameter
+from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal
 
 RESONATORS = ((500.0, "first"), (1800.0, "second"))  # prior median frequency in Hz, name
 
 
-def one_port(s, values, unit):
+def _one_port(s, values, unit):
     """Immittance in the unit of `unit`, a characteristic immittance."""
     total = values["flat"] + s * values["rising"] / (2.0 * np.pi * 1000.0)
     for _, name in RESONATORS:
@@ -28,12 +29,12 @@ def one_port(s, values, unit):
     return unit * total
 
 
-def _apply(network, line, values, place):
-    characteristic = line.density * line.wave_speeds[0] / line.area(0)
+def _apply(network, state, values, place):
+    characteristic = state.density * state.wave_speeds[0] / state.area(0)
     kind = place.form
     unit = 1.0 / characteristic if kind == "shunt" else characteristic
     position = on_line(network, values["position"])
-    network.inserts.append(Insert(position, kind, one_port(network.s, values, unit)))
+    network.inserts.append(Insert(position, kind, _one_port(network.s, values, unit)))
 
 
 def _parameters(rig, place):
@@ -51,7 +52,7 @@ def _parameters(rig, place):
     return tuple(parameters)
 
 
-def _in_time(line, state, values, place):
+def _apply_in_time(line, state, values, place):
     characteristic = state.density * state.wave_speeds[0] / state.area(0)
     unit = 1.0 / characteristic if place.form == "shunt" else characteristic
     position = on_line(line, values["position"])
@@ -74,6 +75,6 @@ EFFECT = Effect(
     parameters=_parameters,
     places=lambda rig: (Place("position", form="shunt"), Place("position", form="series")),
     apply=_apply,
-    in_time=_in_time,
+    apply_in_time=_apply_in_time,
     named=False,
 )

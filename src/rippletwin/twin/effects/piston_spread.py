@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from rippletwin.twin.effects.base import Effect, Parameter, source_place
+from rippletwin.harmonics import one_period
+from rippletwin.twin.effects.base import Effect, source_place
+from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import normal
 
 
@@ -31,8 +33,8 @@ def spread(orders: np.ndarray, values) -> np.ndarray:
     return np.where(turn == 0, 0.0, half_sine(orders) * amplitude)
 
 
-def _apply(network, line, values, place):
-    network.source_flow = network.source_flow + line.mean_flow * spread(line.orders, values)
+def _apply(network, state, values, place):
+    network.source_flow = network.source_flow + state.mean_flow * spread(state.orders, values)
 
 
 def _parameters(rig, place):
@@ -44,11 +46,11 @@ def _parameters(rig, place):
     )
 
 
-def _in_time(line, state, values, place):
+def _apply_in_time(line, state, values, place):
     count = len(line.flow)
-    harmonics = np.zeros(count // 2 + 1, complex)
-    harmonics[1:] = state.mean_flow * spread(np.arange(1, len(harmonics)), values)
-    line.flow = line.flow + np.fft.irfft(0.5 * count * harmonics, count)
+    orders = np.arange(1, count // 2 + 1)
+    added = state.mean_flow * spread(orders, values)
+    line.flow = line.flow + one_period(added, count, orders)
 
 
 EFFECT = Effect(
@@ -61,5 +63,5 @@ EFFECT = Effect(
     parameters=_parameters,
     places=source_place,
     apply=_apply,
-    in_time=_in_time,
+    apply_in_time=_apply_in_time,
 )

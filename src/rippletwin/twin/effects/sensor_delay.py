@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from rippletwin.twin.effects.base import Effect, Parameter, scale_sensor, sensor_places
+from rippletwin.twin.effects.base import Effect, scale_sensor, sensor_places
+from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import normal
 
 
-def _apply(network, line, values, place):
+def _apply(network, state, values, place):
     scale_sensor(network, place.index, np.exp(-network.s * values["delay"]))
 
 
-def _in_time(line, state, values, place):
+def _apply_in_time(line, state, values, place):
     line.sensors.append((place.index, lambda s: np.exp(-s * values["delay"])))
 
 
@@ -25,5 +26,5 @@ EFFECT = Effect(
     parameters=lambda rig, place: (Parameter("delay", "s", normal(0.0, 1e-4)),),
     places=sensor_places,
     apply=_apply,
-    in_time=_in_time,
+    apply_in_time=_apply_in_time,
 )

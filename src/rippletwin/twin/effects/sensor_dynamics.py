@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from rippletwin.twin.effects.base import Effect, Parameter, scale_sensor, sensor_places
+from rippletwin.twin.effects.base import Effect, scale_sensor, sensor_places
+from rippletwin.twin.effects.lumped_elements import second_order_lag
+from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal
 
 
-def resonance(s, natural_frequency, damping_ratio):
-    """w0^2/(s^2 + 2 zeta w0 s + w0^2), `natural_frequency` in Hz."""
-    w = 2.0 * np.pi * natural_frequency
-    return w**2 / (s**2 + 2.0 * damping_ratio * w * s + w**2)
+def _apply(network, state, values, place):
+    scale_sensor(network, place.index, second_order_lag(network.s, **values))
 
 
-def _apply(network, line, values, place):
-    scale_sensor(network, place.index, resonance(network.s, **values))
-
-
-def _in_time(line, state, values, place):
-    line.sensors.append((place.index, lambda s: resonance(s, **values)))
+def _apply_in_time(line, state, values, place):
+    line.sensors.append((place.index, lambda s: second_order_lag(s, **values)))
 
 
 EFFECT = Effect(
@@ -34,5 +28,5 @@ EFFECT = Effect(
     ),
     places=sensor_places,
     apply=_apply,
-    in_time=_in_time,
+    apply_in_time=_apply_in_time,
 )

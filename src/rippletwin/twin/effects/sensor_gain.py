@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from rippletwin.twin.effects.base import Effect, Parameter, scale_sensor, sensor_places
+from rippletwin.twin.effects.base import Effect, scale_sensor, sensor_places
+from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import normal
 
 
-def _apply(network, line, values, place):
+def _apply(network, state, values, place):
     scale_sensor(network, place.index, 1.0 + values["gain_error"] + 0.0 * network.s)
 
 
-def _in_time(line, state, values, place):
+def _apply_in_time(line, state, values, place):
     line.sensors.append((place.index, lambda s: 1.0 + values["gain_error"] + 0.0 * s))
 
 
@@ -23,5 +24,5 @@ EFFECT = Effect(
     parameters=lambda rig, place: (Parameter("gain_error", "1", normal(0.0, 0.15)),),
     places=sensor_places,
     apply=_apply,
-    in_time=_in_time,
+    apply_in_time=_apply_in_time,
 )

@@ -9,12 +9,12 @@ from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, s
 from rippletwin.line.time_domain.line_elements import Branch, Pipe
 from rippletwin.twin.effects.base import (
     Effect,
-    Parameter,
     on_line,
     position_parameter,
     position_place,
     segment_at,
 )
+from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal
 
 
@@ -30,21 +30,21 @@ def branch_admittance(s, length, diameter, wave_speed, density, viscosity, frict
     return np.sqrt(shunt / series) * np.tanh(length * np.sqrt(series * shunt))
 
 
-def _apply(network, line, values, place):
+def _apply(network, state, values, place):
     k = segment_at(network.lengths, values["position"])
     admittance = branch_admittance(
         network.s,
         values["length"],
         values["diameter"],
-        line.wave_speeds[k],
-        line.density,
-        values["viscosity_ratio"] * line.viscosity,
-        line.friction,
+        state.wave_speeds[k],
+        state.density,
+        values["viscosity_ratio"] * state.viscosity,
+        state.friction,
     )
     network.inserts.append(Insert(on_line(network, values["position"]), "shunt", admittance))
 
 
-def _in_time(line, state, values, place):
+def _apply_in_time(line, state, values, place):
     # A pipe of its own at a junction, its far end closed.
     k = segment_at([pipe.length for pipe in line.pipes], values["position"])
     pipe = Pipe(values["length"], values["diameter"], state.wave_speeds[k])
@@ -68,5 +68,5 @@ EFFECT = Effect(
     ),
     places=position_place,
     apply=_apply,
-    in_time=_in_time,
+    apply_in_time=_apply_in_time,
 )

@@ -6,8 +6,9 @@ import numpy as np
 
 from rippletwin.line.frequency_domain.line_network import Insert
 from rippletwin.line.time_domain.line_elements import Element, inertance
-from rippletwin.twin.effects.base import Effect, Parameter, Place
-from rippletwin.twin.effects.line_volume import volume_admittance
+from rippletwin.twin.effects.base import Effect, Place
+from rippletwin.twin.effects.lumped_elements import volume_compliance
+from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal
 
 
@@ -15,9 +16,9 @@ def _places(rig):
     return (Place("source", form="volume"), Place("source", form="volume and passage"))
 
 
-def _apply(network, line, values, place):
-    admittance = volume_admittance(network.s, values["volume"], line.density, line.wave_speeds[0])
-    admittance = admittance + values["conductance"]
+def _apply(network, state, values, place):
+    compliance = volume_compliance(values["volume"], state.density, state.wave_speeds[0])
+    admittance = network.s * compliance + values["conductance"]
     network.source_admittance = network.source_admittance + admittance
     if place.form == "volume and passage":
         impedance = network.s * values["inertance"]
@@ -42,8 +43,8 @@ def _parameters(rig, place):
     return parameters
 
 
-def _in_time(line, state, values, place):
-    compliance = volume_admittance(1.0, values["volume"], state.density, state.wave_speeds[0])
+def _apply_in_time(line, state, values, place):
+    compliance = volume_compliance(values["volume"], state.density, state.wave_speeds[0])
     line.source.append(Element(0.0, "shunt", (compliance, values["conductance"])))
     if place.form == "volume and passage":
         line.inserts.insert(0, inertance(0.0, values["inertance"]))
@@ -59,5 +60,5 @@ EFFECT = Effect(
     parameters=_parameters,
     places=_places,
     apply=_apply,
-    in_time=_in_time,
+    apply_in_time=_apply_in_time,
 )

@@ -5,23 +5,24 @@ from __future__ import annotations
 import numpy as np
 
 from rippletwin.harmonics import peak_amplitudes, phase_modulate
-from rippletwin.twin.effects.base import Effect, Parameter, source_place
+from rippletwin.twin.effects.base import Effect, source_place
+from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import normal
 
 
-def _apply(network, line, values, place):
+def _apply(network, state, values, place):
     b = complex(values["cosine"], values["sine"])
     flow = np.array(np.broadcast_to(network.source_flow, np.shape(network.s)), dtype=complex)
-    for r in np.unique(line.recording):
-        own = line.recording == r
-        orders = np.asarray(line.orders[own], int)
+    for r in np.unique(state.recording):
+        own = state.recording == r
+        orders = np.asarray(state.orders[own], int)
         spectrum = np.zeros(orders.max() + 1, complex)
-        spectrum[0], spectrum[orders] = line.mean_flow[own][0], flow[own]
+        spectrum[0], spectrum[orders] = state.mean_flow[own][0], flow[own]
         flow[own] = peak_amplitudes(phase_modulate(spectrum, b, 4 * len(spectrum)))[orders]
     network.source_flow = flow
 
 
-def _in_time(line, state, values, place):
+def _apply_in_time(line, state, values, place):
     spectrum = peak_amplitudes(line.flow)
     line.flow = phase_modulate(spectrum, complex(values["cosine"], values["sine"]), len(line.flow))
 
@@ -38,5 +39,5 @@ EFFECT = Effect(
     ),
     places=source_place,
     apply=_apply,
-    in_time=_in_time,
+    apply_in_time=_apply_in_time,
 )

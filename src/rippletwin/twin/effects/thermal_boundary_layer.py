@@ -21,14 +21,14 @@ def thermal_factor(s, viscosity, diameter, heat_capacity_ratio, prandtl):
     return heat_capacity_ratio - (heat_capacity_ratio - 1.0) * ratio
 
 
-def _apply(network, line, values, place):
-    for k, diameter in enumerate(line.diameters):
+def _apply(network, state, values, place):
+    for k, diameter in enumerate(state.diameters):
         network.shunt[k] = network.shunt[k] * thermal_factor(
-            network.s, line.viscosity, diameter, line.heat_capacity_ratio, line.prandtl
+            network.s, state.viscosity, diameter, state.heat_capacity_ratio, state.prandtl
         )
 
 
-def _in_time(line, state, values, place):
+def _apply_in_time(line, state, values, place):
     # The isothermal layer is a wall that yields with delay, a sum of exponentials.
     for k, diameter in enumerate(state.diameters):
         rate = 4.0 * state.viscosity / (state.prandtl * diameter**2)
@@ -47,5 +47,5 @@ EFFECT = Effect(
     parameters=lambda rig, place: (),
     places=line_place,
     apply=_apply,
-    in_time=_in_time,
+    apply_in_time=_apply_in_time,
 )

@@ -21,14 +21,14 @@ def friction_excess(s, viscosity, diameter, density):
     return (excess if np.ndim(diameter) or np.ndim(viscosity) else excess[0]) * density / area
 
 
-def _apply(network, line, values, place):
-    for k, diameter in enumerate(line.diameters):
+def _apply(network, state, values, place):
+    for k, diameter in enumerate(state.diameters):
         network.series[k] = network.series[k] + friction_excess(
-            network.s, line.viscosity, diameter, line.density
+            network.s, state.viscosity, diameter, state.density
         )
 
 
-def _in_time(line, state, values, place):
+def _apply_in_time(line, state, values, place):
     line.friction = "unsteady"  # Zielke's weights as a sum of exponentials
 
 
@@ -42,6 +42,6 @@ EFFECT = Effect(
     parameters=lambda rig, place: (),
     places=line_place,
     apply=_apply,
-    in_time=_in_time,
+    apply_in_time=_apply_in_time,
     friction="unsteady",
 )

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rippletwin.twin.effects.base import Effect, Parameter, segment_places
+from rippletwin.twin.effects.base import Effect, segment_places
+from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal
 
 
-def _apply(network, line, values, place):
+def _apply(network, state, values, place):
     creep = values["compliance_ratio"] / (1.0 + network.s * values["retardation_time"])
     network.shunt[place.index] = network.shunt[place.index] * (1.0 + creep)
 
 
-def _in_time(line, state, values, place):
+def _apply_in_time(line, state, values, place):
     # One more retarded strain at each node.
     pipe = line.pipes[place.index]
     term = values["compliance_ratio"], values["retardation_time"]
@@ -33,5 +34,5 @@ EFFECT = Effect(
     ),
     places=segment_places,
     apply=_apply,
-    in_time=_in_time,
+    apply_in_time=_apply_in_time,
 )

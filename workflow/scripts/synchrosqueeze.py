@@ -4,21 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from job import start
+from job import open_log
 from rippletwin import store
 from rippletwin.learning.synchrosqueezing import SstSettings, amplitude_scale, sst_images
 
-tell = start(snakemake)
-params = snakemake.params
+report_progress = open_log(snakemake)
 reference = store.load(snakemake.input.reference)
 rate = reference.sizes["time"] * reference.speed_hz
-settings = SstSettings(
-    size=params.size,
-    min_frequency_hz=params.min_frequency_hz,
-    max_frequency_hz=params.max_frequency_hz,
-    voices=params.voices,
-    k=params.k,
-)
+settings = SstSettings(**snakemake.params.sst)
 healthy = reference.signal.values[reference.state.values == "H"][:1]
 settings = replace(settings, scale=amplitude_scale(np.tile(healthy, 2), rate, settings))
 for source, target in zip(snakemake.input.samples, snakemake.output, strict=True):
@@ -30,6 +23,6 @@ for source, target in zip(snakemake.input.samples, snakemake.output, strict=True
         target,
         compressed=False,
     )
-tell(
+report_progress(
     f"{len(images)} images of {settings.size} x {settings.size} a store, scale {settings.scale:.3g}"
 )

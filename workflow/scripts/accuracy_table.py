@@ -5,25 +5,25 @@ from pathlib import Path
 
 import pandas as pd
 
-from job import start
+from job import open_log
 from rippletwin import store
 from rippletwin.learning.accuracy import UNKNOWN, result_row, score
 from rippletwin.learning.architectures import CLASSES
 from rippletwin.learning.tables import accuracy_table, answer_table
 from rippletwin.learning.training import History
 
-tell = start(snakemake)
+report_progress = open_log(snakemake)
 params, paths = snakemake.params, snakemake.input
 files = dict(enumerate(store.load(paths.recorded).source.split(", ")))
 rows, diagnoses = [], []
 for (dataset, architecture), predictions, histories in zip(
     params.cells, paths.predictions, paths.histories, strict=True
 ):
-    signal = "flow" if dataset.startswith("CFD-Q") else "pressure"
     endings = [History(**h) for h in json.loads(Path(histories).read_text())]
     answers = pd.read_csv(predictions)
     for seed, windows in answers.groupby("seed"):
         predicted = windows.predicted.map(CLASSES.index).to_numpy()
+        signal = params.signals[dataset]
         scored = score(windows.truth.to_numpy(), predicted, signal, params.severity)
         rows.append(result_row(architecture, dataset, seed, scored, endings[seed]))
     unknown = answers[answers.truth == UNKNOWN]
@@ -39,10 +39,10 @@ The recordings are {params.recordings}; mean and standard deviation over {len(en
 paper's values in brackets. A recorded cylinder fault is right as {params.severity["pressure"]} for
 pressure and as {params.severity["flow"]} for flow.
 
-{accuracy_table(results, paper)}
+{accuracy_table(results, paper, params.columns)}
 ## Either severity of a cylinder fault counts as right
 
-{accuracy_table(results, paper.iloc[:0].assign(dataset=[]), "accuracy_either")}
+{accuracy_table(results, paper.iloc[:0], params.columns, "accuracy_either")}
 {int(results.converged.sum())} of {len(results)} trainings met the convergence rule.
 """
 if diagnoses:
@@ -53,4 +53,4 @@ Their windows are not scored above. Shares of the answers over windows and seeds
 
 {answer_table(pd.concat(diagnoses))}"""
 Path(snakemake.output.page).write_text(page)
-tell(f"{len(results)} trainings, {int(results.converged.sum())} of them converged")
+report_progress(f"{len(results)} trainings, {int(results.converged.sum())} of them converged")

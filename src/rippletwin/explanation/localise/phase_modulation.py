@@ -1,0 +1,91 @@
+"""The flow ripple that an unevenly turning shaft delivers.
+
+Phase modulation moves energy from the piston orders to their sidebands. At high orders a small
+modulation takes most of it, so the line must be fitted with the modulated ripple.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rippletwin.calibration.frequency_continuation import fit_hypothesis
+from rippletwin.case.model import FlowRipple
+from rippletwin.explanation.localise.shaft_orders import (
+    ShaftOrders,
+    analyse_shaft_orders,
+    shaft_order_level,
+)
+from rippletwin.explanation.thresholds import MIN_SHAFT_ORDER_LEVEL, ROUGH_MODULATION_SHARE
+from rippletwin.harmonics import flow_harmonics, phase_modulate
+from rippletwin.spectra.frequency_selection import select_fitted_frequencies
+from rippletwin.twin.twin import Twin
+
+MIN_PHASE_CHANGE = 0.02  # rad at the highest order; a smaller change of the modulation is ignored
+
+
+def estimate_phase_modulation(rig, observations: Sequence, highest_hz: float) -> ShaftOrders | None:
+    """The shaft orders by a line that is calibrated without effects.
+
+    None where their level is too low to matter. The explained line gives a better estimate.
+    """
+    level_and_p = None
+    if "pistons" in rig.pump:
+        level_and_p = shaft_order_level(observations, rig.pump["pistons"], highest_hz)
+    if level_and_p is None or level_and_p[0] < MIN_SHAFT_ORDER_LEVEL:
+        return None
+    shaft_orders = None
+    for uncertain_pump in (False, True):
+        # The pump's parameters come second: before the ripple is modulated, they would absorb what
+        # the modulation takes from the piston orders.
+        modulated = with_phase_modulation(observations, shaft_orders)
+        data = select_fitted_frequencies(modulated, rig, highest_hz)
+        base = Twin(rig, data, uncertain_pump=uncertain_pump)
+        twin = fit_hypothesis(base, (), data).twin
+        shaft_orders = analyse_shaft_orders(twin, observations, highest_hz, ROUGH_MODULATION_SHARE)
+    return shaft_orders
+
+
+def modulation_differs(
+    one: ShaftOrders | None, other: ShaftOrders | None, observations: Sequence
+) -> bool:
+    """Whether two estimates of the modulation differ enough to change the fitted ripple."""
+    one, other = _modulation_of(one), _modulation_of(other)
+    highest_order = {o.label: np.max(o.orders) for o in observations if o.orders is not None}
+    return any(
+        highest_order.get(label, 0.0) * abs(one.get(label, 0.0) - other.get(label, 0.0))
+        > MIN_PHASE_CHANGE
+        for label in {*one, *other}
+    )
+
+
+def with_phase_modulation(observations: Sequence, shaft_orders: ShaftOrders | None) -> list:
+    """The observations with the flow ripple of a shaft with the modulation of `shaft_orders`."""
+    modulation = _modulation_of(shaft_orders)
+    return [
+        o
+        if o.flow_ripple is None or o.label not in modulation
+        else replace(o, flow_ripple=modulate_ripple(o.flow_ripple, modulation[o.label]))
+        for o in observations
+    ]
+
+
+def _modulation_of(shaft_orders: ShaftOrders | None) -> Mapping[str, complex]:
+    """Modulation of each recording by its label; empty unless it is a speed fluctuation."""
+    if shaft_orders is None or shaft_orders.name != "speed_fluctuation":
+        return {}
+    return shaft_orders.modulation
+
+
+def modulate_ripple(ripple: FlowRipple, modulation: complex) -> FlowRipple:
+    """The flow ripple of a shaft that leads an even rotation by Re(b exp(j t)) rad at angle t.
+
+    b is `modulation`.
+    """
+    count = max(len(ripple.flow) // 2, 8)
+    spectrum = flow_harmonics(ripple, np.arange(count))
+    flow = phase_modulate(spectrum, modulation, 4 * count)
+    angle = 360.0 * np.arange(len(flow)) / len(flow)
+    return replace(ripple, angle_deg=angle, flow=flow, swing=modulation)

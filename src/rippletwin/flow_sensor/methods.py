@@ -1,0 +1,68 @@
+"""The flow sensor by either method, and the noise of what it estimates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from rippletwin.flow_sensor import spectral_inversion
+from rippletwin.flow_sensor.estimate import FlowEstimate
+from rippletwin.flow_sensor.line_response import NetworkFactory
+from rippletwin.spectra.noise import noise_cycle_scatter
+
+METHODS = ("spectral", "pinn")
+STEPS_BETWEEN_REPORTS = 50  # of the physics-informed network's training
+
+
+def estimate_flow_by(
+    method: str,
+    windows: np.ndarray,
+    speed_hz: float,
+    network: NetworkFactory,
+    noise: np.ndarray,
+    bandwidth_hz: float,
+    *,
+    width: int,
+    steps: int,
+    threads: int,
+    progress: Callable[[str], None],
+) -> FlowEstimate:
+    """Outlet flow of each one-revolution window, by one of `METHODS`.
+
+    windows : (n, S, M) pressure, Pa; noise : (S,) standard deviation of a sample, Pa. `width`
+    (neurons of a hidden layer), `steps` (of the optimiser) and `threads` are for "pinn" alone: a
+    network is trained once for the line, then solved a window at a time. progress(text) is called
+    on the way. Raises ValueError for another method.
+    """
+    if method == "spectral":
+        return spectral_inversion.estimate_flow(windows, speed_hz, network, noise, bandwidth_hz)
+    if method != "pinn":
+        raise ValueError(f"method {method!r}: known are {', '.join(METHODS)}")
+
+    import torch  # takes seconds, and the other method needs none
+
+    from rippletwin.flow_sensor import pinn
+
+    torch.set_num_threads(threads)
+
+    def report(step: int, loss: float) -> None:
+        if step % STEPS_BETWEEN_REPORTS == 0:
+            progress(f"step {step}: loss {loss:.2g}")
+
+    settings = pinn.Settings(width=width, steps=steps)
+    trunk, _ = pinn.train(network, speed_hz, bandwidth_hz, settings, report)
+    progress(f"equations hold to {float(trunk.residual):.2g} of the waves")
+    return pinn.estimate_flow(windows, speed_hz, network, trunk, noise, bandwidth_hz)
+
+
+def noise_of_flow(flow: np.ndarray, recording: np.ndarray, healthy: np.ndarray) -> np.ndarray:
+    """Standard deviation (1,) of a sample of estimated flow, by the scatter between revolutions.
+
+    flow : (n, M); recording : (n,) which recording a window is of; healthy : (n,) booleans. The
+    mean over healthy recordings, or over all where none is. The flow ends at its bandwidth, so the
+    finest wavelet details, by which pressure's noise is estimated, are empty.
+    """
+    counted = np.unique(recording[healthy] if np.any(healthy) else recording)
+    scatter = [noise_cycle_scatter(flow[recording == k][:, None]) for k in counted]
+    return np.mean(scatter, axis=0)

@@ -1,0 +1,51 @@
+"""Windows of one revolution put together: pairs, probes without noise, a few of a recording."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rippletwin.learning.dataset import remove_mean
+
+
+def pair_windows(recording: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Indices of the first and of the second windows (pairs,) of two revolutions each.
+
+    recording : (n,) which recording a window is of. Consecutive windows of one recording make a
+    pair and none is in two; the last of an odd number is left out.
+    """
+    first, second = [], []
+    for name in dict.fromkeys(np.asarray(recording).tolist()):
+        at = np.flatnonzero(recording == name)
+        count = len(at) // 2
+        first.append(at[0 : 2 * count : 2])
+        second.append(at[1 : 2 * count : 2])
+    return np.concatenate(first), np.concatenate(second)
+
+
+def noise_free_probes(signal: np.ndarray, turns: int, revolutions: int) -> np.ndarray:
+    """Every state's revolution begun at `turns` crank angles, evenly spread, without its mean.
+
+    signal : (states, channels, M), one revolution each. Returns (states * turns, channels,
+    M * revolutions) float32, all turns of a state in a row.
+    """
+    signal = remove_mean(np.asarray(signal, dtype=float))
+    points = signal.shape[-1]
+    starts = np.arange(turns) * points // turns
+    turned = np.stack([np.roll(signal, -start, axis=-1) for start in starts], axis=1)
+    return (
+        np.tile(turned, revolutions)
+        .reshape(-1, signal.shape[1], points * revolutions)
+        .astype(np.float32)
+    )
+
+
+def spread_windows(state: np.ndarray, count: int) -> dict[str, np.ndarray]:
+    """State -> indices of at most `count` of its windows, evenly from the first to the last.
+
+    state : (n,) state of each window, whose recordings may be many.
+    """
+    chosen = {}
+    for name in dict.fromkeys(np.asarray(state).tolist()):
+        at = np.flatnonzero(state == name)
+        chosen[name] = at[np.unique(np.linspace(0, len(at) - 1, count).round().astype(int))]
+    return chosen

@@ -1,0 +1,138 @@
+"""Moves of the stepwise search: which fits are asked for, and which are taken."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+
+from made_fits import made_fit
+from rippletwin.explanation import fit_jobs
+from rippletwin.explanation.fit_jobs import FitJob, NearFit
+from rippletwin.explanation.search import single_effects, stepwise_moves
+from rippletwin.explanation.search.single_effects import fit_single_effects
+from rippletwin.explanation.search.stepwise_moves import (
+    drop_needless_effects,
+    fit_extensions,
+    fit_substitutes,
+    simplify_effects,
+)
+from rippletwin.explanation.search.stepwise_search import Search
+from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
+from rippletwin.explanation.verdict.decision import equivalent_effects, equivalent_places
+from rippletwin.twin.effects.base import Place
+from rippletwin.twin.effects.library import EFFECTS
+from synthetic_observations import rig
+
+HOSE = (EFFECTS["viscoelastic_wall"], Place("segment 1", 0))
+VOLUME = (EFFECTS["line_volume"], Place("position"))
+VOLUME_AT_LOAD = (EFFECTS["load_volume"], Place("load"))
+VOLUME_AT_PUMP = (EFFECTS["source_impedance"], Place("source", form="volume"))
+VOLUME_AND_PASSAGE = (EFFECTS["source_impedance"], Place("source", form="volume and passage"))
+ALWAYS_PRESENT = (replace(EFFECTS["unsteady_friction"], certain=True), Place("line"))
+
+
+def test_every_effect_is_compared_with_its_substitutes():
+    """Besides a hose, the delay of a sensor is exchanged for the other effects of that sensor and
+    for a delay of the other sensor.
+
+    Those that fit equally well make a class of names and a class of places. A single effect is
+    exchanged for nothing: every other has been tried alone."""
+    delay, dynamics = (
+        (EFFECTS[name], Place("sensor p1", 0)) for name in ("sensor_delay", "sensor_dynamics")
+    )
+    delay_elsewhere = (EFFECTS["sensor_delay"], Place("sensor p2", 1))
+    gain_elsewhere = (EFFECTS["sensor_gain"], Place("sensor p2", 1))
+    best, asked = made_fit(100.0, delay, HOSE), []
+
+    def fit(jobs):
+        asked.extend(job.hypothesis for job in jobs)
+        return [made_fit(98.0, *job.hypothesis) for job in jobs]
+
+    workers = SimpleNamespace(fit=fit)
+    candidates = [HOSE, delay, dynamics, delay_elsewhere, gain_elsewhere, VOLUME]
+    substitutes = fit_substitutes(workers, best, candidates)
+    assert asked == [(HOSE, dynamics), (HOSE, delay_elsewhere)]
+    assert fit_substitutes(workers, made_fit(100.0, delay), [delay, dynamics]) == []
+    search = Search(made_fit(0.0), [], best, substitutes)
+    assert equivalent_effects(search) == (("sensor_delay", "sensor_dynamics"),)
+    assert equivalent_places(search) == (
+        ("sensor_delay at sensor p1", "sensor_delay at sensor p2"),
+    )
+
+
+@pytest.mark.parametrize(
+    ("general", "special_cases"),
+    [(VOLUME_AND_PASSAGE, [VOLUME_AT_PUMP]), (VOLUME, [VOLUME_AT_LOAD, VOLUME_AT_PUMP])],
+)
+@pytest.mark.parametrize("cost", [MIN_LOG_BAYES_FACTOR - 1, MIN_LOG_BAYES_FACTOR + 1])
+def test_a_general_effect_needs_evidence_over_its_special_cases(general, special_cases, cost):
+    """A passage beside a volume at the pump, and a position of its own for a volume, are kept only
+    if they add MIN_LOG_BAYES_FACTOR."""
+    best, asked = made_fit(100.0, HOSE, general), []
+
+    def fit(jobs):
+        asked.extend(job.hypothesis for job in jobs)
+        return [made_fit(100.0 - cost, *job.hypothesis) for job in jobs]
+
+    workers = SimpleNamespace(base=SimpleNamespace(rig=rig()), fit=fit)
+    library = [HOSE, VOLUME, VOLUME_AT_LOAD, VOLUME_AT_PUMP, VOLUME_AND_PASSAGE]
+    simplified = simplify_effects(workers, best, library)
+    assert asked == [(HOSE, special) for special in special_cases]
+    kept = special_cases[0] if cost < MIN_LOG_BAYES_FACTOR else general
+    assert simplified.hypothesis == (HOSE, kept)
+
+
+@pytest.mark.parametrize(("model_error", "is_asked"), [(0.004, False), (0.3, True)])
+def test_poor_fits_are_also_started_near_the_fit_without_the_effect(
+    monkeypatch, model_error, is_asked
+):
+    """Where fits from nominal values leave a large `model_error`, every effect is also started near
+    the base, and near the best fit when it is added to one."""
+    monkeypatch.setattr(single_effects, "transfer_theta", lambda *_: None)
+    started_near = []
+
+    def fit_one(job):
+        if not job.hypothesis:
+            return made_fit(0.0, model_error=0.3)
+        if isinstance(job.start, NearFit):
+            started_near.append(job.hypothesis)
+            return made_fit(50.0, *job.hypothesis)
+        return made_fit(10.0, *job.hypothesis, model_error=model_error)
+
+    workers = SimpleNamespace(
+        base=SimpleNamespace(rig=rig()),
+        fit=lambda jobs, report=None: [fit_one(job) for job in jobs],
+        observations=("point 1", "point 2"),
+    )
+    base, fits = fit_single_effects(workers, [HOSE, VOLUME])
+    assert base.evidence == 0.0
+    assert started_near == ([(HOSE,), (VOLUME,)] if is_asked else [])
+    assert [f.evidence for f in fits] == ([50.0, 50.0] if is_asked else [10.0, 10.0])
+    monkeypatch.setattr(stepwise_moves, "restart_job", lambda best, h, rig: FitJob(h))
+    started_near.clear()
+    best = made_fit(10.0, HOSE, model_error=0.3)
+    extensions = fit_extensions(workers, best, [HOSE, VOLUME], None)
+    assert started_near == ([(HOSE, VOLUME)] if is_asked else [])
+    assert extensions[0].evidence == (50.0 if is_asked else 10.0)
+
+
+def test_needless_effects_are_dropped_weakest_first(monkeypatch):
+    """Without the volume hardly any evidence is lost, without the hose more than a name needs.
+
+    An always-present effect is dropped only if the data are clearly against it."""
+    losses = {HOSE: MIN_LOG_BAYES_FACTOR + 1, VOLUME: MIN_LOG_BAYES_FACTOR - 1, ALWAYS_PRESENT: 0}
+    monkeypatch.setattr(fit_jobs, "transfer_theta", lambda *_: None)
+
+    def fit(jobs):
+        return [
+            made_fit(-sum(x for e, x in losses.items() if e not in j.hypothesis), *j.hypothesis)
+            for j in jobs
+        ]
+
+    workers = SimpleNamespace(base=None, fit=fit)
+    kept = drop_needless_effects(workers, made_fit(0.0, HOSE, VOLUME, ALWAYS_PRESENT))
+    assert kept.hypothesis == (HOSE, ALWAYS_PRESENT)
+    del losses[VOLUME]
+    losses[ALWAYS_PRESENT] = -4.0
+    kept = drop_needless_effects(workers, made_fit(0.0, HOSE, ALWAYS_PRESENT))
+    assert kept.hypothesis == (HOSE,)

@@ -1,0 +1,76 @@
+"""verdict.json: effects at shaft orders, and what a verdict must not list."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rippletwin.calibration.frequency_continuation import refine
+from rippletwin.calibration.misfit import Score
+from rippletwin.explanation.checks.alarms import Alarms
+from rippletwin.explanation.checks.cross_validation import Validation
+from rippletwin.explanation.localise.shaft_orders import ShaftOrders
+from rippletwin.explanation.search.stepwise_search import Search
+from rippletwin.explanation.verdict.decision import Decision
+from rippletwin.explanation.verdict.explanation import Explanation
+from rippletwin.explanation.verdict.verdict_file import verdict_dict
+from rippletwin.twin.twin import Twin
+from synthetic_observations import POINTS, make
+
+MODULATION = ShaftOrders(
+    0.02, 1e-9, 0.95, "speed_fluctuation", 4e-3, {"point 1": 4e-3}, (3.9e-3, 4.1e-3)
+)
+
+
+@pytest.fixture(scope="module")
+def explanation():
+    """A line without effects and with a speed fluctuation, explained as consistent."""
+    rig, observations, truth = make(np.random.default_rng(3), points=POINTS[:1])
+    base = refine(Twin(rig, observations), (), observations, [truth.theta])
+    scores = {"in_sample": Score(0.02, 0.01), "held_out": Score(0.02, 0.01)}
+    return Explanation(
+        rig=rig,
+        observations=tuple(observations),
+        search=Search(base, [base], base),
+        alarms=Alarms(0.004, (0.1, "load"), (0.1, "load"), (0.5, "point 1")),
+        validation=Validation(scores, scores, ("recording 1",), 0.0),
+        decision=Decision("consistent", base),
+        point_fits=(),
+        shaft_orders=MODULATION,
+    )
+
+
+def decided(explanation, verdict):
+    return replace(explanation, decision=replace(explanation.decision, verdict=verdict))
+
+
+@pytest.mark.parametrize("verdict", ["consistent", "calibration_only"])
+def test_a_speed_fluctuation_is_named_with_its_own_interval(explanation, verdict):
+    """The amplitude has the interval that was found for it; no posterior probability is stated,
+    because no evidence was calculated."""
+    result = verdict_dict(decided(explanation, verdict))
+    (effect,) = result["effects"]
+    assert result["verdict"] == "named" and result["mismatch"]["present"]
+    assert result["mismatch"]["where"]["element"] == "source"
+    assert effect["name"] == "speed_fluctuation"
+    amplitude = {"value": 4e-3, "ci95": [3.9e-3, 4.1e-3], "unit": "rad"}
+    assert effect["parameters"]["amplitude"] == amplitude
+    assert "probability" not in effect
+
+
+def test_an_unknown_interval_is_left_out(explanation):
+    """Without an interval the key is missing: an invented one would be worse."""
+    unknown = replace(explanation, shaft_orders=replace(MODULATION, interval=None))
+    (effect,) = verdict_dict(unknown)["effects"]
+    assert effect["parameters"]["amplitude"] == {"value": 4e-3, "unit": "rad"}
+
+
+@pytest.mark.parametrize("verdict", ["bad_data", "unexplained"])
+def test_shaft_effects_are_not_listed_where_nothing_is_established(explanation, verdict):
+    """Contradicting data establish no effect, and neither do shaft orders that an incomplete twin
+    interprets. The place of the mismatch is then not the source for their sake either."""
+    result = verdict_dict(decided(explanation, verdict))
+    assert result["verdict"] == verdict and result["effects"] == []
+    assert result["mismatch"]["where"]["element"] != "source"
+    is_mentioned = "indicate a speed fluctuation" in result["sentence"]
+    assert is_mentioned is (verdict == "unexplained")

@@ -1,0 +1,37 @@
+"""Windows put together: pairs of recorded ones, probes without noise, a few of a recording."""
+
+import numpy as np
+
+from rippletwin.learning.windows import noise_free_probes, pair_windows, spread_windows
+
+
+def test_pairs_are_consecutive_and_of_one_recording():
+    """By hand: five windows of one recording and two of the next; the fifth has no partner."""
+    first, second = pair_windows(np.array([0, 0, 0, 0, 0, 1, 1]))
+    assert first.tolist() == [0, 2, 5] and second.tolist() == [1, 3, 6]
+
+
+def test_a_single_window_makes_no_pair():
+    """Of one recording there is one window: two recordings are never joined."""
+    first, second = pair_windows(np.array([0, 1]))
+    assert first.size == second.size == 0
+
+
+def test_probes_begin_evenly_over_the_revolution():
+    """Two states of 8 points, 4 turns, 2 revolutions: each probe is its state's revolution without
+    its mean, begun a quarter later, and repeats."""
+    signal = np.stack([np.arange(8.0), np.arange(8.0) ** 2])[:, None]
+    probes = noise_free_probes(signal, turns=4, revolutions=2)
+    assert probes.shape == (8, 1, 16) and probes.dtype == np.float32
+    for state in range(2):
+        revolution = signal[state, 0] - signal[state, 0].mean()
+        for turn in range(4):
+            expected = np.tile(np.roll(revolution, -2 * turn), 2)
+            np.testing.assert_allclose(probes[4 * state + turn, 0], expected)
+
+
+def test_windows_are_spread_over_their_state():
+    """Of ten windows three: the first, the middle, the last; of two all, none of them twice."""
+    state = np.array(["H"] * 10 + ["S"] * 2)
+    chosen = spread_windows(state, 3)
+    assert chosen["H"].tolist() == [0, 4, 9] and chosen["S"].tolist() == [10, 11]

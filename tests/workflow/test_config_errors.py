@@ -1,0 +1,128 @@
+"""A wrong configuration ends with a short message that names the key and what it should be."""
+
+import pandas as pd
+import pytest
+import yaml
+from snakemake.exceptions import WorkflowError
+from snakemake.utils import validate
+
+from config_errors import check_config, check_datasets, check_names, read_rig
+from paths import ROOT
+from rippletwin.learning.architectures import ARCHITECTURES
+from workflow_copy import RIG
+
+SCHEMAS = ROOT / "workflow/schemas"
+DEFAULTS = yaml.safe_load((ROOT / "config/config.yaml").read_text())
+
+
+def dataset_table() -> pd.DataFrame:
+    path = ROOT / "config/datasets.tsv"
+    return pd.read_csv(path, sep="\t", dtype=str, keep_default_na=False)
+
+
+def message(call, *arguments) -> str:
+    with pytest.raises(WorkflowError) as caught:
+        call(*arguments)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"sed": 2}, "unknown key sed. Did you mean seeds?"),
+        ({"colour": "blue"}, "unknown key colour. Known here: results, case"),
+        ({"sst": DEFAULTS["sst"] | {"sise": 8}}, "unknown key sst.sise. Did you mean size?"),
+        ({"seeds": 0}, "seeds: 0: below 1"),
+        ({"noise": {"factor": "much"}}, "noise.factor: much: not of type number"),
+        ({"noise": {}}, "missing noise.factor"),
+        ({"scoring": {"pressure": "C3", "flow": "C2"}}, "C3: not one of C1, C2"),
+        ({"datasets": ["CFD-P", "CFD-P"]}, "an entry is given twice"),
+        ({"sst": [1] * 1000}, "sst: [1, 1, "),
+    ],
+)
+def test_each_wrong_key_has_a_short_line(changes, said):
+    """The line says the key, the value and the rule; no schema and no configuration is printed."""
+    text = message(check_config, DEFAULTS | changes, SCHEMAS / "config.schema.yaml")
+    assert said in text
+    assert len(text.splitlines()) == 2 and len(text) < 600
+
+
+def test_all_wrong_keys_are_told_at_once():
+    """Three mistakes, three lines, and where to read on."""
+    wrong = DEFAULTS | {"seeds": 0, "sed": 2, "noise": {}}
+    assert len(message(check_config, wrong, SCHEMAS / "config.schema.yaml").splitlines()) == 4
+
+
+def test_the_shipped_configuration_and_datasets_are_accepted():
+    """The counterpart: nothing is wrong with what a fresh checkout has."""
+    check_config(DEFAULTS, SCHEMAS / "config.schema.yaml")
+    check_names("architectures", DEFAULTS["architectures"], list(ARCHITECTURES))
+    table = dataset_table()
+    validate(table, SCHEMAS / "datasets.schema.yaml")
+    check_datasets(table)
+    check_names("datasets", DEFAULTS["datasets"], list(table["name"]))
+
+
+def test_an_unknown_name_is_named_with_its_neighbours():
+    """A dataset and a network, of which the schema does not know the names."""
+    text = message(check_names, "datasets", ["CFD-P", "CFDP"], list(dataset_table()["name"]))
+    assert "'CFDP' is not known. Did you mean CFD-P" in text and "'CFD-P'" not in text
+    assert "resnet18_1d" in message(check_names, "architectures", ["resnet18"], list(ARCHITECTURES))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"signal": "force"},
+        {"line": "none"},
+        {"twin": "calibrated", "signal": "pressure", "line": "pipe"},
+        {"twin": "none", "signal": "flow"},
+        {"twin": "none", "line": "twin"},
+        {"twin": "calibrated", "line": "twin", "uncorrected": "CFD-P"},
+        {"name": "a/b"},
+        {"extra": "x"},
+    ],
+)
+def test_the_schema_of_datasets_has_teeth(changes):
+    """Each row is wrong in one way: an unknown word, a twin without use, a use without a twin, a
+    comparison that is none, a slash in a file's name, a column nobody reads."""
+    row = {"name": "a", "signal": "pressure", "line": "pipe", "twin": "none", "uncorrected": "none"}
+    good = pd.DataFrame([row])
+    validate(good, SCHEMAS / "datasets.schema.yaml")
+    with pytest.raises(WorkflowError):
+        validate(pd.DataFrame([row | changes]), SCHEMAS / "datasets.schema.yaml")
+
+
+def test_datasets_differ_and_are_compared_with_known_ones():
+    """Two rows of one name; two names for one thing; a comparison with a row that is not there."""
+    table = dataset_table()
+    again = table[table["name"] == "CFD-P"]
+    assert "CFD-P, CFD-P: the same name" in message(check_datasets, pd.concat([table, again]))
+    other = again.assign(name="mine")
+    assert "CFD-P, mine: the same" in message(check_datasets, pd.concat([table, other]))
+    wrong = table.replace({"uncorrected": {"CFD-Q": "CFD-R"}})
+    assert "'CFD-R' is not known" in message(check_datasets, wrong)
+
+
+@pytest.mark.parametrize(
+    ("sheet", "said"),
+    [
+        ("", ["the whole file"]),
+        ("fluid:\n\tdensity: 870\n", ["line 2"]),
+        (RIG.replace("state: healthy", "state: Healthy"), ["recordings[0].state", "'Healthy'"]),
+        (RIG.replace("recordings:", "recording:"), ["recording"]),
+    ],
+)
+def test_a_wrong_sheet_ends_the_planning_with_one_line(tmp_path, sheet, said):
+    """The file and the place are named; nothing of YAML's own trace or of Python's is shown."""
+    (tmp_path / "rig.yaml").write_text(sheet)
+    text = message(read_rig, tmp_path / "rig.yaml")
+    assert text.startswith(f"config: case: {tmp_path / 'rig.yaml'}: ")
+    assert all(word in text for word in said)
+    assert "\n" not in text
+
+
+def test_a_sheet_in_order_is_read(tmp_path):
+    """Numbers are numbers, as for the jobs: 3.2e-5 has no sign that YAML 1.1 wants."""
+    (tmp_path / "rig.yaml").write_text(RIG.replace("9500000", "9.5e6"))
+    assert read_rig(tmp_path / "rig.yaml")["recordings"][0]["load_pressure"] == 9.5e6

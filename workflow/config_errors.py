@@ -1,0 +1,112 @@
+"""What is wrong with a configuration or with the case that it names, one short line an error.
+
+snakemake.utils.validate prints the whole schema and the whole configuration with the first error;
+a person needs the key, and what it should be.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import jsonschema
+import pandas as pd
+import yaml
+from snakemake.exceptions import WorkflowError
+
+from rippletwin.case.rig_yaml import read_sheet
+from rippletwin.errors import InputError
+
+MAX_VALUE_CHARACTERS = 60  # of a wrong value that a message shows
+
+
+def check_config(config: dict, schema: Path) -> None:
+    """Raise WorkflowError with a line for each key that violates the schema, a YAML file."""
+    validator = jsonschema.Draft202012Validator(yaml.safe_load(schema.read_text("utf-8")))
+    errors = sorted(validator.iter_errors(config), key=lambda error: list(map(str, error.path)))
+    lines = [line for error in errors for line in _lines(error)]
+    if lines:
+        raise WorkflowError("\n".join([*lines, "config/README.md explains every key."]))
+
+
+def check_names(key: str, names: Sequence[str], known: Sequence[str], remedy: str = "") -> None:
+    """Raise WorkflowError that names each of `names`, values of the config key, that is not known.
+
+    remedy : what to do where the name is meant as it is.
+    """
+    lines = [
+        f"config: {key}: {name!r} is not known. {_near(name, known)}{remedy}"
+        for name in names
+        if name not in known
+    ]
+    if lines:
+        raise WorkflowError("\n".join(lines))
+
+
+def check_datasets(table: pd.DataFrame) -> None:
+    """Raise WorkflowError where two rows of config/datasets.tsv have one name or are the same."""
+    for columns in (["name"], ["signal", "line", "twin"]):
+        twice = table[table.duplicated(columns, keep=False)]
+        if len(twice):
+            names = ", ".join(twice["name"])
+            raise WorkflowError(f"config/datasets.tsv: {names}: the same {', '.join(columns)}")
+    compared = [name for name in table["uncorrected"] if name != "none"]
+    check_names("datasets.tsv: uncorrected", compared, list(table["name"]))
+
+
+def read_rig(path: Path) -> dict:
+    """The sheet of the configured case; raises WorkflowError with what is wrong with it."""
+    try:
+        return read_sheet(path)
+    except InputError as error:
+        raise WorkflowError(f"config: case: {error}") from None
+
+
+def _lines(error: jsonschema.ValidationError) -> Iterator[str]:
+    path = list(error.absolute_path)
+    if error.validator == "additionalProperties":
+        known = list(error.schema["properties"])
+        for key in error.instance:
+            if key not in known:
+                yield f"config: unknown key {_dotted([*path, key])}. {_near(str(key), known)}"
+    elif error.validator == "required":
+        missing = [key for key in error.validator_value if key not in error.instance]
+        # jsonschema reports each missing key on its own; the first of them stands for all
+        if error.message.startswith(repr(missing[0])):
+            yield f"config: missing {', '.join(_dotted([*path, key]) for key in missing)}"
+    else:
+        value = str(error.instance)
+        if len(value) > MAX_VALUE_CHARACTERS:
+            value = value[:MAX_VALUE_CHARACTERS] + "..."
+        wanted = error.schema.get("description", "")
+        yield f"config: {_dotted(path)}: {value}: {_rule(error)}. {wanted}".rstrip()
+
+
+def _rule(error: jsonschema.ValidationError) -> str:
+    """What the violated keyword of the schema asks for."""
+    asked = error.validator_value
+    words = {
+        "type": f"not of type {asked}",
+        "enum": f"not one of {', '.join(map(str, asked))}" if error.validator == "enum" else "",
+        "minimum": f"below {asked}",
+        "maximum": f"above {asked}",
+        "exclusiveMinimum": f"not above {asked}",
+        "exclusiveMaximum": f"not below {asked}",
+        "minItems": f"fewer than {asked} entries",
+        "uniqueItems": "an entry is given twice",
+    }
+    return words.get(error.validator, f"{error.validator} {asked}")
+
+
+def _near(name: str, known: Sequence[str]) -> str:
+    near = difflib.get_close_matches(name, known, n=3)
+    if near:
+        return f"Did you mean {' or '.join(near)}? "
+    return f"Known here: {', '.join(known)}. "
+
+
+def _dotted(path: Sequence) -> str:
+    """sst.size from ["sst", "size"]; the whole configuration where the path is empty."""
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
+    return text.lstrip(".") or "the whole configuration"

@@ -1,0 +1,63 @@
+# Accuracies and simulated signals -> the paper's claims, and how alike the images are.
+rule claims:
+    input:
+        table=rules.accuracy_table.output.table,
+        paper=PAPER,
+        rig=rig_sheet(),
+        source=scripts_sources("claims.py"),
+    output:
+        table=report(
+            f"{RESULTS}/claims.csv",
+            category="claims",
+            caption="../report/claims.rst",
+        ),
+        comparisons=f"{RESULTS}/claims_compared.csv",
+        page=f"{RESULTS}/claims.md",
+        png=report(
+            f"{RESULTS}/figures/claims.png",
+            category="claims",
+            caption="../report/claims.rst",
+        ),
+        svg=f"{RESULTS}/figures/claims.svg",
+    log:
+        f"{RESULTS}/logs/claims.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/claims.tsv"
+    params:
+        rig=rig_sections("pump"),
+        samples_per_revolution=config["windows"]["samples_per_revolution"],
+    script:
+        "../scripts/claims.py"
+
+
+rule compare_sst:
+    input:
+        seeds=expand(f"{RESULTS}/seeds/{{dataset}}/single.zarr", dataset=PRESSURES),
+        recorded=rules.cut_windows.output.windows,
+        rig=rig_sheet(),
+        source=scripts_sources("compare_sst.py"),
+    output:
+        table=report(
+            f"{RESULTS}/similarity.csv",
+            category="simulated signals",
+            caption="../report/similarity.rst",
+        ),
+        png=report(
+            f"{RESULTS}/figures/sst_compared.png",
+            category="simulated signals",
+            caption="../report/similarity.rst",
+        ),
+        svg=f"{RESULTS}/figures/sst_compared.svg",
+    log:
+        f"{RESULTS}/logs/compare_sst.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/compare_sst.tsv"
+    params:
+        titles=[
+            "uncalibrated" if DATASETS[name].line == "pipe" else DATASETS[name].twin
+            for name in PRESSURES
+        ],
+        rig=rig_sections("pump"),
+        sst=config["sst"],
+    script:
+        "../scripts/compare_sst.py"

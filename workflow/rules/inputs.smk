@@ -1,0 +1,162 @@
+# What a rule's wildcards stand for: input files, parameters, and the files of a whole run.
+from rippletwin.learning.architectures import LONGEST_TRAININGS
+
+# ---- what a whole run makes ----
+
+
+def get_final_output():
+    """What a whole run makes with the configured datasets, networks and compound faults."""
+    wanted = [
+        rules.accuracy_table.output,
+        rules.claims.output,
+        rules.plot_accuracy.output,
+        rules.plot_calibration.output,
+        expand(rules.plot_confusion.output, dataset=CHOSEN),
+        expand(rules.plot_seeds.output, dataset=SIMULATED),
+    ]
+    if PRESSURES:
+        wanted.append(rules.compare_sst.output)
+    if corrected_pairs():
+        wanted.append(rules.report_cost.output)
+    if SIMULATED:
+        wanted += [rules.attention_table.output, rules.plot_ranks.output]
+        domains = [name for name in ("time", "image") if of_domain(name)]
+        wanted += expand(rules.plot_attention.output, dataset=SIMULATED, domain=domains)
+    if SIMULATED and STATES["compound"]:
+        wanted.append(rules.report_compound.output)
+        wanted += expand(rules.plot_compound_seeds.output, dataset=SIMULATED)
+    return wanted
+
+
+# ---- the pump and its line ----
+
+
+def leak_area_of(wildcards):
+    """Fault -> its leak, m2, for every fault of the state."""
+    areas = config["faults"]["leak_area"]
+    faults = wildcards.state.split("+")
+    return {fault: areas[fault] for fault in faults if fault in areas}
+
+
+def twin_of(wildcards):
+    """The calibrated twin, or the one that `explain` corrected."""
+    made_by = {"calibrated": rules.calibrate, "corrected": rules.explain}
+    return made_by[wildcards.twin].output.twin
+
+
+def states_of(wildcards):
+    """A store for each simulated state, of the line that carries the dataset's ripple."""
+    dataset = DATASETS[wildcards.dataset]
+    folder = f"propagated/{dataset.twin}" if dataset.line == "twin" else "faults"
+    return expand(f"{RESULTS}/{folder}/{{state}}.zarr", state=STATES[wildcards.faults])
+
+
+def seed_variable_of(wildcards):
+    """Variable of these stores; a flow sensor sees the flow that any line can be driven with."""
+    by_signal = {"pressure": "pressure", "flow": "source_flow"}
+    return by_signal[DATASETS[wildcards.dataset].signal]
+
+
+# ---- samples ----
+
+
+def every_seed(path):
+    """A pattern of stores with one for each {seed}; other wildcards stay."""
+    seeds = range(config["seeds"])
+    return [f"{RESULTS}/{path}".replace("{seed}", str(seed)) for seed in seeds]
+
+
+def recorded_signal_of(wildcards):
+    """Recorded windows of a dataset's signal; flow is estimated through the line of its twin."""
+    dataset = DATASETS[wildcards.dataset]
+    kind = f"flow_{dataset.twin}" if dataset.signal == "flow" else "pressure"
+    return f"{RESULTS}/recordings/{kind}.zarr"
+
+
+def samples_per_class_of(wildcards):
+    counts = config["samples_per_class"]
+    return counts["time" if wildcards.revolutions == "1" else "image"]
+
+
+def reference_of(wildcards):
+    """What the images of a dataset are scaled by."""
+    if DATASETS[wildcards.dataset].line == "rig":
+        return recorded_signal_of(wildcards)
+    return f"{RESULTS}/seeds/{wildcards.dataset}/single.zarr"
+
+
+# ---- networks ----
+
+
+def for_network(wildcards, time, image):
+    """The one of two paths that has the input of the wildcards' network."""
+    is_image = ARCHITECTURES[wildcards.architecture].domain == "image"
+    return image if is_image else time
+
+
+def recorded_of(wildcards):
+    """What a network is tested on."""
+    images = f"{RESULTS}/images/{{dataset}}/recorded.zarr"
+    return for_network(wildcards, recorded_signal_of(wildcards), images)
+
+
+def samples_of(wildcards):
+    """What a network learns from: a store a seed, or the recordings."""
+    if DATASETS[wildcards.dataset].line == "rig":
+        return recorded_of(wildcards)
+    return for_network(
+        wildcards,
+        every_seed("samples/{dataset}/single/{seed}x1.zarr"),
+        every_seed("images/{dataset}/single/{seed}.zarr"),
+    )
+
+
+def probes_of(wildcards):
+    """Simulated states without noise, as a network takes them."""
+    return for_network(
+        wildcards,
+        f"{RESULTS}/samples/{{dataset}}/probex1.zarr",
+        f"{RESULTS}/images/{{dataset}}/probe.zarr",
+    )
+
+
+def compound_samples_of(wildcards):
+    """Samples of compound faults for a network of a dataset, of the first seed."""
+    return for_network(
+        wildcards,
+        f"{RESULTS}/samples/{{dataset}}/compound/0x1.zarr",
+        f"{RESULTS}/images/{{dataset}}/compound/0.zarr",
+    )
+
+
+def priority_of(wildcards):
+    """Start the longest trainings first."""
+    name = wildcards.architecture
+    return 20 - LONGEST_TRAININGS.index(name) if name in LONGEST_TRAININGS else 10
+
+
+def learnt_share_of(wildcards):
+    """Early share of every recording that a network learns from: none of it from simulations."""
+    from_recordings = DATASETS[wildcards.dataset].line == "rig"
+    return config["experimental"]["training_share"] if from_recordings else 0.0
+
+
+def cylinder_class_of(wildcards):
+    """Class of a recorded cylinder fault where networks learn from recordings, as in scoring."""
+    dataset = DATASETS[wildcards.dataset]
+    return config["scoring"][dataset.signal] if dataset.line == "rig" else None
+
+
+# ---- tables ----
+
+
+def table_columns():
+    """Datasets of the accuracy table from left to right: the configured ones and the paper's."""
+    paper = set(pd.read_csv(PAPER)["dataset"])
+    return [name for name in DATASETS if name in CHOSEN or name in paper]
+
+
+def corrected_pairs():
+    """(dataset with the calibrated twin, the same with the corrected one), both configured."""
+    pairs = [(DATASETS[name].uncorrected, name) for name in CHOSEN]
+    return [pair for pair in pairs if pair[0] in CHOSEN]

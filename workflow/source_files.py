@@ -1,0 +1,100 @@
+"""Which of this repository's source files a Python script runs.
+
+Snakemake reruns a job when one of its input files changes, but it does not look into what a script
+imports. Rules therefore name these files as inputs.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+IMPORT_ROOTS = (ROOT / "src", ROOT / "workflow" / "scripts")
+"""Folders from which Python imports this repository's modules."""
+
+PLUGIN_FOLDERS = {
+    "src/rippletwin/twin/effects/library.py": "src/rippletwin/twin/effects",
+    "src/rippletwin/case/readers/registry.py": "src/rippletwin/case/readers",
+}
+"""Modules that import by a computed name -> the folder whose modules they import."""
+
+SUFFIXES = {".py", ".yaml"}  # code and data of a package
+
+
+def source_files_of(path: Path | str) -> list[Path]:
+    """Source files that running `path` imports, directly or not, late imports included; sorted.
+
+    path : a script or a module, anywhere; relative paths are below this repository. It is in the
+        result only where another file imports it.
+    """
+    pending = [_absolute(path)]
+    found: set[Path] = set()
+    while pending:
+        new = _imported_files(pending.pop()) - found
+        found |= new
+        pending += new
+    return sorted(found)
+
+
+def package_files(name: str) -> list[Path]:
+    """Every file of code or data of a package of src/, sorted: those of another program."""
+    return sorted(file for file in (ROOT / "src" / name).rglob("*") if file.suffix in SUFFIXES)
+
+
+@cache
+def _imported_files(file: Path) -> frozenset[Path]:
+    """Source files that `file` itself imports; a file is parsed once a process."""
+    found = {path for name in _imported_names(file) for path in _files_run_by(name)}
+    if file.is_relative_to(ROOT):
+        folder = PLUGIN_FOLDERS.get(file.relative_to(ROOT).as_posix())
+        if folder:
+            found |= set((ROOT / folder).glob("*.py"))
+    return frozenset(found)
+
+
+def _imported_names(file: Path) -> Iterator[str]:
+    """Dotted names in a file's import statements, wherever they are but for type checkers only."""
+    tree = ast.parse(file.read_text("utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
+            node.body = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            parents = _package_of(file, node.level) if node.level else ()
+            name = ".".join([*parents, *filter(None, [node.module])])
+            yield name
+            yield from (f"{name}.{alias.name}" for alias in node.names)
+
+
+def _package_of(file: Path, level: int) -> tuple[str, ...]:
+    """The package that `level` leading dots mean in a file."""
+    for root in IMPORT_ROOTS:
+        if file.is_relative_to(root):
+            return file.relative_to(root).parts[:-level]
+    raise ValueError(f"{file}: a relative import outside {', '.join(map(str, IMPORT_ROOTS))}")
+
+
+@cache
+def _files_run_by(name: str) -> frozenset[Path]:
+    """This repository's files that `import name` runs: each package's __init__ and the module."""
+    parts = name.split(".")
+    return frozenset(
+        file
+        for root in IMPORT_ROOTS
+        for depth in range(1, len(parts) + 1)
+        for file in (
+            root.joinpath(*parts[:depth], "__init__.py"),
+            root.joinpath(*parts[: depth - 1], f"{parts[depth - 1]}.py"),
+        )
+        if file.is_file()
+    )
+
+
+def _absolute(path: Path | str) -> Path:
+    path = Path(path)
+    return path if path.is_absolute() else ROOT / path
