@@ -27,8 +27,8 @@ from rippletwin.line.time_domain.line_elements import (
     capacitance,
 )
 from rippletwin.line.time_domain.method_of_characteristics import simulate, steps_a_period
-from rippletwin.line.time_domain.weighting_functions import summed_friction
 from rippletwin.twin.effects.side_branch import branch_admittance
+from summed_friction import summed_friction
 
 OIL = {"density": DENSITY, "viscosity": VISCOSITY}
 ORIFICE = End("orifice", 0.0, COEFFICIENT)

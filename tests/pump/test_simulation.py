@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from default_pump import LOAD, OIL, PIPE, POSITIONS, SPEED, relative_rms
-from rippletwin.pump.geometry import Geometry, kinematic_flow
+from kinematic_flow import kinematic_flow
+from rippletwin.pump.geometry import Geometry
 from rippletwin.pump.outlets import ConstantPressure, Pipe
 from rippletwin.pump.simulation import simulate
 

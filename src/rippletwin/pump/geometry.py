@@ -99,18 +99,5 @@ class Geometry:
         return _smooth(rising) * _smooth(falling)
 
 
-def kinematic_flow(pump: dict, speed_rpm: float, angle_deg: np.ndarray) -> np.ndarray:
-    """Delivery of an incompressible, leak-free pump with ideal ports, m3/s at `angle_deg`.
-
-    The sum of the displacing pistons' speeds (Ivantysyn & Ivantysynova 2001, Hydrostatic Pumps
-    and Motors, ch. 2): what `simulate` tends to for a stiff fluid and no overlap.
-    """
-    geometry = Geometry.from_dict(pump)
-    k = np.arange(geometry.pistons)[:, None]
-    phi = np.radians(angle_deg) - 2 * np.pi * k / geometry.pistons
-    rate = -geometry.volume_slope(phi) * speed_rpm * np.pi / 30
-    return np.maximum(rate, 0.0).sum(axis=0)
-
-
 def _smooth(u):
     return u * u * (3 - 2 * u)

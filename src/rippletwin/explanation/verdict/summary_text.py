@@ -150,7 +150,7 @@ def liquid_like_air(names: Sequence[str], pressures: Sequence[float | None]) -> 
 
 def _source_free(e: Explanation) -> list[str]:
     """Whether the accepted effects are also seen if the source is unknown."""
-    for row in compare_evidence(e.search, e.source_free_fits):
+    for row in compare_evidence(e.search.leading_fits, e.source_free_fits):
         if row["effects"] == e.decision.accepted.label:
             if row["source_free"] > SOURCE_FREE_SHARE * row["informed"]:
                 return ["The evidence remains if the source is assumed unknown."]

@@ -36,18 +36,6 @@ HEAT_RATES = np.array(
 )
 
 
-def summed_friction(sigma: np.ndarray) -> np.ndarray:
-    """sigma + 8 + 4 sum_k m_k sigma/(sigma + n_k): stands for `segment.scaled_friction`.
-
-    `sigma` = s R^2/nu, any shape; exact it would be sigma I0/I2.
-    """
-    sigma = np.asarray(sigma, dtype=complex)
-    memory = np.sum(
-        FRICTION_WEIGHTS * sigma[..., None] / (sigma[..., None] + FRICTION_RATES), axis=-1
-    )
-    return sigma + 8.0 + 4.0 * memory
-
-
 def recursion(step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """e, g, h (10,) of y_k <- e_k y_k + g_k dq - h_k dq_last over a step of tau = `step`.
 
