@@ -25,6 +25,7 @@ HIGHEST_TRACKED_HZ = 5000.0
 ENOUGH = 20
 HALF_WIDTH, SHAPE = 24, 14.0  # of the interpolation kernel: 1e-6 up to 0.4 times the sampling rate
 FRACTIONS = 4096
+WINDOWS_AT_ONCE = 256  # transformed together, so that memory does not grow with the recording
 
 
 @dataclass(frozen=True)
@@ -149,8 +150,10 @@ def _sliding_orders(smooth, sampling_rate_hz, time, step, highest):
     orders = np.empty((starts.size, len(smooth), highest + 1), complex)
     for s, row in enumerate(smooth):
         even = map_coordinates(row, position[None], order=3, prefilter=False, mode="nearest")
-        windows = np.lib.stride_tricks.sliding_window_view(even, step)[::hop]
-        orders[:, s] = np.fft.rfft(windows - row.mean(), axis=1)[:, : highest + 1]
+        windows, mean = np.lib.stride_tricks.sliding_window_view(even, step)[::hop], row.mean()
+        for first in range(0, starts.size, WINDOWS_AT_ONCE):
+            some = slice(first, first + WINDOWS_AT_ONCE)
+            orders[some, s] = np.fft.rfft(windows[some] - mean, axis=1)[:, : highest + 1]
     # refer every window to one origin of the angle
     turn = np.exp(-2j * np.pi * np.outer(angle[starts], np.arange(highest + 1)))
     return orders * turn[:, None, :] * (2 / step), angle[starts] + 0.5
