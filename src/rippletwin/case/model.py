@@ -182,11 +182,12 @@ class Rig:
 
 @dataclass(frozen=True)
 class Case:
-    """A folder with a rig and its recordings."""
+    """A folder with a rig and its recordings; `warnings` are in plain words, one line each."""
 
     folder: Path
     rig: Rig
     recordings: tuple[Recording, ...]
+    warnings: tuple[str, ...] = ()
 
     @property
     def healthy(self) -> list[Recording]:

@@ -27,6 +27,7 @@ KERNEL_HALF_WIDTH = 24  # samples; with KERNEL_SHAPE right to 1e-6 up to 0.4 tim
 KERNEL_SHAPE = 14.0
 KERNEL_FRACTIONS = 4096  # of a sample, at which the kernel is tabulated
 SIGNIFICANT_POWER = 10.0  # of a mean order over its scatter's, to be tracked
+WINDOWS_AT_ONCE = 256  # transformed together, so that memory does not grow with the recording
 
 
 @dataclass(frozen=True)
@@ -153,8 +154,10 @@ def _sliding_orders(smooth, sampling_rate_hz, time, step, highest):
     orders = np.empty((starts.size, len(smooth), highest + 1), complex)
     for s, row in enumerate(smooth):
         even = map_coordinates(row, position[None], order=3, prefilter=False, mode="nearest")
-        windows = np.lib.stride_tricks.sliding_window_view(even, step)[::hop]
-        orders[:, s] = np.fft.rfft(windows - row.mean(), axis=1)[:, : highest + 1]
+        windows, mean = np.lib.stride_tricks.sliding_window_view(even, step)[::hop], row.mean()
+        for first in range(0, starts.size, WINDOWS_AT_ONCE):
+            some = slice(first, first + WINDOWS_AT_ONCE)
+            orders[some, s] = np.fft.rfft(windows[some] - mean, axis=1)[:, : highest + 1]
     # Refer every window to one origin of the angle.
     turn = np.exp(-2j * np.pi * np.outer(angle[starts], np.arange(highest + 1)))
     return orders * turn[:, None, :] * (2 / step), angle[starts] + 0.5

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 
@@ -14,8 +15,14 @@ from rippletwin.spectra.observation import Observation, observe, revolutions_of
 SIGNIFICANT_POWER = 20.0  # |X|^2 over its variance; pure noise exceeds it once in 5e8
 
 
-def summarise_case(case: Case) -> Iterator[str]:
-    """Lines of text: the rig in one, then every recording as it is analysed."""
+def summarise_case(
+    case: Case, progress: Callable[[str, int, int], None] | None = None
+) -> Iterator[str]:
+    """Lines of text: the rig in one, then every recording as it is analysed.
+
+    `progress` is called with a recording's label, how many steps of its analysis are done, and of
+    how many.
+    """
     rig = case.rig
     sensors = ", ".join(f"{s.name} at {s.position:g} m" for s in rig.sensors) or "none"
     yield f"{case.folder}: {len(rig.line)} segment(s), {rig.length:g} m, load: {rig.load.kind}"
@@ -24,13 +31,16 @@ def summarise_case(case: Case) -> Iterator[str]:
     for recording in case.recordings:
         yield f"{recording.label} ({recording.kind}, {recording.state})"
         if recording.kind == "periodic":
-            yield from _periodic(recording, revolutions_of(recording, rig), rig)
+            step = None if progress is None else partial(progress, recording.label)
+            yield from _periodic(recording, revolutions_of(recording, rig), rig, step)
         else:
             yield from _spectral(recording, observe(recording, rig))
 
 
-def _periodic(recording: Recording, revolutions: Revolutions, rig: Rig) -> Iterator[str]:
-    observation = observe(recording, rig, revolutions=revolutions)
+def _periodic(
+    recording: Recording, revolutions: Revolutions, rig: Rig, progress: Callable | None
+) -> Iterator[str]:
+    observation = observe(recording, rig, revolutions=revolutions, progress=progress)
     speed = revolutions.speed_hz
     yield (
         f"  {len(speed)} whole revolutions at {60 * observation.speed_hz:.2f} r/min (nominal "

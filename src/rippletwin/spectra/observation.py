@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,6 +64,7 @@ def observe(
     max_frequency_hz: float | None = None,
     piston_harmonics_only: bool = False,
     revolutions: Revolutions | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Observation:
     """The observation of a recording.
 
@@ -70,11 +72,12 @@ def observe(
         that is lower, or all of a spectrum.
     piston_harmonics_only : keep only the orders that are multiples of the number of pistons.
     revolutions : of a periodic recording, where they are known already (`revolutions_of`).
+    progress : called with how many steps of a periodic recording's analysis are done, and of all.
     """
     if recording.kind == "periodic":
         revolutions = revolutions or revolutions_of(recording, rig)
         return _observe_periodic(
-            recording, rig, revolutions, max_frequency_hz, piston_harmonics_only
+            recording, rig, revolutions, max_frequency_hz, piston_harmonics_only, progress
         )
     if recording.kind == "random":
         return _observe_random(recording, rig, max_frequency_hz)
@@ -95,13 +98,13 @@ def revolutions_of(
 
 
 def _observe_periodic(
-    recording, rig, revolutions, max_frequency_hz, piston_harmonics_only
+    recording, rig, revolutions, max_frequency_hz, piston_harmonics_only, progress
 ) -> Observation:
     speed_hz = mean_speed(revolutions.speed_hz)
     highest = _highest(max_frequency_hz, recording.sampling_rate_hz)
     orders = np.arange(1, int(highest / speed_hz) + 1)
-    spectra = peak_amplitudes(revolutions.windows)[:, :, orders]
-    values, covariance = harmonics_at_mean_speed(spectra, revolutions.speed_hz, orders)
+    spectra = np.stack([peak_amplitudes(window)[:, orders] for window in revolutions.windows])
+    values, covariance = harmonics_at_mean_speed(spectra, revolutions.speed_hz, orders, progress)
     if piston_harmonics_only:
         kept = orders % rig.pump["pistons"] == 0
         orders, values, covariance = orders[kept], values[:, kept], covariance[kept]
