@@ -69,7 +69,7 @@ def harmonics_at_mean_speed(
                 np.flatnonzero(band == each),
                 rate / (4 * np.pi * 2.0 ** (each / BANDS_PER_OCTAVE)),
             )
-            for which, *found in _regress(data[:, own], deviation, chirp):
+            for which, *result in _regress(data[:, own], deviation, chirp):
                 weights[own[which]], unknown[own[which]], residual[:, own[which]] = result
             if progress is not None:
                 progress(done, len(bands))
