@@ -40,8 +40,8 @@ def test_blocks_are_as_good_as_one_regression(monkeypatch):
     speed, spectra, true = delayed(300, 0)
     orders = np.full(COPIES, ORDER)
     errors = []
-    for most in (speed_regression.MAX_IN_ONE, 1000):
-        monkeypatch.setattr(speed_regression, "MAX_IN_ONE", most)
+    for most in (speed_regression.MAX_REVOLUTIONS_TOGETHER, 1000):
+        monkeypatch.setattr(speed_regression, "MAX_REVOLUTIONS_TOGETHER", most)
         values, covariance = harmonics_at_mean_speed(spectra, speed, orders)
         error = np.abs(values[0] - true) ** 2
         assert np.mean(error / covariance[:, 0, 0].real) == pytest.approx(1.0, abs=0.5)
