@@ -81,7 +81,7 @@ def compute_baselines(explanation) -> dict:
     return {
         "nominal": misfit(likelihood, nominal).relative,
         "segments": {
-            "calibrated": _segments(base),
+            "calibrated": _segments(explanation.without_effects),
             "corrected": _segments(accepted),
         },
         "bic": pick_by_bic(explanation),
