@@ -17,7 +17,7 @@ from rippletwin.case.model import absolute
 class Geometry:
     """The keys of rig.yaml's `pump`, SI units; defaults describe a pump of 42 cm3/rev.
 
-    Where the defaults come from is told in docs/pump.md.
+    Where the defaults come from is told in docs/explanation/pump.md.
     """
 
     pistons: int = 9

@@ -4,8 +4,8 @@ The lumped pump as a source is its flow into a constant pressure and the mean ad
 chambers beside it (`source_admittance`). But ports open and close as the shaft turns, and the
 flow through one that is nearly shut goes with the root of the pressure drop: what the line's own
 ripple does to the flow is partly at other harmonics and no proportion of it. On the default pump in
-a 5 m pipe that is 5 % of the ripple (docs/pump.md). Once an explanation tells the pressure at the
-outlet, the pump is simulated against it (waveform relaxation; Lelarasmee, Ruehli &
+a 5 m pipe that is 5 % of the ripple (docs/explanation/pump.md). Once an explanation tells the
+pressure at the outlet, the pump is simulated against it (waveform relaxation; Lelarasmee, Ruehli &
 Sangiovanni-Vincentelli 1982, IEEE Trans. CAD 1, 131), and the source is the flow that with the
 same admittance beside it gives what this pump delivers there.
 """
