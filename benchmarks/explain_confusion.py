@@ -25,7 +25,7 @@ import numpy as np
 from tqdm import tqdm
 
 from rippletwin.calibration.misfit import relative_misfit
-from rippletwin.calibration.whitening import smooth_basis
+from rippletwin.calibration.smooth_source import smooth_basis
 from rippletwin.case.load import load_case
 from rippletwin.explanation.explain import HIGHEST_HZ
 from rippletwin.explanation.fit_jobs import open_workers

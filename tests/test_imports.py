@@ -35,8 +35,9 @@ ROOMS = (
 ASIDE = {"learning": ("errors", "store")}
 """Rooms outside that order, and what each may import besides itself."""
 
-EXPLANATION = (("thresholds", "fit_jobs"), ("search",), ("localise",), ("checks",), ("verdict",))
-"""Parts of `explanation` from the bottom, `explain` above all; `fit_jobs` may read `thresholds`."""
+EXPLANATION = (("thresholds", "fit_jobs"), ("search", "localise"), ("checks",), ("verdict",))
+"""Parts of `explanation` from the bottom, `explain` above them all; those of one level are apart,
+but that `fit_jobs` may read `thresholds`."""
 
 MAX_PACKAGES, MAX_LOOSE_MODULES = 11, 5
 

@@ -8,8 +8,8 @@ from itertools import product
 from pathlib import Path
 
 from rippletwin.calibration.fit import Fit, Hypothesis
-from rippletwin.calibration.multistart import align_shaft_angles
 from rippletwin.calibration.posterior import Posterior
+from rippletwin.calibration.shaft_angles import align_shaft_angles
 from rippletwin.case.load import load_case
 from rippletwin.explanation.explain import observe_whole_and_halves, prepare_base
 from rippletwin.explanation.fit_jobs import (

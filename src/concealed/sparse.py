@@ -29,15 +29,12 @@ def pick_by_matching_pursuit(base, candidates: Sequence, observations: Sequence)
     """
     likelihood = Likelihood(base.twin, observations)
     theta = base.twin.theta
-    likelihood.estimate_errors(likelihood.forward(theta))
-    residual = likelihood.residual(theta)
-    nuisance = np.stack(
-        [
-            likelihood.residual(theta + DIFFERENCE_STEP * unit) - residual
-            for unit in np.eye(len(theta))
-        ],
-        axis=1,
-    )
+    prediction = likelihood.predict(theta)
+    likelihood.estimate_errors(prediction, theta)
+    residual = likelihood.residual(theta, prediction)
+    moved = [theta + DIFFERENCE_STEP * unit for unit in np.eye(len(theta))]
+    changes = [likelihood.residual(m, likelihood.predict(m)) - residual for m in moved]
+    nuisance = np.stack(changes, axis=1)
     basis, _ = np.linalg.qr(nuisance)
     names, atoms = [], []
     for effect, place in candidates:
@@ -64,5 +61,6 @@ def _atoms(base, effect, place, likelihood: Likelihood, residual: np.ndarray) ->
         for p in effect.parameters(base.twin.rig, place)
     ]
     for values in product(*scans):
-        changed = other.residual(np.concatenate([base.twin.theta, values]))
+        moved = np.concatenate([base.twin.theta, values])
+        changed = other.residual(moved, other.predict(moved))
         yield changed[: len(residual)] - residual  # the effect's own priors come last

@@ -14,10 +14,10 @@ from types import SimpleNamespace
 import numpy as np
 
 from concealed.sparse import pick_by_matching_pursuit
-from rippletwin.calibration.calibrate import align
 from rippletwin.calibration.likelihood import Likelihood
 from rippletwin.calibration.misfit import misfit
 from rippletwin.calibration.report import segment_table
+from rippletwin.calibration.shaft_angles import fit_shaft_angles
 from rippletwin.case.load import load_case
 from rippletwin.explanation.explain import explain
 from rippletwin.explanation.search.stepwise_search import applicable_candidates
@@ -74,8 +74,9 @@ def compute_baselines(explanation) -> dict:
     """
     base, accepted = explanation.search.base, explanation.decision.accepted
     observations = list(explanation.observations)
-    likelihood = Likelihood(base.twin.with_(theta=np.zeros_like(base.twin.theta)), observations)
-    nominal = align(likelihood, np.zeros(len(likelihood.twin.parameters)))
+    # Evenness 1: the angles are those of the least misfit of the whole ripple.
+    likelihood = Likelihood(base.twin, observations, evenness=1.0)
+    nominal = fit_shaft_angles(likelihood, np.zeros_like(base.twin.theta))
     candidates = applicable_candidates(explanation.rig, observations)
     return {
         "nominal": misfit(likelihood, nominal).relative,

@@ -7,10 +7,19 @@ it runs, so that the command line answers at once.
 from __future__ import annotations
 
 import argparse
+import math
+import os
+import signal
 import sys
+from contextlib import contextmanager
+from pathlib import Path
 
 from rippletwin import __version__
 from rippletwin.errors import InputError
+
+BAD_INPUT, INTERRUPTED, CLOSED_PIPE = 2, 130, 141  # exit codes; 128 and the signal's number
+MAX_PROCESSES = 1024
+EFFECTIVE = os.access in os.supports_effective_ids
 
 
 def check(commands) -> None:
@@ -19,11 +28,17 @@ def check(commands) -> None:
     parser.add_argument("case", help="a folder with a rig.yaml")
 
     def run(arguments) -> int:
+        from threadpoolctl import threadpool_limits
+
         from rippletwin.case.load import load_case
         from rippletwin.spectra.case_summary import summarise_case
 
-        for line in summarise_case(load_case(arguments.case)):
-            print(line)
+        case = load_case(arguments.case)
+        _warn(case)
+        # one thread: the matrices are small, and threads only wait for each other
+        with threadpool_limits(1), _progress_bars(passing=True) as progress:
+            for line in summarise_case(case, progress):
+                print(line, flush=True)
         return 0
 
     parser.set_defaults(run=run)
@@ -43,6 +58,8 @@ def calibrate(commands) -> None:
     parser.add_argument("--max-frequency", type=float, metavar="HZ", help="use nothing above it")
 
     def run(arguments) -> int:
+        _check_max_frequency(arguments.max_frequency)
+        _check_out(arguments.out)
         from rippletwin.calibration import report
         from rippletwin.calibration.calibrate import Settings
         from rippletwin.calibration.calibrate import calibrate as fit
@@ -58,7 +75,17 @@ def calibrate(commands) -> None:
                 "none has state: healthy",
                 "calibration needs at least one healthy recording",
             )
+        _warn(case)
         observations = [observe(r, case.rig, piston_harmonics_only=True) for r in case.recordings]
+        lowest = max(o.frequency_hz[0] for o in observations)
+        if arguments.max_frequency is not None and arguments.max_frequency < lowest:
+            raise InputError(
+                "command line",
+                "--max-frequency",
+                f"{arguments.max_frequency:g} Hz leaves nothing of a recording, whose lowest "
+                f"frequency is {lowest:.4g} Hz",
+                "give a multiple of the pump's piston frequency, or leave it out",
+            )
         twin = Twin(case.rig, observations, friction=arguments.friction)
         settings = Settings(max_frequency_hz=arguments.max_frequency)
         calibration = fit(twin, observations, settings, progress=print)
@@ -96,12 +123,11 @@ def explain(commands) -> None:
 
     def run(arguments) -> int:
         import json
-        import os
 
+        _check_processes(arguments.processes)
+        _check_out(arguments.out)
         # One thread a process: the matrices are small, and the processes share the cores.
         os.environ.setdefault("OMP_NUM_THREADS", "1")
-        from tqdm import tqdm
-
         from rippletwin.case.load import load_case
         from rippletwin.explanation.checks.bootstrap import MIN_DRAWS
         from rippletwin.explanation.explain import explain as find
@@ -115,18 +141,9 @@ def explain(commands) -> None:
                 f"give at least {MIN_DRAWS}, or leave it out",
             )
         case = load_case(arguments.case, states={"healthy"})
-        bars = {}
-
-        def progress(what, done, total):
-            if what not in bars:
-                bars[what] = tqdm(total=total, desc=what, disable=arguments.json_only)
-            bars[what].update(done - bars[what].n)
-
-        try:
+        _warn(case)
+        with _progress_bars(arguments.json_only) as progress:
             explanation = find(case, arguments.processes, progress, arguments.bootstrap)
-        finally:
-            for bar in bars.values():
-                bar.close()
         result = write_verdict(explanation, arguments.out)
         if not arguments.no_figures:
             from rippletwin.figures.explanation import draw
@@ -138,11 +155,98 @@ def explain(commands) -> None:
     parser.set_defaults(run=run)
 
 
+@contextmanager
+def _progress_bars(quiet: bool = False, passing: bool = False):
+    """A function of (what, done, total) that draws one bar for each `what` on standard error.
+
+    Nothing is drawn where standard error is no terminal. `passing` bars are for work that is
+    mostly short: they appear after two seconds, and go when they are full.
+    """
+    from tqdm import tqdm
+
+    bars = {}
+
+    def progress(what: str, done: int, total: int) -> None:
+        if what not in bars:
+            bars[what] = tqdm(
+                total=total,
+                desc=what,
+                disable=True if quiet else None,
+                leave=not passing,
+                delay=2.0 if passing else 0.0,
+            )
+        bars[what].update(done - bars[what].n)
+        if passing and done >= total:
+            bars.pop(what).close()
+
+    try:
+        yield progress
+    finally:
+        for bar in bars.values():
+            bar.close()
+
+
+def _warn(case) -> None:
+    """Write a case's warnings to standard error."""
+    for warning in case.warnings:
+        print(f"rippletwin: warning: {warning}", file=sys.stderr)
+
+
+def _check_max_frequency(value: float | None) -> None:
+    if value is not None and not (math.isfinite(value) and value > 0):
+        raise InputError(
+            "command line",
+            "--max-frequency",
+            f"{value:g} is no frequency",
+            "give a positive number of Hz, or leave it out",
+        )
+
+
+def _check_processes(value: int) -> None:
+    if not 1 <= value <= MAX_PROCESSES:
+        raise InputError(
+            "command line",
+            "--processes",
+            f"{value} processes cannot be started",
+            f"give a number from 1 to {MAX_PROCESSES}; as many as there are processors is best",
+        )
+
+
+def _check_out(out: str) -> None:
+    """Raise InputError where results could not be written to the folder `out`.
+
+    This is asked before anything is fitted, so that hours of fitting are not lost at the end.
+    """
+    problem = "no folder is named" if not out.strip() else None
+    try:
+        place = Path(out).absolute()
+        while problem is None and not place.exists():
+            place = place.parent
+        if problem is None and not place.is_dir():
+            problem = f"{place} is a file, not a folder"
+        elif problem is None and not os.access(place, os.W_OK | os.X_OK, effective_ids=EFFECTIVE):
+            problem = f"you are not allowed to write to {place}"
+    except (OSError, ValueError) as error:
+        problem = f"cannot be opened ({getattr(error, 'strerror', None) or error})"
+    if problem is not None:
+        raise InputError("command line", "--out", problem, "name a folder that you may write to")
+
+
 COMMANDS = (check, calibrate, explain)
 
 
+def _end_quietly() -> None:
+    """In a process that fits: let Ctrl-C end it without a traceback."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def main(argv: list[str] | None = None) -> int:
-    """Run one command; bad input is told on standard error and ends with exit code 2."""
+    """Run one command.
+
+    Returns the exit code: 0; 2 for bad input, which is reported on standard error with one line
+    for each fault; 130 after Ctrl-C and 141 where the reader of standard output has gone, both
+    without a word.
+    """
     parser = argparse.ArgumentParser(prog="rippletwin", description=__doc__.splitlines()[0])
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
@@ -150,10 +254,21 @@ def main(argv: list[str] | None = None) -> int:
         add(commands)
     arguments = parser.parse_args(argv)
     try:
-        return arguments.run(arguments)
+        os.register_at_fork(after_in_child=_end_quietly)
+        code = arguments.run(arguments)
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        return code
     except InputError as error:
-        print(f"rippletwin: {error}", file=sys.stderr)
-        return 2
+        for each in error.errors:
+            print(f"rippletwin: {each}", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except BrokenPipeError:
+        # What is left in the buffer has no reader: it goes nowhere when the interpreter ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return CLOSED_PIPE
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from virtualrig.drawn_effect import DrawnEffect, RigContext, log_between
+from virtualrig.node_elements import ATMOSPHERE
 
 PASSIVE_SHARE = 0.9  # of the gain at which a valve begins to feed the line at some frequency
 
@@ -162,7 +163,7 @@ def accumulator(rig: RigContext, level: float) -> DrawnEffect:
     arguments = {
         "position": position,
         "gas_volume": log_between(2e-8, 5e-6, level) * rig.volume_scale(rig.segment_at(position)),
-        "gas_pressure": rig.pressure,
+        "gas_pressure": rig.pressure + ATMOSPHERE,
     }
     return DrawnEffect("accumulator", "position", arguments, level, position)
 

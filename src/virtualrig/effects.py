@@ -132,7 +132,7 @@ def sensor_delay(draft: Draft, sensor: int, delay: float) -> None:
 def accumulator(
     draft: Draft, position: float, gas_volume: float, gas_pressure: float, exponent: float = 1.4
 ) -> None:
-    """Gas of volume `gas_volume`, m3, at absolute pressure `gas_pressure`, Pa; nonlinear."""
+    """Gas of volume `gas_volume`, m3, at the absolute pressure `gas_pressure`, Pa; nonlinear."""
     draft.fit(position, gas_volume=gas_volume, gas_pressure=gas_pressure, gas_exponent=exponent)
 
 

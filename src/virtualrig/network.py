@@ -197,10 +197,8 @@ def state_at_rest(network: Network, line: waves.Line, pressure: float, flow: flo
     node = np.zeros((multistep.DEPTH, node_elements.NODE_STATES, len(network.nodes)))
     node[:, node_elements.STORED] = table[:, node_elements.VOLUME] * pressure
     gas = table[:, node_elements.GAS_VOLUME]
-    exponent = 1 / table[:, node_elements.GAS_EXPONENT]
-    node[:, node_elements.STORED] -= (
-        gas * (table[:, node_elements.GAS_PRESSURE] / pressure) ** exponent
-    )
+    ratio = table[:, node_elements.GAS_PRESSURE] / (pressure + node_elements.ATMOSPHERE)
+    node[:, node_elements.STORED] -= gas * ratio ** (1 / table[:, node_elements.GAS_EXPONENT])
     arm = table[:, node_elements.ARM_STIFFNESS] > 0
     node[:, node_elements.ARM_VOLUME, arm] = pressure / table[arm, node_elements.ARM_STIFFNESS]
     return waves.State(

@@ -8,10 +8,12 @@ from numba import njit
 
 from virtualrig.pump import orifice_flow
 
+ATMOSPHERE = 1.01325e5  # Pa; all pressures are gauge pressures, unless called absolute
+
 # columns of the node table; flows leave the node, pressures in Pa
 (
     VOLUME,  # compliance of a volume, m3/Pa
-    GAS_VOLUME,  # accumulator: gas volume at GAS_PRESSURE, polytropic exponent GAS_EXPONENT
+    GAS_VOLUME,  # accumulator: volume at absolute GAS_PRESSURE, polytropic exponent GAS_EXPONENT
     GAS_PRESSURE,
     GAS_EXPONENT,
     LEAK,  # conductance to the tank, m3/s/Pa
@@ -58,9 +60,10 @@ def settle_node(table, history, state, lead, wave_in, wave_lead, guess):
     for _ in range(50):
         stored, compliance = table[VOLUME] * p, table[VOLUME]
         if table[GAS_VOLUME] > 0:
-            gas = table[GAS_VOLUME] * (table[GAS_PRESSURE] / p) ** (1 / table[GAS_EXPONENT])
+            absolute = p + ATMOSPHERE
+            gas = table[GAS_VOLUME] * (table[GAS_PRESSURE] / absolute) ** (1 / table[GAS_EXPONENT])
             stored -= gas
-            compliance += gas / (p * table[GAS_EXPONENT])
+            compliance += gas / (absolute * table[GAS_EXPONENT])
         root, slope = orifice_flow(p, 1e3)
         opening = open_0 + open_1 * p
         out = table[LEAK] * (p - table[TANK]) + table[ORIFICE] * opening * root
@@ -73,7 +76,8 @@ def settle_node(table, history, state, lead, wave_in, wave_lead, guess):
             break
     state[STORED] = table[VOLUME] * p
     if table[GAS_VOLUME] > 0:
-        state[STORED] -= table[GAS_VOLUME] * (table[GAS_PRESSURE] / p) ** (1 / table[GAS_EXPONENT])
+        ratio = table[GAS_PRESSURE] / (p + ATMOSPHERE)
+        state[STORED] -= table[GAS_VOLUME] * ratio ** (1 / table[GAS_EXPONENT])
     state[ARM_FLOW] = arm_0 + arm_1 * p
     state[ARM_VOLUME] = (history[ARM_VOLUME] + state[ARM_FLOW]) / lead
     state[VALVE] = open_0 + open_1 * p - 1

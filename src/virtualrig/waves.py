@@ -12,8 +12,7 @@ import numpy as np
 from numba import njit
 
 from virtualrig.multistep import LEAD, combine_past, extrapolate
-
-ATMOSPHERE = 1.01325e5
+from virtualrig.node_elements import ATMOSPHERE
 
 
 class Line(NamedTuple):

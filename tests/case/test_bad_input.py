@@ -1,34 +1,24 @@
 """Bad input is an InputError that names file, field and remedy; each test spoils a good case once.
 
-`test_case_load.py` shows that the unspoilt case is read, so it is the spoiling that is refused.
+`test_load.py` shows that the unspoilt case is read, so it is the spoiling that is refused.
 """
 
 import numpy as np
 import pytest
 
-from case_folders import RATE, ripple, sheet, write_case, write_hdf5
+from case_folders import (
+    RATE,
+    errors_of,
+    refused,
+    ripple,
+    sheet,
+    spoilt,
+    told,
+    write_case,
+    write_hdf5,
+)
 from rippletwin.case.load import load_case
 from rippletwin.errors import InputError
-
-
-def refused(folder, file, field, *words):
-    """Load `folder`; the error must name `file` and `field` and say `words`, with a remedy."""
-    with pytest.raises(InputError) as caught:
-        load_case(folder)
-    error = caught.value
-    assert error.file.endswith(file), error
-    assert error.field == field, error
-    assert error.remedy, error
-    for word in words:
-        assert word in str(error), error
-
-
-def spoilt(folder, spoil, pressure="ripple"):
-    """A case whose sheet `spoil` has changed."""
-    content = sheet()
-    spoil(content)
-    write_case(folder, content, pressure)
-
 
 # the sheet
 
@@ -87,7 +77,7 @@ def test_sensor_outside_the_line(tmp_path):
 
 def test_two_sensors_of_one_name(tmp_path):
     spoilt(tmp_path, lambda c: c["sensors"][1].update(name="p1"))
-    refused(tmp_path, "rig.yaml", "sensors[0].name", "p1 twice")
+    refused(tmp_path, "rig.yaml", "sensors[1].name", "p1 is the name of sensors[0] too")
 
 
 @pytest.mark.parametrize("key", ["file", "flow_ripple"])
@@ -248,13 +238,15 @@ def test_coarse_steps_are_not_clipping(tmp_path):
 @pytest.mark.parametrize(("unit", "scale"), [("bar", 1e5), ("MPa", 1e6), ("kPa", 1e3)])
 def test_wrong_units(tmp_path, unit, scale):
     write_case(tmp_path, sheet(), ripple() / scale)
-    refused(tmp_path, "healthy_0.h5", "p1", "implausible", unit, f"multiply by {scale:g}")
+    for name, error in zip(("p1", "p2"), errors_of(tmp_path), strict=True):
+        told(error, "healthy_0.h5", name, "implausible", unit, f"multiply by {scale:g}")
 
 
 def test_wrong_units_of_an_ac_coupled_sensor(tmp_path):
     pressure = ripple()
     write_case(tmp_path, sheet(), (pressure - pressure.mean(axis=1, keepdims=True)) / 1e5)
-    refused(tmp_path, "healthy_0.h5", "p1", "implausible")
+    for name, error in zip(("p1", "p2"), errors_of(tmp_path), strict=True):
+        told(error, "healthy_0.h5", name, "implausible")
 
 
 def test_ac_coupled_sensors_are_fine(tmp_path):

@@ -4,7 +4,6 @@ import h5py
 import numpy as np
 import pytest
 import scipy.io
-import yaml
 from nptdms import ChannelObject, TdmsWriter
 
 from case_folders import RATE, ripple, sheet, write_case, write_hdf5
@@ -169,10 +168,10 @@ def test_the_example_of_the_documentation_is_valid():
     the exclusive."""
     import jsonschema
 
-    from rippletwin.case.rig_yaml import _Loader
+    from rippletwin.case.yaml_limits import parse_yaml
 
     text = (ROOT / "docs" / "reference" / "rig_yaml.md").read_text()
-    example = yaml.load(text.split("```yaml")[1].split("```")[0], Loader=_Loader)
+    example = parse_yaml(text.split("```yaml")[1].split("```")[0])
     jsonschema.Draft202012Validator(schema()).validate(example)
     properties = schema()["properties"]
     assert set(example) == set(properties)

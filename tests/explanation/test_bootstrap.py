@@ -33,7 +33,7 @@ def test_draws_have_the_covariance_of_the_error_model(fitted):
     posterior = Posterior(fit.twin, observations)
     prediction = posterior.predict(fit.twin.theta)
     posterior.estimate_errors(prediction, fit.twin.theta)
-    metric, rng = posterior._metric(prediction), np.random.default_rng(0)
+    metric, rng = posterior._whitening(prediction), np.random.default_rng(0)
     white = np.array(
         [
             metric.apply(posterior._rotate(posterior.draw(prediction, rng) - prediction))

@@ -145,5 +145,5 @@ def test_an_effect_without_a_source_free_fit_is_left_out():
     base = made_fit(0.0)
     search = Search(base, [made_fit(9.0, HOSE), made_fit(5.0, VOLUME)], made_fit(9.0, HOSE))
     source_free = [base, made_fit(-np.inf, HOSE), made_fit(3.0, VOLUME)]
-    (row,) = compare_evidence(search, source_free)
+    (row,) = compare_evidence(search.leading_fits, source_free)
     assert (row["effects"], row["source_free"]) == ("line_volume, position", 3.0)

@@ -63,7 +63,7 @@ def test_the_log_posterior_has_fallen_by_the_quantile_at_the_interval_end(hose, 
     theta = fit.twin.theta.copy()
     theta[k] = end
     posterior = Posterior(fit.twin, workers.observations)
-    value = descend(posterior, theta, 30, held=[k])[1]
+    value = descend(posterior, theta, 30, fixed=[k])[1]
     assert value - fit.objective == pytest.approx(INTERVAL_RISE, abs=0.2 * INTERVAL_RISE)
     assert side * (end - fit.twin.theta[k]) > 0
 
@@ -78,7 +78,7 @@ def test_intervals_contain_the_truth_and_a_fixed_parameter_stays(hose):
         assert low < parameter["value"] < high
         assert low < TRUTH[f"viscoelastic_wall@segment 2.{name}"] < high
     start = fit.twin.theta + 0.1
-    theta, _ = descend(Posterior(fit.twin, workers.observations), start, 3, held=[2])
+    theta, _ = descend(Posterior(fit.twin, workers.observations), start, 3, fixed=[2])
     assert theta[2] == start[2] and np.all(theta[:2] != start[:2])
 
 

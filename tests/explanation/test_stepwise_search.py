@@ -3,23 +3,20 @@
 import numpy as np
 import pytest
 
-from rippletwin.calibration.frequency_continuation import refine
 from rippletwin.calibration.misfit import relative_misfit
 from rippletwin.calibration.posterior import MIN_MODEL_ERROR
 from rippletwin.explanation.checks.cross_validation import cross_validate
 from rippletwin.explanation.fit_jobs import Workers
-from rippletwin.explanation.search.single_effects import fit_single_effects
 from rippletwin.explanation.search.stepwise_search import resume_search, search_effects
 from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.twin import Twin
-from synthetic_observations import POINTS, make
+from synthetic_observations import make
 
 VOLUME = (EFFECTS["line_volume"], Place("position"))
 HOSE = (EFFECTS["viscoelastic_wall"], Place("segment 2", 1))
 GAIN = (EFFECTS["sensor_gain"], Place("sensor p2", 1))
-AIR = (EFFECTS["entrained_air"], Place("line"))
 
 
 @pytest.fixture
@@ -62,17 +59,3 @@ def test_the_search_names_the_effect_and_it_holds_on_held_out_points(small_libra
     assert resumed.log_bayes_factor(resumed.best) == pytest.approx(
         search.log_bayes_factor(search.best), abs=0.5
     )
-
-
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_little_air_reaches_the_evidence_of_the_true_start(seed):
-    """0.15 % of air at one operating point, nearly all of which the line can absorb (1) or most of
-    it (2): the fit reaches the log evidence of a fit that starts at the truth."""
-    values = {"entrained_air@line.gas_fraction": 1.5e-3}
-    one = {"sensors": 2, "points": POINTS[:1], "source": 0.005, "noise": 500.0}
-    bench, data, truth = make(np.random.default_rng(seed), (AIR,), values, **one)
-    workers = Workers(Twin(bench, data), data)
-    known = refine(workers.base, (AIR,), data, [truth.theta])
-    base, (air,) = fit_single_effects(workers, [AIR])
-    assert known.evidence - base.evidence > MIN_LOG_BAYES_FACTOR
-    assert air.evidence == pytest.approx(known.evidence, abs=0.5)

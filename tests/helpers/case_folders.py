@@ -2,7 +2,11 @@
 
 import h5py
 import numpy as np
+import pytest
 import yaml
+
+from rippletwin.case.load import load_case
+from rippletwin.errors import InputError
 
 RATE = 51200.0
 
@@ -53,3 +57,37 @@ def write_case(folder, content, pressure="ripple"):
     if pressure is not None:
         pressure = ripple() if isinstance(pressure, str) else pressure
         write_hdf5(folder / content["recordings"][0]["file"], pressure)
+
+
+def spoilt(folder, spoil, pressure="ripple"):
+    """A case whose sheet `spoil` has changed."""
+    content = sheet()
+    spoil(content)
+    write_case(folder, content, pressure)
+
+
+def refused(folder, file, field, *words):
+    """Load `folder`; the only error must name `file` and `field` and say `words`, with a remedy.
+
+    Returns the error.
+    """
+    error, *others = errors_of(folder)
+    assert not others, others
+    return told(error, file, field, *words)
+
+
+def errors_of(folder):
+    """What is told of a case that is refused."""
+    with pytest.raises(InputError) as caught:
+        load_case(folder)
+    return caught.value.errors
+
+
+def told(error, file, field, *words):
+    """`error`, which must name `file` and `field` and say `words`, with a remedy."""
+    assert error.file.endswith(file), error
+    assert error.field == field, error
+    assert error.remedy, error
+    for word in words:
+        assert word in str(error), error
+    return error

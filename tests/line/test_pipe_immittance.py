@@ -10,7 +10,8 @@ from rippletwin.line.frequency_domain.pipe_immittance import (
     series_impedance,
     shunt_admittance,
 )
-from rippletwin.line.time_domain.weighting_functions import recursion, summed_friction
+from rippletwin.line.time_domain.weighting_functions import recursion
+from summed_friction import summed_friction
 
 OIL = {"density": DENSITY, "viscosity": VISCOSITY, "diameter": 0.02}
 

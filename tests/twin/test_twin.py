@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from harmonic_balance import balance_orifice
-from rippletwin.calibration.likelihood import Likelihood
-from rippletwin.calibration.misfit import misfit, theil
+from paper_rig import paper_rig
 from rippletwin.case.model import Load
 from rippletwin.harmonics import flow_harmonics
 from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
@@ -20,14 +19,7 @@ from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.forward_model import ForwardModel, reflection
 from rippletwin.twin.twin import Twin
-from synthetic_recordings import (
-    flow_ripple,
-    line_errors,
-    paper_rig,
-    point,
-    recordings,
-    three_points,
-)
+from synthetic_recordings import flow_ripple, line_errors, point, three_points
 
 
 def test_three_points_at_once_equal_newtons_harmonic_balance_one_by_one():
@@ -175,58 +167,3 @@ def test_passive_ends_reflect_no_more_than_arrives(kind):
     first = rig.line[0]
     z = network.input_impedance() / (870.0 * first.wave_speed / first.area)
     assert np.all(np.abs(reflection(z)) <= 1.0 + 1e-12)
-
-
-@pytest.mark.parametrize("source", ["known", "nominal"])
-def test_whitened_residuals_are_the_gaussian_density(source):
-    """Sum of squares and log determinant equal those of the covariance written out as a matrix."""
-    rig = paper_rig()
-    points = [replace(point(rig, highest_hz=900.0), source=source)]
-    _, data = recordings(rig, points, seed=3, sd=3e3)
-    rng = np.random.default_rng(0)
-    root = rng.standard_normal((3, 3)) + 1j * rng.standard_normal((3, 3))
-    covariance = np.tile(1e7 * root @ root.conj().T, (len(points[0].orders), 1, 1))
-    data = [replace(data[0], covariance=covariance)]
-    likelihood = Likelihood(Twin(rig, data), data)
-    likelihood.model_error, likelihood.source_sd = 0.03, 0.04
-    theta = 0.3 * np.ones(len(likelihood.twin.parameters))
-    prediction = likelihood.forward(theta)[0]
-    sigma = 0.04 if source == "nominal" else 0.0
-    expected = 0.5 * np.sum(theta[likelihood.prior] ** 2)
-    for f in range(prediction.shape[1]):
-        v, h = data[0].values[:, f], prediction[:, f]
-        matrix = covariance[f] + 0.03**2 * np.mean(np.abs(v) ** 2) * np.eye(3)
-        matrix = matrix + sigma**2 * np.outer(h, h.conj())
-        e = v - h
-        expected += (e.conj() @ np.linalg.solve(matrix, e)).real + np.linalg.slogdet(matrix)[1]
-    assert likelihood.objective(theta) == pytest.approx(expected, rel=1e-10)
-
-
-def test_a_free_source_hides_any_factor_common_to_all_sensors():
-    """With the source free the residuals do not change when every frequency's values are
-    multiplied by a complex number of its own (of modulus one, which leaves the floor alone).
-    """
-    rig = replace(paper_rig(), load=Load("closed"))
-    points = [replace(point(rig), source="free")]
-    _, data = recordings(rig, points, seed=2)
-    turn = np.exp(1j * np.random.default_rng(1).uniform(0, 6, data[0].values.shape[1]))
-    turned = [replace(data[0], values=data[0].values * turn)]
-    theta = np.zeros(len(Twin(rig, data).parameters))
-    costs = [Likelihood(Twin(rig, d), d).objective(theta) for d in (data, turned)]
-    assert costs[0] == pytest.approx(costs[1], rel=1e-10)
-
-
-def test_theil_from_harmonics_is_theil_from_the_time_signals():
-    """Theil's U of the complex harmonics equals root-mean-square of the difference over the sum of
-    the root-mean-squares of the signals that they make (Parseval).
-    """
-    rig = paper_rig()
-    _, data = recordings(rig, [point(rig)], seed=4)
-    twin = Twin(rig, data)
-    measured, predicted = data[0].values, twin.predict(data)[0]
-    angle = 2 * np.pi * np.arange(4096) / 4096
-    turn = np.exp(1j * np.outer(data[0].orders, angle))
-    x, y = (measured @ turn).real, (predicted @ turn).real
-    expected = np.sqrt(np.mean((x - y) ** 2)) / (np.sqrt(np.mean(x**2)) + np.sqrt(np.mean(y**2)))
-    assert theil(measured, predicted) == pytest.approx(expected, rel=1e-9)
-    assert misfit(Likelihood(twin, data), twin.theta).theil == pytest.approx(expected, rel=1e-9)

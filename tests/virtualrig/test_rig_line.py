@@ -13,7 +13,6 @@ from scipy.special import ive
 
 from virtualrig.effects import EFFECTS, Draft
 from virtualrig.orbit import Bench
-from virtualrig.profile import velocity_modes
 from virtualrig.pump import Pump
 from virtualrig.rig import Rig, Sensing, lay_out
 
@@ -32,7 +31,7 @@ S = 2j * np.pi * HARMONICS * SPEED_RPM / 60
 
 
 def source(amplitude):
-    """Flow over a revolution and its harmonics (peak, complex) of relative size `amplitude`."""
+    """Flow over a revolution, and its complex peak harmonics, each `amplitude` of the mean."""
     rng = np.random.default_rng(3)
     harmonics = amplitude * FLOW * np.exp(2j * np.pi * rng.uniform(size=len(HARMONICS)))
     turn = np.arange(46080) / 46080
@@ -104,7 +103,7 @@ def exact(flow, load_admittance, fittings=(), **pipe):
 
 
 def bench(flow, *effects, friction="unsteady", tolerance=0.5):
-    """Harmonics (sensors, 30) of the settled rig driven by `flow`, and its orbit."""
+    """Harmonics (sensors, 30) of the settled rig with the source `flow`, and its orbit."""
     draft = Draft(
         Pump(bulk_modulus=MODULUS), [dict(s) for s in SEGMENTS], [{}, {}], friction=friction
     )
@@ -127,18 +126,6 @@ def misfit(rig, truth):
 def orifice_admittance(orbit):
     """dq/dp of the load's orifice at the settled mean pressure."""
     return 0.5 * orbit.valve / np.sqrt(orbit.load_pressure)
-
-
-def test_velocity_modes_are_the_bessel_admittance_and_passive():
-    """Ten lags hold Zielke's friction to 0.2 % over the band used, with positive weights, rates."""
-    rates, weights = velocity_modes(10)
-    s = 1j * np.geomspace(150, 1e5, 400)  # 16 Hz to 5 kHz in these pipes
-    z = np.sqrt(s)
-    exact_friction = s * ive(0, z) / ive(2, z) - s
-    friction = 1 / (weights / (s[:, None] + rates)).sum(axis=1) - s
-    assert np.abs(friction / exact_friction - 1).max() < 2e-3
-    assert (weights > 0).all() and (rates > 0).all()
-    assert 1 / (weights / rates).sum() == pytest.approx(8, rel=1e-10)
 
 
 @pytest.mark.parametrize("friction", ["steady", "unsteady"])
@@ -190,7 +177,7 @@ LINEAR = {
 
 @pytest.mark.parametrize("name", LINEAR)
 def test_linear_effects_are_their_admittances(name):
-    """Linear effects move the ripple by percents, and land on the exact solution to 0.3 %."""
+    """Linear effects change the ripple by over 2 % and agree with the exact solution to 0.3 %."""
     effects, description = LINEAR[name]
     flow, harmonics = source(1e-3)
     rig, orbit = bench(flow, *effects)
@@ -205,7 +192,7 @@ def test_linear_effects_are_their_admittances(name):
     [{"gain": 0.6, "lag": 1e-3}, {"gain": 0.4, "frequency_hz": 300.0, "damping": 0.3}],
 )
 def test_load_dynamics_is_its_admittance(arguments):
-    """The valve that opens with pressure, linearised: q0/p0 (1/2 + gain/(1 + lag s + s^2/w^2))."""
+    """A valve that opens with pressure has q0/p0 (1/2 + gain/(1 + lag s + s^2/w^2)), linearised."""
     flow, harmonics = source(1e-3)
     rig, orbit = bench(flow, ("load_dynamics", arguments))
     lag, inertia = arguments.get("lag", 0.0), 0.0
@@ -237,7 +224,7 @@ def test_accumulator_and_stiffening_are_their_tangents_for_small_ripple():
     gas = {"position": 1.2, "gas_volume": 2e-7, "gas_pressure": 6e6, "exponent": 1.3}
     growth = {"per_pascal": 5e-9, "reference": 0.0}
     rig, orbit = bench(flow, ("accumulator", gas), ("stiffening_liquid", growth))
-    local = np.interp(1.2, SENSORS, orbit.pressure.mean(axis=1))
+    local = np.interp(1.2, SENSORS, orbit.pressure.mean(axis=1)) + 1.01325e5  # absolute
     volume = 2e-7 * (6e6 / local) ** (1 / 1.3)
     fittings = [(1.2, S * volume / (1.3 * local))]
     softness = [1 / (1 + 5e-9 * orbit.pressure.mean())] * 3
@@ -249,8 +236,8 @@ def test_accumulator_and_stiffening_are_their_tangents_for_small_ripple():
 
 
 def test_full_amplitude_orifice_is_harmonic_balance():
-    """At full ripple the square-law load agrees with Newton's harmonic balance to 3e-4, which
-    its linearisation misses by 5e-3 and more."""
+    """At full ripple the square-law load agrees with Newton's harmonic balance to 3e-4, from which
+    the linearised load differs by 5e-3 and more."""
     flow, harmonics = source(0.25 * np.minimum(1, (4 / HARMONICS) ** 1.5))
     rig, orbit = bench(flow, tolerance=5.0)
     whole = chain(0.0, LENGTH)
@@ -276,7 +263,7 @@ def test_full_amplitude_orifice_is_harmonic_balance():
 
 
 def test_turbulent_friction_is_darcys_pressure_drop():
-    """A smooth flow loses Hagen-Poiseuille's share and f (l/D) rho v^2/2 between the sensors."""
+    """A steady flow loses Hagen-Poiseuille's pressure and f (l/D) rho v^2/2 between the sensors."""
     factor = 0.05
     _, orbit = bench(np.full(2, FLOW), ("turbulent_friction", {"factor": factor}))
     drop, at = 0.0, 0.0

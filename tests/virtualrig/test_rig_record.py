@@ -1,10 +1,6 @@
-"""What the virtual rig writes: sensing, noise, wander, the case folder, and what must not be in
-it.
-"""
+"""Recordings of the virtual rig: sensing, noise, wander, case folders and what they conceal."""
 
-import ast
 from dataclasses import replace
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -31,7 +27,7 @@ QUICK = {
 
 
 def orbit(harmonic, speed_rpm=1000.0, sensors=1, delay=0.0):
-    """An orbit that is one cosine of 1 Pa on 5 Pa."""
+    """An orbit whose pressure is a cosine of 1 Pa about 5 Pa."""
     turn = np.arange(4608) / 4608
     pressure = 5 + np.cos(2 * np.pi * harmonic * (turn - delay * speed_rpm / 60))
     pressure = np.tile(pressure, (sensors, 1))
@@ -39,7 +35,7 @@ def orbit(harmonic, speed_rpm=1000.0, sensors=1, delay=0.0):
 
 
 def test_sensor_gain_delay_and_resonance_are_those_of_the_formulae():
-    """A cosine at 450 Hz comes out with the second-order response at 450 Hz, gain and delay."""
+    """A cosine at 450 Hz is sensed with gain, delay and second-order response at 450 Hz."""
     sensing = (Sensing(gain=1.1, delay=2e-4, resonance=(900.0, 0.2)),)
     out = sensed_pressure(orbit(27), sensing)[0]
     got = 2 * np.fft.rfft(out)[27] / 4608
@@ -48,8 +44,8 @@ def test_sensor_gain_delay_and_resonance_are_those_of_the_formulae():
     assert out.mean() == pytest.approx(1.1 * 5)
 
 
-def test_wander_is_slow_and_as_strong_as_told():
-    """Over many seconds: the stated deviation, and next to nothing within one revolution."""
+def test_wander_is_slow_and_has_the_stated_deviation():
+    """The speed has the stated deviation over many seconds and hardly varies in a revolution."""
     rng = np.random.default_rng(0)
     runs = np.array([draw_speed_wander(256000, 1e-3, 0.8, rng) for _ in range(20)])
     assert runs.std() == pytest.approx(1e-3, rel=0.15)
@@ -57,7 +53,7 @@ def test_wander_is_slow_and_as_strong_as_told():
 
 
 def test_recording_follows_the_crank_and_the_line_between_orbits():
-    """A delay of 2 ms in the line is 2 ms at every speed between the orbits, at 300 Hz to 1e-4."""
+    """A delay of 2 ms in the line is 2 ms at all speeds between the orbits, at 300 Hz to 1e-4."""
     speeds = np.linspace(998.0, 1002.0, 20000)
     turns = 0.3 + np.cumsum(speeds) / 60 / SAMPLING_RATE_HZ
     orbits = [orbit(18, s, delay=2e-3) for s in (998.0, 1000.0, 1002.0)]
@@ -89,7 +85,7 @@ def case(tmp_path_factory):
 
 
 def test_case_folder_is_complete_and_says_nothing_of_the_truth(case):
-    """rig.yaml carries the sheet and the recordings; no sealed name or number is in it."""
+    """rig.yaml has the data sheet and the recordings; no name or number of the seal is in it."""
     sheet, written = read_yaml(SHEET), read_yaml(case / "case" / "rig.yaml")
     assert {key: written[key] for key in sheet} == sheet
     (entry,) = written["recordings"]
@@ -109,7 +105,7 @@ def test_case_folder_is_complete_and_says_nothing_of_the_truth(case):
 
 
 def test_noise_is_what_the_seal_says(case):
-    """What remains above 15 kHz, where the ripple is gone, is white noise of 777 Pa."""
+    """Above 15 kHz, where there is no ripple, the recording is white noise of 777 Pa."""
     with h5py.File(case / "case" / "recordings" / "a.h5") as file:
         pressure = file["pressure"][0]
     power = np.abs(np.fft.rfft(pressure - pressure.mean())) ** 2 / len(pressure)
@@ -118,7 +114,7 @@ def test_noise_is_what_the_seal_says(case):
 
 
 def test_truth_is_the_outlet_flow_of_the_recording(case):
-    """The sealed flow has the mean that the valve passes, and lies outside the case folder."""
+    """The true flow has the mean that the valve passes, and lies outside the case folder."""
     with h5py.File(case / "truth" / "a.h5") as file:
         flow, pressure = file["outlet_flow"][:], file["outlet_pressure"][:]
         assert len(file["turns"]) == 25600
@@ -130,7 +126,7 @@ def test_truth_is_the_outlet_flow_of_the_recording(case):
 
 
 def test_nominal_flow_ripple_is_the_sheets_and_not_the_true_one(case):
-    """One revolution of flow of the sheet's pump: the right mean, not the true ripple."""
+    """One revolution of the data sheet pump's flow: the right mean, not the true ripple."""
     table = np.loadtxt(case / "case" / "flow_ripple_a.csv", delimiter=",", skiprows=1)
     with h5py.File(case / "truth" / "a.h5") as file:
         true = file["outlet_flow"][:]
@@ -152,7 +148,7 @@ def test_nominal_flow_ripple_is_the_sheets_and_not_the_true_one(case):
     ],
 )
 def test_wrong_input_is_named(arguments, words, tmp_path, capsys):
-    """Exit status 2 and one line that names file, field or option; nothing is recorded."""
+    """Wrong input ends with status 2, one line that names file, field or option, and no case."""
     (tmp_path / "bad.yaml").write_text("effects: [{name: magic}]")
     (tmp_path / "faultless.yaml").write_text("noise: 1.0")
     out = tmp_path / "out"
@@ -165,16 +161,15 @@ def test_wrong_input_is_named(arguments, words, tmp_path, capsys):
 
 
 def test_full_folder_is_not_overwritten(tmp_path, capsys):
-    """A folder with content is left alone."""
+    """A folder with content is not changed."""
     (tmp_path / "precious").write_text("")
     assert main(["record", "--out", str(tmp_path)]) == 2
     assert "not empty" in capsys.readouterr().err
 
 
-def test_effects_say_what_they_do_not_take():
-    """An unknown parameter, a place outside the line and two effects at odds are refused by
-    name.
-    """
+def test_wrong_arguments_of_effects_are_named():
+    """Errors name an unknown parameter, a position outside the line and two effects that set the
+    same element."""
     known = read_yaml(SHEET)
     for effect, words in (
         ({"name": "leak", "position": 99.0, "conductance": 1e-12}, "outside the line"),
@@ -187,7 +182,7 @@ def test_effects_say_what_they_do_not_take():
 
 
 def test_built_in_rig_reads_and_differs_from_its_sheet_within_the_stated_uncertainty():
-    """The true line lies within 2.5 stated deviations of the sheet's; faults have one size each."""
+    """The true line is within 2.5 stated deviations of the data sheet's; faults have one size."""
     known, rig = read_rig(SHEET, SEAL)
     stated = known["uncertainty"]
     true = read_yaml(SEAL)["line"]["segments"]
@@ -198,26 +193,15 @@ def test_built_in_rig_reads_and_differs_from_its_sheet_within_the_stated_uncerta
 
 
 def test_recording_at_constant_speed_repeats_every_revolution():
-    """Without noise, wander and speed error, one revolution is like the other."""
+    """Without noise, wander and speed error all revolutions are equal."""
     rig = build(read_yaml(SHEET), QUICK)
     take = record(rig, Point("a", 3000.0, 8e6, 0.2), np.random.default_rng(1))
     revolutions = take.pressure[0].reshape(10, 1024)
     assert np.abs(revolutions - revolutions[0]).max() < 1e-3
 
 
-def test_rig_imports_nothing_of_the_twin():
-    """No module of virtualrig imports rippletwin, nor the other way round."""
-    for package, other in (("virtualrig", "rippletwin"), ("rippletwin", "virtualrig")):
-        for file in Path("src", package).rglob("*.py"):
-            for node in ast.walk(ast.parse(file.read_text())):
-                names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
-                if isinstance(node, ast.ImportFrom):
-                    names = [node.module or ""]
-                assert not any(name.split(".")[0] == other for name in names), file
-
-
 def test_unreadable_yaml_is_named(tmp_path):
-    """Broken YAML and a list where keys are wanted name the file."""
+    """Errors for broken YAML and for a list instead of keys name the file."""
     for text in ("a: [1", "- 1"):
         (tmp_path / "x.yaml").write_text(text)
         with pytest.raises(RigError, match=r"x\.yaml"):
@@ -239,7 +223,7 @@ def test_built_in_rig_is_converged_to_a_tenth_of_its_noise():
 
 @pytest.fixture(scope="module")
 def driven():
-    """A short line between a given flow and the valve; its speed wanders."""
+    """A short line between a given flow and the valve, with a wandering speed."""
     sheet = read_yaml(SHEET) | {"sensors": [{"name": "p1", "position": 0.41}]}
     seal = QUICK | {"speed": {"error": 0.0, "wander": 1e-3, "correlation_s": 0.3}}
     turn = 2 * np.pi * np.arange(4608) / 4608
@@ -248,7 +232,7 @@ def driven():
 
 
 def test_a_march_at_even_speed_repeats_the_orbit(driven):
-    """Invariance: where the speed does not deviate, two more revolutions are two orbits."""
+    """Without a deviation of the speed two more revolutions are two orbits."""
     rig, flow = driven
     bench = Bench(rig, flow=flow)
     orbit = bench.settle(1500.0, 8e6, tolerance=1.0)
@@ -257,9 +241,9 @@ def test_a_march_at_even_speed_repeats_the_orbit(driven):
     assert np.abs(marched - twice).max() < 5.0
 
 
-def test_a_march_is_what_orbits_compose_where_the_line_forgets_soon(driven):
-    """Another method: recordings marched and composed of orbits differ by less than 0.1 % of the
-    ripple on a short line at the valve; at even speed instead they differ by more."""
+def test_a_march_agrees_with_composed_orbits_where_transients_decay_fast(driven):
+    """On a short line at the valve, recordings marched and composed of orbits differ by less than
+    0.1 % of the ripple; from one at constant speed they differ by more than 0.3 %."""
     rig, flow = driven
     point = Point("a", 1500.0, 8e6, 0.4)
     march, composed, even = (

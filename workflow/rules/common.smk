@@ -42,7 +42,7 @@ def recordings():
     """The case's files besides rig.yaml: one folder where the virtual rig makes them."""
     if RECORDED_HERE:
         return [f"{CASE}/recordings"]
-    files = set()
+    files = {SHEET["load"]["impedance"]} if "impedance" in SHEET["load"] else set()
     for entry in SHEET["recordings"]:
         files |= {entry["file"], *entry.get("repeats", ())}
         files |= {entry["flow_ripple"]} if "flow_ripple" in entry else set()

@@ -1,4 +1,4 @@
-"""A fitted twin with its Laplace evidence and covariance."""
+"""A fitted twin with its evidence and covariance."""
 
 from __future__ import annotations
 
@@ -7,43 +7,34 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rippletwin.calibration.levenberg_marquardt import hessian
+from rippletwin.calibration.laplace import laplace
+from rippletwin.calibration.likelihood import Likelihood
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.twin.effects.base import Effect, Place
 from rippletwin.twin.twin import Twin
 
-
-def posterior_at_fit(fit: Fit, observations: Sequence, floor: float | None = None) -> Posterior:
-    """The fit's likelihood with errors that are independent from frequency to frequency.
-
-    The source's error, smooth part and the rest, is put into each frequency alone. `floor` is the
-    model error, by default the fit's own.
-    """
-    posterior = Posterior(fit.twin, observations, None, fit.source_free)
-    posterior.estimate_errors(posterior.predict(fit.twin.theta), fit.twin.theta)
-    posterior.source_sd = float(np.hypot(posterior.source_sd, posterior.smooth_sd))
-    posterior.smooth_sd = 0.0
-    posterior.model_error = fit.model_error if floor is None else floor
-    return posterior
-
-
 Hypothesis = tuple[tuple[Effect, Place], ...]
-"""The effects that a twin has, each at its place; () is the paper's line."""
+"""Effects of a twin, each at its place; () is the line without any."""
 
 
 @dataclass(frozen=True)
 class Fit:
-    """A hypothesis fitted.
+    """A fitted hypothesis.
 
-    twin         at the posterior mode
-    objective    minus the log posterior there
-    evidence     Laplace's log evidence, comparable between hypotheses on the same data
-    covariance   (P, P) of theta
-    floor, source_sd, smooth_sd   estimated relative errors (see `Posterior`)
-    source_free  which of the two likelihoods
-    stores       whether the line stores something beyond proportion to the pressure
-    ends         of parameters, by index: the ends of their 95 % intervals in theta's coordinates,
-                 where more is known of them than the covariance (`profile_intervals`)
+    hypothesis    the effects and their places
+    twin          at the mode of the posterior
+    objective     minus the log posterior there
+    evidence      log evidence by Laplace's approximation; hypotheses on the same data compare by it
+    covariance    (P, P) of theta, by the same approximation
+    model_error   estimated relative error of the twin
+    source_sd     estimated relative error of the source, independent between harmonics
+    smooth_sd     estimated relative error of the source, smooth in frequency
+    source_free   whether the source was projected out
+    plain         whether the error model was that of calibration (`likelihood`), without smooth
+                  source errors, and not that of explaining (`posterior`)
+    has_nonlinear_compliance   whether the line has a compliance that depends on the pressure
+    interval_ends   lower and upper end of the 95 % interval of a parameter, by its index, in
+                    theta's coordinates; only where a profile was traced (`profile_intervals`)
     """
 
     hypothesis: Hypothesis
@@ -55,6 +46,7 @@ class Fit:
     source_sd: float
     smooth_sd: float
     source_free: bool = False
+    plain: bool = False
     has_nonlinear_compliance: bool = False
     interval_ends: Mapping[int, tuple[float, float]] = field(default_factory=dict, repr=False)
 
@@ -74,35 +66,50 @@ class Fit:
         return tuple(effect.name for effect, _ in self.hypothesis)
 
     def without(self, k: int) -> Hypothesis:
-        """The hypothesis but for its effect k."""
+        """The hypothesis without its effect k."""
         return self.hypothesis[:k] + self.hypothesis[k + 1 :]
 
     @property
     def label(self) -> str:
-        """Effects and places in words; "" of the paper's line."""
+        """Effects and places in words; "" for the line without any."""
         return " + ".join(f"{effect.name}, {place}" for effect, place in self.hypothesis)
 
 
-def laplace_fit(posterior: Posterior, hypothesis: Hypothesis, theta: np.ndarray) -> Fit:
-    """The fit at a mode: evidence and covariance."""
-    prediction, twin = posterior.predict(theta), posterior.twin.with_(theta=theta)
-    if not posterior.is_valid(prediction):
-        # No start leads anywhere: the hypothesis says nothing of these data.
-        unknown = np.eye(len(theta))
-        return Fit(hypothesis, twin, np.inf, -np.inf, unknown, np.inf, 0.0, 0.0)
-    posterior.estimate_errors(prediction, theta)
-    objective = posterior.objective(theta, prediction)
-    second = hessian(posterior, theta, prediction)
-    log_det = np.linalg.slogdet(second)[1]
+def laplace_fit(model: Posterior | Likelihood, hypothesis: Hypothesis, theta: np.ndarray) -> Fit:
+    """The fit at a mode theta (P,), with its evidence and covariance.
+
+    Where no start leads to a valid prediction, the evidence is minus infinity.
+    """
+    mode, twin = laplace(model, theta), model.twin.with_(theta=theta)
+    if not np.isfinite(mode.evidence):
+        return Fit(hypothesis, twin, np.inf, -np.inf, mode.covariance, np.inf, 0.0, 0.0)
     return Fit(
         hypothesis,
         twin,
-        objective,
-        -objective - 0.5 * log_det,
-        np.linalg.inv(second),
-        posterior.model_error,
-        posterior.source_sd,
-        posterior.smooth_sd,
-        posterior.source_free,
-        posterior.forward.has_nonlinear_compliance,
+        mode.objective,
+        mode.evidence,
+        mode.covariance,
+        model.model_error,
+        model.source_sd,
+        model.smooth_sd,
+        model.source_free,
+        isinstance(model, Likelihood),
+        model.forward.has_nonlinear_compliance,
     )
+
+
+def posterior_at_fit(
+    fit: Fit, observations: Sequence, model_error: float | None = None
+) -> Posterior:
+    """The posterior at a fit, with errors that are independent from frequency to frequency.
+
+    The smooth part of the source's error is added to the independent part.
+
+    model_error   by default that of the fit
+    """
+    posterior = Posterior(fit.twin, observations, None, fit.source_free)
+    posterior.estimate_errors(posterior.predict(fit.twin.theta), fit.twin.theta)
+    posterior.source_sd = float(np.hypot(posterior.source_sd, posterior.smooth_sd))
+    posterior.smooth_sd = 0.0
+    posterior.model_error = fit.model_error if model_error is None else model_error
+    return posterior

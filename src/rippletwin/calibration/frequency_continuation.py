@@ -1,31 +1,39 @@
-"""Fits of twins that differ in their effects: posterior mode and evidence of each.
+"""Continuation in frequency: the mode of a posterior that has many.
 
-Two rules keep the optimiser out of wrong valleys (5 % of wave speed is two turns of phase at
-5 kHz over 9 m). All operating points are fitted together and in absolute frequency, first below
-800 Hz, then higher; and every candidate is fitted that way from the nominal values with the
-effect in the model from the first step, because a fit without it has been bent by its absence.
-What a line stores beyond proportion to the pressure, slow to work out, is left out or held on the
-way, held anew where that has led, and followed from the mode that this leads to.
+Five per cent of wave speed is two turns of phase at 5 kHz over 9 m, so the posterior of all
+harmonics has many local modes. Two rules lead to the right one:
 
-The evidence is Laplace's (MacKay 2003, Information Theory, Inference, and Learning Algorithms,
-ch. 27): all parameters of effects have proper priors N(0, 1) in their coordinates, so
+1. All operating points are fitted together and in absolute frequency, first below 800 Hz, then
+   higher.
+2. Every hypothesis is fitted that way from the data sheet, with its effects in the model from the
+   first step. A fit without a necessary effect has bent the other parameters.
 
-    log Z = log posterior at the mode - 1/2 log det H,
+The nonlinear compliance of the line takes long to solve. During continuation it is omitted or
+frozen, then frozen again at each new point. It is solved exactly only from the final mode.
 
-with H the Hessian in the same coordinates, priors included.
+Calibration and explaining run the same continuation, each over its own error model.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from rippletwin.calibration.error_model import ErrorModel
 from rippletwin.calibration.fit import Fit, Hypothesis, laplace_fit
-from rippletwin.calibration.levenberg_marquardt import CONVERGED, descend
+from rippletwin.calibration.levenberg_marquardt import (
+    CONVERGED,
+    FIRST_DAMPING,
+    MIN_DAMPING,
+    descend,
+)
+from rippletwin.calibration.likelihood import EVENNESS, Likelihood
 from rippletwin.calibration.multistart import (
     FEW_STARTS,
     MAX_MODEL_ERROR_BELOW_LIMIT,
+    State,
+    distinct_modes,
     draw_around_modes,
     first_starts,
     select_by_score_test,
@@ -34,175 +42,213 @@ from rippletwin.calibration.posterior import Posterior
 from rippletwin.twin.twin import Twin
 
 LIMITS_HZ = (800.0, 1500.0, 2500.0, 4000.0)
-MODES_DRAWN_AROUND = (
-    4  # fits below a limit about which the next is begun at random, where that is asked for
-)
-STARTS_FITTED = (8, 24)  # starts from which Levenberg-Marquardt sets out, with few and with many
-STARTS_KEPT = ((4, 2, 1), (8, 4, 1))  # carried on after the first, the second and every later limit
-MAX_STEPS = (
-    12,
-    8,
-    6,
-)  # most steps below the first, second and later limits; the last may take more
-MAX_LAST_STEPS = 30
-ROUGHLY_CONVERGED = 0.5  # gain of the last step where the next limit goes on from there
-MAX_REFREEZES, STEP_SHARES = 6, (1.0, 0.5, 0.25)  # how often what is stored is held anew, at most
-JACOBIAN_ROUNDS, ROUND_CONVERGED = (
-    4,
-    0.2,
-)  # of descents with new derivatives, and what the last may still gain
+LAST_LIMIT_SHARE = 0.9  # of the highest frequency; a limit above it is no stage of its own
+MODES_DRAWN_AROUND = 4  # modes below a limit around which starts of the next are drawn
+STARTS_FITTED = (8, 24)  # starts of the first descents: with few starts, with many
+STARTS_KEPT = ((4, 2, 1), (8, 4, 1))  # after the first, the second and every later limit
+MAX_STEPS = (12, 8, 6)  # below the first, the second and every later limit but the last
+MAX_LAST_STEPS = 30  # of a descent with all data
+ROUGHLY_CONVERGED = 0.5  # gain of the last step of a descent that another one follows
+MAX_REFREEZES = 6  # times that the nonlinear compliance is frozen again
+STEP_SHARES = (1.0, 0.5, 0.25)  # of the way that a frozen compliance suggests
+JACOBIAN_ROUNDS = 4  # descents with the full Jacobian
+ROUND_CONVERGED = 0.2  # gain of the last of them
 
 
-def continuation_limits(observations: Sequence) -> list[float]:
-    """Upper frequencies (Hz) of the continuation for these data."""
+def continuation_limits(
+    observations: Sequence, limits_hz: Sequence[float] = LIMITS_HZ
+) -> list[float]:
+    """Upper frequencies (Hz) of the continuation for these data; the last includes all data."""
     top = max(float(o.frequency_hz[-1]) for o in observations)
     low = min(float(o.frequency_hz[min(2, len(o.frequency_hz) - 1)]) for o in observations)
-    return [*(x for x in LIMITS_HZ if low <= x < 0.9 * top), top]
+    return [*(x for x in limits_hz if low <= x < LAST_LIMIT_SHARE * top), top]
+
+
+def fit_by_continuation(
+    model: ErrorModel,
+    starts: Sequence[Mapping[str, float]] = ({},),
+    draws: int = 0,
+    exact: bool = False,
+    limits_hz: Sequence[float] = LIMITS_HZ,
+    progress: Callable[[float, int, ErrorModel, np.ndarray], None] | None = None,
+) -> tuple[ErrorModel, np.ndarray]:
+    """The mode theta (P,) of a posterior, and the error model with its errors there.
+
+    starts    coordinates of parameters by name; the others are those of the data sheet
+    draws     starts that are drawn around each mode below a limit for the next one
+    exact     whether the full Jacobian, slow to calculate, leads from the last mode on
+    progress  is called after each limit: limit (Hz), number of descents, model and best theta
+    """
+    limits = continuation_limits(model.observations, limits_hz)
+    many = len(starts) > FEW_STARTS or not model.twin.effects
+    states = first_starts(_with_frozen_compliance(model, limits[0]), starts, STARTS_FITTED[many])
+    for stage, limit in enumerate(limits):
+        last = stage == len(limits) - 1
+        part = _with_frozen_compliance(model, limit)
+        part.max_model_error = np.inf if last else MAX_MODEL_ERROR_BELOW_LIMIT
+        steps, converged = MAX_STEPS[min(stage, len(MAX_STEPS) - 1)], ROUGHLY_CONVERGED
+        if last:
+            steps, converged = MAX_LAST_STEPS, CONVERGED
+        modes = []
+        for _, theta in states:
+            if stage > 0:
+                _freeze_compliance(part, theta)
+            theta, value = descend(part, theta, steps, converged=converged)
+            if stage > 0:
+                theta, value = _refreeze_compliance(part, theta, value)
+            modes.append((value, theta))
+        states = _kept(modes, stage, last, many)
+        if progress is not None:
+            progress(limit, len(modes), part, states[0][1])
+        if draws and not last:
+            above = _with_frozen_compliance(model, limits[stage + 1])
+            states = states + draw_around_modes(
+                part, states[:MODES_DRAWN_AROUND], above, draws, STARTS_FITTED[many]
+            )
+    rounds = JACOBIAN_ROUNDS if exact else 0
+    return part, _unfreeze_and_refit(part, states[0][1], rounds)
 
 
 def fit_hypothesis(
     base: Twin,
     hypothesis: Hypothesis,
     observations: Sequence,
-    starts: Sequence[dict[str, float]] = ({},),
+    starts: Sequence[Mapping[str, float]] = ({},),
     source_free: bool = False,
     draws: int = 0,
+    plain: bool = False,
 ) -> Fit:
-    """Fit by continuation from the nominal values, from several starts.
+    """Fit a twin with the effects of `hypothesis` by continuation from the data sheet.
 
-    `base` is a twin without effects of the right rig and recordings. Each of `starts` gives
-    coordinates of effect parameters by name; each is tried with the scalings of the wave speeds.
-    With `draws` every limit is also begun from that many draws about each fit below the last one.
+    base         twin without effects, of the rig and recordings of the observations
+    starts       coordinates of effect parameters by name, one mapping a start
+    source_free  whether the source is projected out
+    draws        as in `fit_by_continuation`
+    plain        whether the error model is that of `calibrate` instead of that of explaining
     """
-    twin = base.with_(effects=hypothesis)
-    stages = continuation_limits(observations)
-    posterior = _posterior_with_frozen_compliance(twin, observations, stages[0], source_free)
-    many = len(starts) > FEW_STARTS or not hypothesis
-    states = first_starts(posterior, starts, STARTS_FITTED[many])
-    for stage, limit in enumerate(stages):
-        last = stage == len(stages) - 1
-        posterior = _posterior_with_frozen_compliance(twin, observations, limit, source_free)
-        posterior.max_model_error = np.inf if last else MAX_MODEL_ERROR_BELOW_LIMIT
-        steps, near = MAX_STEPS[min(stage, len(MAX_STEPS) - 1)], ROUGHLY_CONVERGED
-        if last:
-            steps, near = MAX_LAST_STEPS, CONVERGED
-        fits = []
-        for _, theta in states:
-            if stage > 0:
-                _freeze_compliance(posterior, theta)
-            theta, value = descend(posterior, theta, steps, converged=near)
-            if stage > 0:
-                theta, value = _refreeze_compliance(posterior, theta, value)
-            fits.append((value, theta))
-        kept = STARTS_KEPT[many]
-        states = distinct_modes(fits)[: 1 if last else kept[min(stage, len(kept) - 1)]]
-        if draws and not last:
-            above = _posterior_with_frozen_compliance(
-                twin, observations, stages[stage + 1], source_free
-            )
-            states = states + draw_around_modes(
-                posterior, states[:MODES_DRAWN_AROUND], above, draws, STARTS_FITTED[many]
-            )
-    return laplace_fit(posterior, hypothesis, _unfreeze_and_refit(posterior, states[0][1]))
+    model = _error_model(base, hypothesis, observations, source_free, plain)
+    model, theta = fit_by_continuation(model, starts, draws, exact=plain)
+    return laplace_fit(model, hypothesis, theta)
 
 
 def refine(
     base: Twin,
     hypothesis: Hypothesis,
-    observations,
+    observations: Sequence,
     thetas: Sequence,
     source_free: bool = False,
     exact: bool = True,
+    plain: bool = False,
 ) -> Fit:
-    """Fit on all frequencies from starts theta (P,), where good ones are known: one alone, or many
-    that differ in their newest effect. One alone ends `exact`ly at the mode, if that is asked for,
-    even where it takes derivatives of what the line stores, slow to work out."""
-    twin = base.with_(effects=hypothesis)
-    posterior = Posterior(twin, observations, None, source_free)
+    """Fit with all frequencies from good starts `thetas`, each (P,).
+
+    Of several starts, which differ in their newest effect, the most promising are followed. One
+    alone ends exactly at the mode if `exact`, even where that takes slow derivatives. `source_free`
+    and `plain` are as in `fit_hypothesis`; several starts need the error model of explaining.
+    """
+    model = _error_model(base, hypothesis, observations, source_free, plain)
     thetas = [np.asarray(theta, dtype=float) for theta in thetas]
     if len(thetas) > 1:
-        thetas = select_by_score_test(base, posterior, thetas)
+        thetas = select_by_score_test(base, model, thetas)
     else:
-        posterior.predict(thetas[0])
-        posterior.forward.freeze_compliance = True
-    fits = [descend(posterior, theta, MAX_LAST_STEPS) for theta in thetas]
-    best = min(fits, key=lambda f: f[1])[0]
-    rounds = JACOBIAN_ROUNDS if exact and len(fits) == 1 else 0
-    return laplace_fit(posterior, hypothesis, _unfreeze_and_refit(posterior, best, rounds))
+        model.predict(thetas[0])
+        model.forward.freeze_compliance = True
+    modes = [descend(model, theta, MAX_LAST_STEPS) for theta in thetas]
+    best = min(modes, key=lambda mode: mode[1])[0]
+    rounds = JACOBIAN_ROUNDS if exact and len(modes) == 1 else 0
+    return laplace_fit(model, hypothesis, _unfreeze_and_refit(model, best, rounds))
 
 
-def _posterior_with_frozen_compliance(
-    twin: Twin, observations, limit: float, source_free: bool
-) -> Posterior:
-    """A posterior that knows nothing of what the line stores beyond proportion to the pressure."""
-    posterior = Posterior(twin, observations, limit, source_free)
-    posterior.forward.freeze_compliance = True
-    return posterior
+def _error_model(
+    base: Twin, hypothesis: Hypothesis, observations: Sequence, source_free: bool, plain: bool
+) -> Posterior | Likelihood:
+    """The error model of explaining, or the plain one of calibration."""
+    twin = base.with_(effects=hypothesis)
+    if plain:
+        return Likelihood(twin, observations, evenness=EVENNESS)
+    return Posterior(twin, observations, None, source_free)
 
 
-def _freeze_compliance(posterior: Posterior, theta: np.ndarray) -> None:
-    """Hold what the line stores at theta, if that fits better than leaving it out: higher harmonics
-    that get much of their size by way of it would else be put down to the pump."""
-    if not posterior.forward.has_nonlinear_compliance:
+def _kept(modes: Sequence[State], stage: int, last: bool, many: bool) -> list[State]:
+    """The modes from which the next limit is begun."""
+    kept = STARTS_KEPT[many]
+    return distinct_modes(modes)[: 1 if last else kept[min(stage, len(kept) - 1)]]
+
+
+def _with_frozen_compliance(model: ErrorModel, limit: float) -> ErrorModel:
+    """The error model below a limit (Hz), without the nonlinear compliance of the line."""
+    part = model.below(limit)
+    part.forward.freeze_compliance = True
+    return part
+
+
+def _freeze_compliance(model: ErrorModel, theta: np.ndarray) -> None:
+    """Freeze the nonlinear compliance at theta, or omit it where that fits better.
+
+    Without it, harmonics that it makes from lower ones would be attributed to the pump.
+    """
+    if not model.forward.has_nonlinear_compliance:
         return
-    posterior.forward.omit_compliance()
-    without = posterior.objective(theta, posterior.predict(theta))
-    if not _objective_with_compliance(posterior, theta) < without:
-        posterior.forward.omit_compliance()
+    model.forward.omit_compliance()
+    without = model.objective(theta, model.predict(theta))
+    if not _objective_with_compliance(model, theta) < without:
+        model.forward.omit_compliance()
 
 
 def _refreeze_compliance(
-    posterior: Posterior, theta: np.ndarray, value: float
+    model: ErrorModel, theta: np.ndarray, value: float
 ) -> tuple[np.ndarray, float]:
-    """theta and minus the log posterior with what the line stores worked out, as long as holding it
-    where theta is leads to a better place. Of a way there the longest of SHARES that fits better is
-    gone: what is stored changes on it."""
-    if not posterior.forward.has_nonlinear_compliance:
+    """theta and minus the log posterior after descents, the compliance frozen anew at each theta.
+
+    value   minus the log posterior with the compliance frozen earlier
+
+    The compliance changes along a descent. So only the longest of STEP_SHARES of its way that fits
+    better with the compliance solved is taken.
+    """
+    if not model.forward.has_nonlinear_compliance:
         return theta, value
-    held, value = value, _objective_with_compliance(posterior, theta)
-    if abs(value - held) < ROUGHLY_CONVERGED:
-        return theta, value  # what is stored stayed as it was held
+    frozen, value = value, _objective_with_compliance(model, theta)
+    if abs(value - frozen) < ROUGHLY_CONVERGED:
+        return theta, value  # the compliance is still the frozen one
     for _ in range(MAX_REFREEZES):
-        way = descend(posterior, theta, MAX_STEPS[0], converged=ROUGHLY_CONVERGED)[0] - theta
+        way = descend(model, theta, MAX_STEPS[0], converged=ROUGHLY_CONVERGED)[0] - theta
         for share in STEP_SHARES:
             tried = theta + share * way
-            stored = _objective_with_compliance(posterior, tried)
-            if stored < value - ROUGHLY_CONVERGED:
+            solved = _objective_with_compliance(model, tried)
+            if solved < value - ROUGHLY_CONVERGED:
                 break
         else:
             break
-        theta, value = tried, stored
+        theta, value = tried, solved
     return theta, value
 
 
-def _objective_with_compliance(posterior: Posterior, theta: np.ndarray) -> float:
-    """Minus the log posterior with what the line stores worked out, which is held from here on."""
-    posterior.forward.freeze_compliance = False
-    value = posterior.objective(theta, posterior.predict(theta))
-    posterior.forward.freeze_compliance = True
+def _objective_with_compliance(model: ErrorModel, theta: np.ndarray) -> float:
+    """Minus the log posterior with the compliance solved, which is frozen from here on."""
+    model.forward.freeze_compliance = False
+    value = model.objective(theta, model.predict(theta))
+    model.forward.freeze_compliance = True
     return value
 
 
-def _unfreeze_and_refit(posterior: Posterior, theta: np.ndarray, rounds: int = 0) -> np.ndarray:
-    """The mode near theta, where that was held: now it is followed, and in so many `rounds` at most
-    by derivatives too."""
-    posterior.forward.freeze_compliance = False
-    if not posterior.forward.has_nonlinear_compliance:
+def _unfreeze_and_refit(model: ErrorModel, theta: np.ndarray, rounds: int = 0) -> np.ndarray:
+    """The mode near theta with the compliance solved at each step.
+
+    rounds   most descents that follow with the full Jacobian, where the error model needs it
+    """
+    model.forward.freeze_compliance = False
+    damping = FIRST_DAMPING
+    if model.forward.has_nonlinear_compliance:
+        theta, value = descend(model, theta, MAX_LAST_STEPS)
+    elif rounds and model.needs_full_jacobian:
+        value = model.objective(theta, model.predict(theta))
+        damping = MIN_DAMPING  # damped steps gain nothing in ill-conditioned directions
+    else:
         return theta
-    theta, value = descend(posterior, theta, MAX_LAST_STEPS)
     for _ in range(rounds if np.isfinite(value) else 0):
-        posterior.use_full_jacobian(theta)
+        model.use_full_jacobian(theta)
         last = value
-        theta, value = descend(posterior, theta, MAX_LAST_STEPS)
+        theta, value = descend(model, theta, MAX_LAST_STEPS, damping=damping)
         if last - value < ROUND_CONVERGED:
             break
     return theta
-
-
-def distinct_modes(fits: list) -> list:
-    """Best first, without those that ended where a better one did."""
-    kept = []
-    for candidate in sorted(fits, key=lambda f: f[0]):
-        if all(np.max(np.abs(candidate[1] - k[1])) > 0.05 for k in kept):
-            kept.append(candidate)
-    return kept

@@ -1,4 +1,4 @@
-"""The way down to a posterior mode, and the curvature there."""
+"""Levenberg-Marquardt descent to a mode of the posterior, for both error models."""
 
 from __future__ import annotations
 
@@ -6,64 +6,63 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rippletwin.calibration.posterior import Posterior
+from rippletwin.calibration.error_model import ErrorModel
 
-CONVERGED = 1e-2  # change of minus the log posterior: evidence is judged in whole units
-REACH = 1.5  # longest step of a coordinate, in prior standard deviations
+CONVERGED = 1e-2  # change of minus the log posterior: evidence is compared in whole units
+MAX_STEP = 1.5  # longest step of a coordinate, in prior standard deviations
+FIRST_DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-2, 1e-9, 1e6  # relative to the Hessian's diagonal
+DAMPING_RISE, DAMPING_FALL = 6.0, 8.0  # factors after a refused and after an accepted step
+MIN_CURVATURE = 1e-6  # of a coordinate, in the damping term
 
 
 def descend(
-    posterior: Posterior,
+    model: ErrorModel,
     theta: np.ndarray,
     max_steps: int,
-    held: Sequence[int] = (),
+    fixed: Sequence[int] = (),
     errors: bool = True,
     converged: float = CONVERGED,
-):
-    """Levenberg-Marquardt: theta (P,) and minus the log posterior. Parameters with the indices
-    `held` stay; the posterior's errors are estimated on the way unless `errors` is false. A step
-    that gains less than `converged` is the last."""
-    free = np.setdiff1d(np.arange(len(theta)), held)
-    prediction = posterior.predict(theta)
-    if not posterior.is_valid(prediction):
-        return theta, np.inf  # no way leads down from there
+    damping: float = FIRST_DAMPING,
+) -> tuple[np.ndarray, float]:
+    """Mode near theta (P,) and minus the log posterior there; infinite where theta is not valid.
+
+    fixed      indices of the parameters that stay
+    errors     whether the errors of `model` are estimated again after each step
+    converged  gain of a step below which it is the last
+    damping    of the first step, relative to the diagonal of the Hessian
+
+    Method: Marquardt 1963, J. Soc. Ind. Appl. Math. 11:431.
+    """
+    free = np.setdiff1d(np.arange(len(theta)), fixed)
+    prediction = model.predict(theta)
+    if not model.is_valid(prediction):
+        return theta, np.inf
     if errors:
-        posterior.estimate_errors(prediction, theta)
-    value = posterior.objective(theta, prediction)
-    damping = 1e-2
+        model.estimate_errors(prediction, theta)
+    value = model.objective(theta, prediction)
     for _ in range(max_steps):
-        r, jacobian = posterior.linearise(theta, prediction)
+        r, jacobian = model.linearise(theta, prediction)
         jacobian = jacobian[:, free]
         gradient, hessian = jacobian.T @ r, jacobian.T @ jacobian
-        scale = np.maximum(np.diag(hessian), 1e-6)
+        scale = np.maximum(np.diag(hessian), MIN_CURVATURE)
         accepted = False
-        while damping < 1e6:
+        while damping < MAX_DAMPING:
             step = -np.linalg.solve(hessian + np.diag(damping * scale), gradient)
             new = theta.copy()
-            new[free] += np.clip(step, -REACH, REACH)
-            new_prediction = posterior.predict(new)
-            new_value = posterior.objective(new, new_prediction)
+            new[free] += np.clip(step, -MAX_STEP, MAX_STEP)
+            new_prediction = model.predict(new)
+            new_value = model.objective(new, new_prediction)
             if new_value < value:
                 accepted = True
                 break
-            damping *= 6.0
+            damping *= DAMPING_RISE
         if not accepted:
             break
-        damping = max(damping / 8.0, 1e-9)
+        damping = max(damping / DAMPING_FALL, MIN_DAMPING)
         theta, prediction = new, new_prediction
         if errors:
-            posterior.estimate_errors(prediction, theta)
-        last, value = value, min(new_value, posterior.objective(theta, prediction))
+            model.estimate_errors(prediction, theta)
+        last, value = value, min(new_value, model.objective(theta, prediction))
         if last - value < converged:
             break
     return theta, value
-
-
-def hessian(posterior: Posterior, theta: np.ndarray, prediction: np.ndarray) -> np.ndarray:
-    """Of minus the log posterior (P, P), to first order in the prediction."""
-    jacobian = posterior.linearise(theta, prediction)[1]
-    second = jacobian.T @ jacobian
-    # Shaft angles have no prior. Blind to the source they have no say either, hence the 1.
-    flat = ~posterior.prior
-    second[flat, flat] += 1.0 if posterior.source_free else 1e-9
-    return second

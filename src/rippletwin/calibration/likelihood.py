@@ -1,181 +1,260 @@
-"""How likely observations are under a twin: noise, a relative model error, an uncertain source.
+"""Error model of calibration: noise, a relative model error, an uncertain source.
 
-At each frequency the S sensors' values v and the prediction h make the residual e = v - h with
+At each frequency the values v (S,) of the sensors and the prediction h have the residual
+e = v - h with
 
-    E[e e^H] = C + delta^2 m I + sigma^2 h h^H,     m = (1 - g) |v|^2 + g mean_f |v|^2,
+    E[e e^H] = C + delta^2 m I + sigma^2 h h^H,     m = (1 - g) |v|^2 + g mean_f |v|^2.
 
-with |v|^2 the mean over sensors and mean_f that over frequencies too. C is the observation's own
-covariance. delta is the relative error floor of the model, estimated; the evenness g says whether
-it is relative to each harmonic (0) or to the whole ripple (1).
-sigma is the relative error of the source, common to all sensors: zero for a known source,
-estimated up to `twin.source_sd` for a nominal flow ripple, infinite for a free one, whose
-amplitude is then projected out. Its term is built from the prediction, not from the data, so a
-shrinking model gains nothing by it.
+* C is the covariance of the observation.
+* delta is the relative model error. It is estimated. |v|^2 is the mean over sensors, mean_f the
+  mean over frequencies. The evenness g says whether delta is relative to each harmonic (0) or to
+  the whole ripple (1).
+* sigma is the relative error of the source, common to all sensors. It is zero for a known source
+  and is estimated up to `twin.source_sd` for a nominal flow ripple. It is infinite for a free
+  source: the amplitude of the source is then projected out. Its term is built from the
+  prediction: with the data in its place a prediction that is too small would be rewarded.
 
-C is rotated to its eigenbasis once, which leaves the floor's term as it is; what remains is
-diagonal plus one rank, and its inverse root acts as: divide by the standard deviations, then
-shorten the part along the prediction by 1/sqrt(1 + sigma^2 |h|^2).
+Errors of different frequencies are independent. Errors of explaining are not: `posterior`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
+from rippletwin.calibration.error_model import ObservedRipple
+from rippletwin.calibration.whitening import NoiseBasis, Whitening, as_real
 from rippletwin.spectra.frequency_selection import select_below
-from rippletwin.twin.forward_model import ForwardModel, characteristic_impedance, reflection
+from rippletwin.twin.forward_jacobian import STEP, DifferentiableForward
+from rippletwin.twin.forward_model import characteristic_impedance, reflection
 
-FLOORS = np.geomspace(1e-4, 2.0, 40)
-SOURCE_STEPS = np.array([0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0])
+EVENNESS = 0.5
+"""Evenness g with which `calibrate` works. Where physics is missing, the weak upper harmonics are
+wholly wrong. With an error relative to each harmonic they would weigh as much as the strong lower
+ones."""
+
+MODEL_ERRORS = np.geomspace(1e-4, 2.0, 13)  # of the first search, which two finer ones follow
+FINER_MODEL_ERRORS = 9
+SOURCE_SHARES = np.array([0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0])
+"""Of the largest source error, `twin.source_sd`: the values tried for sigma."""
 
 
 class Likelihood:
-    """Whitened residuals of a twin against observations below a frequency.
+    """Log posterior of a twin with independent errors; see `ErrorModel` for the methods.
 
     Parameters
     ----------
     twin, observations : see rippletwin.twin.twin and rippletwin.spectra.observation.
     max_frequency_hz : use nothing above it; None for all.
-    floor : relative model error to begin with.
+    model_error : relative model error delta to begin with.
+    piston_orders : use only multiples of the number of pistons of periodic recordings. A healthy
+        nominal pump makes no other shaft orders.
     evenness : g above.
 
-    Columns are the frequencies of all observations side by side. With `piston_orders` the shaft
-    orders that no healthy nominal pump makes are left out of periodic recordings.
-
-    Attributes: `floor` and `source_sd` (delta and sigma of nominal sources), to be set by
-    `estimate_errors`; `count`, the number of real data; `observations`, as used.
+    Attributes: `model_error` and `source_sd` (delta and sigma of nominal sources) are set by
+    `estimate_errors`; `count` is the number of real data; `observations` are those used.
     """
+
+    source_free, smooth_sd = False, 0.0
+    needs_full_jacobian = True
+    """Derivatives that freeze the nonlinear load are wrong by up to 2 %. The model error may be far
+    less, and then a descent by them ends too far from the mode."""
 
     def __init__(
         self,
         twin,
         observations: Sequence,
         max_frequency_hz: float | None = None,
-        floor: float = 0.1,
+        model_error: float = 0.1,
         piston_orders: bool = True,
         evenness: float = 0.0,
     ):
         self.twin = twin
+        self._settings = {"piston_orders": piston_orders, "evenness": evenness}
         pistons = twin.rig.pump.get("pistons", 1) if piston_orders else 1
         self.observations = [select_below(o, max_frequency_hz, pistons) for o in observations]
-        self.forward = ForwardModel(twin, self.observations)
-        self.model_error, self.source_sd = floor, 0.0
+        self.forward = DifferentiableForward(twin, self.observations)
+        self.model_error, self.source_sd = model_error, 0.0
+        self.max_model_error = np.inf
         self.prior = np.array([not p.flat for p in twin.parameters])
-        self._groups = [_Group(comparable(o, twin.rig), evenness) for o in self.observations]
-        free = sum(g.values.shape[1] for g in self._groups if g.source == "free")
-        self.count = 2 * (sum(g.values.size for g in self._groups) - free)
+        data = [comparable(o, twin.rig) for o in self.observations]
+        impedance = [o.kind == "input_impedance" for o in data]
+        self._members = [np.flatnonzero(np.equal(impedance, which)) for which in (False, True)]
+        self._members = [members for members in self._members if len(members)]
+        self._groups = [_Group([data[k] for k in m], evenness) for m in self._members]
+        self._pressures = not any(impedance)
+        self._use_quotients = not self._pressures
+        self.count = 2 * sum(g.values.size - int(np.sum(g.free)) for g in self._groups)
 
-    def residual(self, theta: np.ndarray, prediction=None) -> np.ndarray:
-        """Whitened residuals (2 N,) of unit variance, then theta where it has a prior.
+    def below(self, max_frequency_hz: float) -> Likelihood:
+        """The same error model of the data at and below a frequency."""
+        return Likelihood(self.twin, self.observations, max_frequency_hz, **self._settings)
 
-        Half the sum of squares is minus the log posterior but for `log_determinant`. Complex data
-        give a real and an imaginary part of variance one half each, hence the factor sqrt 2.
-        """
-        prediction = self.forward(theta) if prediction is None else prediction
-        parts = []
-        for group, h in zip(self._groups, prediction):
-            r = group.whitened(h, self.model_error, self._sigma(group))[0]
-            parts += [r.real.ravel(), r.imag.ravel()]
-        return np.concatenate([np.sqrt(2.0) * np.concatenate(parts), theta[self.prior]])
+    def predict(self, theta: np.ndarray) -> list[np.ndarray]:
+        """Predictions (S, F): pressures of all observations side by side, then reflections."""
+        predicted = self.forward(theta)
+        return [np.concatenate([predicted[k] for k in m], axis=1) for m in self._members]
 
-    def objective(self, theta: np.ndarray, prediction=None) -> float:
-        """Minus the log posterior at the present floor and source error, but for a constant."""
-        prediction = self.forward(theta) if prediction is None else prediction
+    def by_observation(self, prediction: Sequence[np.ndarray]) -> list[ObservedRipple]:
+        """Measurement and prediction, one observation at a time."""
+        parts = [None] * len(self.observations)
+        for members, group, h in zip(self._members, self._groups, prediction):
+            for k, part in zip(members, group.slices):
+                parts[k] = ObservedRipple(group.values[:, part], h[:, part], group.power[part])
+        return parts
+
+    def is_valid(self, prediction: Sequence[np.ndarray]) -> bool:
+        """Whether the last prediction is finite and its nonlinear equations were solved."""
+        return self.forward.solved and all(np.all(np.isfinite(h)) for h in prediction)
+
+    def objective(self, theta: np.ndarray, prediction: Sequence[np.ndarray]) -> float:
+        """Minus the log posterior at the present errors but for a constant; inf if not valid."""
+        if not self.is_valid(prediction):
+            return np.inf
         total = 0.5 * float(np.sum(theta[self.prior] ** 2))
         for group, h in zip(self._groups, prediction):
-            r, log_determinant = group.whitened(h, self.model_error, self._sigma(group))
-            total += float(np.sum(np.abs(r) ** 2)) + log_determinant
+            whitening = group.whitening(h, self.model_error, self.source_sd)
+            total += float(np.sum(np.abs(whitening.apply(group.residual(h))) ** 2))
+            total += whitening.log_determinant
         return total
 
-    def estimate_errors(self, prediction: Sequence[np.ndarray]) -> None:
-        """Set floor and source error to their most likely values given the residuals.
+    def residual(self, theta: np.ndarray, prediction: Sequence[np.ndarray]) -> np.ndarray:
+        """Whitened residuals (N,) of unit variance, then theta where it has a prior.
 
-        Degrees of freedom taken by the parameters are made up for by scaling the sum of squares.
+        Half the sum of squares is minus the log posterior but for the log determinant.
         """
-        taken = min(np.sum(self.prior) + len(self.twin.labels), 0.5 * self.count)
-        scale = self.count / (self.count - taken)
-        sigmas = self.twin.source_sd * SOURCE_STEPS
-        floors = FLOORS
-        for _ in range(2):
-            cost = np.zeros((len(floors), len(sigmas)))
-            for group, h in zip(self._groups, prediction):
-                cost += group.cost(h, floors, sigmas, scale)
-            best, kept = np.unravel_index(np.argmin(cost), cost.shape)
-            # Once more, finely, about the best floor.
-            near = floors[max(best - 1, 0)], floors[min(best + 1, len(floors) - 1)]
-            self.model_error, self.source_sd = float(floors[best]), float(sigmas[kept])
-            floors = np.geomspace(*near, 12)
+        parts = []
+        for group, h in zip(self._groups, prediction):
+            whitening = group.whitening(h, self.model_error, self.source_sd)
+            parts.append(as_real(whitening.apply(group.residual(h))).ravel())
+        return np.concatenate([*parts, theta[self.prior]])
 
-    def _sigma(self, group: _Group) -> float:
-        return {"known": 0.0, "nominal": self.source_sd, "free": np.inf}[group.source]
+    def linearise(
+        self, theta: np.ndarray, prediction: Sequence[np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Residual (N,) and its Jacobian (N, P) at the present errors.
+
+        The sum of squares is the least over the error of the source. Its gradient therefore is
+        that with the source fixed at its most likely value, which multiplies every derivative.
+        """
+        residuals, columns = [], []
+        for group, h, slopes in zip(self._groups, prediction, self._slopes(theta, prediction)):
+            whitening = group.whitening(h, self.model_error, self.source_sd)
+            whitened = whitening.apply(group.residual(h))
+            slopes = slopes * group.best_source(
+                h, whitening.adjoint(whitened), self.model_error, self.source_sd
+            )
+            changes = -as_real(whitening.apply(group.noise.rotate(slopes)))
+            residuals.append(as_real(whitened).ravel())
+            columns.append(changes.reshape(len(theta), -1).T)
+        jacobian = np.concatenate([*columns, np.eye(len(theta))[self.prior]])
+        return np.concatenate([*residuals, theta[self.prior]]), jacobian
+
+    def estimate_errors(self, prediction: Sequence[np.ndarray], theta: np.ndarray) -> None:
+        """Set model error and source error to their most likely values given the residuals.
+
+        The sum of squares is scaled up for the degrees of freedom that the parameters take.
+        """
+        taken = min(len(self.prior), 0.5 * self.count)
+        scale = self.count / (self.count - taken)
+        model_errors, sigmas = MODEL_ERRORS, self.twin.source_sd * SOURCE_SHARES
+        for _ in range(3):
+            cost = sum(
+                group.cost(h, model_errors, sigmas, scale)
+                for group, h in zip(self._groups, prediction)
+            )
+            best, source = np.unravel_index(np.argmin(cost), cost.shape)
+            self.model_error, self.source_sd = float(model_errors[best]), float(sigmas[source])
+            ends = [max(best - 1, 0), min(best + 1, len(model_errors) - 1)]
+            model_errors = np.geomspace(*model_errors[ends], FINER_MODEL_ERRORS)
+            sigmas = sigmas[source : source + 1]
+        self.model_error = min(self.model_error, self.max_model_error)
+
+    def use_full_jacobian(self, theta: np.ndarray) -> None:
+        """From here on derivatives near theta include those of nonlinear load and compliance."""
+        if self._pressures and self.forward.has_nonlinear_compliance:
+            self.forward.use_full_jacobian(theta)
+        else:
+            self._use_quotients = True
+
+    def _slopes(self, theta: np.ndarray, prediction: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Derivatives of the predictions, list of (P, S, F)."""
+        if not self._use_quotients:
+            return [self.forward.derivatives(theta)]
+        moved = [self.predict(theta + STEP * unit) for unit in np.eye(len(theta))]
+        return [(np.stack(hs) - h) / STEP for hs, h in zip(zip(*moved), prediction)]
 
 
 class _Group:
-    """One observation in the eigenbasis of its covariance."""
+    """Values (S, F) of observations of one quantity side by side.
 
-    def __init__(self, o, evenness: float = 0.0):
-        variances, basis = np.linalg.eigh(o.covariance)  # (F, S), (F, S, S)
-        self.source = o.source
-        self.variances = np.maximum(variances, 0.0).T  # (S, F)
-        self.rotation = np.conj(basis)
-        self.values = self.rotate(o.values)
-        power = np.mean(np.abs(o.values) ** 2, axis=0)  # (F,)
-        self.power = (1.0 - evenness) * power + evenness * np.mean(power)
+    power       (F,) m, of each observation for itself
+    free        (F,) mask of the frequencies whose source is free; `nominal` likewise
+    """
 
-    def rotate(self, x: np.ndarray) -> np.ndarray:
-        return np.einsum("fsk,sf->kf", self.rotation, x)
+    def __init__(self, observations: Sequence, evenness: float):
+        sizes = np.cumsum([0, *(len(o.frequency_hz) for o in observations)])
+        self.slices = [slice(a, b) for a, b in pairwise(sizes)]
+        self.values = np.concatenate([o.values for o in observations], axis=1)
+        self.noise = NoiseBasis(np.concatenate([o.covariance for o in observations]))
+        self._rotated = self.noise.rotate(self.values)
+        self.power = np.mean(np.abs(self.values) ** 2, axis=0)
+        for part in self.slices:
+            own = self.power[part]
+            self.power[part] = (1.0 - evenness) * own + evenness * np.mean(own)
+        sources = np.repeat([o.source for o in observations], np.diff(sizes))
+        self.free, self.nominal = sources == "free", sources == "nominal"
 
-    def whitened(self, prediction, floor, sigma) -> tuple[np.ndarray, float]:
-        """Whitened residual (S, F) and the log determinant of its covariance."""
-        variance = self.variances + floor**2 * self.power
-        sd = np.sqrt(variance)
-        h = self.rotate(prediction)
-        e, u = (self.values - h) / sd, h / sd
-        log_determinant = float(np.sum(np.log(variance)))
-        if sigma == 0.0:
-            return e, log_determinant
-        size = np.maximum(np.sum(np.abs(u) ** 2, axis=0), 1e-300)
-        if np.isinf(sigma):
-            shorten = np.ones_like(size)
-            # The volume that the projection leaves: the free amplitude has a flat prior relative
-            # to the prediction's own size.
-            log_determinant += float(np.sum(np.log(size / np.sum(np.abs(h) ** 2, axis=0))))
-        else:
-            stretch = 1.0 + sigma**2 * size
-            shorten = 1.0 - 1.0 / np.sqrt(stretch)
-            log_determinant += float(np.sum(np.log(stretch)))
-        along = np.sum(np.conj(u) * e, axis=0) / size
-        return e - shorten * along * u, log_determinant
+    def variance(self, model_error) -> np.ndarray:
+        """Variance (..., S, F) of noise and model error (...)."""
+        return self.noise.variances + model_error**2 * self.power
 
-    def cost(self, prediction, floors, sigmas, scale) -> np.ndarray:
-        """Minus log likelihood (len(floors), len(sigmas)), squares scaled by `scale`."""
-        variance = self.variances + floors[:, None, None] ** 2 * self.power  # (D, S, F)
-        h = self.rotate(prediction)
-        e = self.values - h
-        square = np.sum(np.abs(e) ** 2 / variance, axis=1)
-        cross = np.abs(np.sum(np.conj(h) * e / variance, axis=1)) ** 2
-        size = np.maximum(np.sum(np.abs(h) ** 2 / variance, axis=1), 1e-300)
-        logs = np.sum(np.log(variance), axis=(1, 2))
-        if self.source == "free":
-            logs = logs + np.sum(np.log(size), axis=1)
-            return np.repeat(
-                (scale * np.sum(square - cross / size, axis=1) + logs)[:, None], len(sigmas), 1
-            )
-        if self.source == "known":
-            sigmas = np.zeros_like(sigmas)
-        stretch = 1.0 + sigmas[:, None] ** 2 * size[:, None, :]  # (D, G, F)
-        along = np.sum(sigmas[:, None] ** 2 * cross[:, None, :] / stretch, axis=2)
-        return (
-            scale * (np.sum(square, axis=1)[:, None] - along)
-            + logs[:, None]
-            + np.sum(np.log(stretch), axis=2)
-        )
+    def residual(self, prediction: np.ndarray) -> np.ndarray:
+        """Residual (S, F) in the eigenbasis of the noise."""
+        return self._rotated - self.noise.rotate(prediction)
+
+    def whitening(self, prediction: np.ndarray, model_error: float, sigma: float) -> Whitening:
+        """Whitening by the covariance that a prediction (S, F) implies."""
+        source = np.where(self.free, np.inf, np.where(self.nominal, sigma, 0.0))
+        return Whitening(self.noise.rotate(prediction), np.sqrt(self.variance(model_error)), source)
+
+    def best_source(self, prediction, pull, model_error: float, sigma: float) -> np.ndarray:
+        """Most likely source (F,) relative to that of the prediction (S, F).
+
+        pull   (S, F) residual multiplied by the inverse covariance
+        """
+        h = self.noise.rotate(prediction)
+        source = 1.0 + np.where(self.nominal, sigma**2, 0.0) * np.sum(np.conj(h) * pull, axis=0)
+        if not np.any(self.free):
+            return source
+        weight = 1.0 / self.variance(model_error)
+        size = np.maximum(np.sum(weight * np.abs(h) ** 2, axis=0), 1e-300)
+        amplitude = np.sum(weight * np.conj(h) * self._rotated, axis=0) / size
+        return np.where(self.free, amplitude, source)
+
+    def cost(self, prediction, model_errors, sigmas, scale) -> np.ndarray:
+        """Minus log likelihood (D, G) of model errors (D,) and source errors sigmas (G,).
+
+        The squares are multiplied by `scale`.
+        """
+        weight = 1.0 / self.variance(model_errors[:, None, None])  # (D, S, F)
+        h, e = self.noise.rotate(prediction), self.residual(prediction)
+        square = np.sum(np.abs(e) ** 2 * weight, axis=1)
+        cross = np.abs(np.sum(np.conj(h) * e * weight, axis=1)) ** 2
+        size = np.maximum(np.sum(np.abs(h) ** 2 * weight, axis=1), 1e-300)
+        variances = np.where(self.nominal, sigmas[:, None] ** 2, 0.0)
+        stretch = 1.0 + variances * size[:, None]  # (D, G, F)
+        along = np.where(self.free, 1.0 / size[:, None], variances / stretch) * cross[:, None]
+        logs = np.log(np.where(self.free, size[:, None], stretch))
+        cost = np.sum(scale * (square[:, None] - along) + logs, axis=2)
+        return cost - np.sum(np.log(weight), axis=(1, 2))[:, None]
 
 
 def comparable(observation, rig):
-    """The observation in the quantity that `Forward` predicts.
+    """The observation in the quantity that `ForwardModel` predicts.
 
     An input impedance becomes a reflection coefficient (see `reflection`), its
     covariance with it: dR = 2 dz/(z + 1)^2 with z over the data sheet's rho a/A. The rest stays.

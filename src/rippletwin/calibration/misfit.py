@@ -18,10 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rippletwin.calibration.error_model import ErrorModel
 from rippletwin.calibration.fit import Fit
-from rippletwin.calibration.likelihood import comparable
-from rippletwin.calibration.multistart import align_shaft_angles
 from rippletwin.calibration.posterior import Posterior
+from rippletwin.calibration.shaft_angles import fit_shaft_angles
 
 
 @dataclass(frozen=True)
@@ -45,15 +45,14 @@ def theil(measured: np.ndarray, predicted: np.ndarray) -> float:
     return float(np.linalg.norm(measured - predicted) / total) if total else 0.0
 
 
-def misfit(likelihood, theta: np.ndarray) -> Misfit:
-    """Misfits of the observations of `likelihood` at theta.
+def misfit(model: ErrorModel, theta: np.ndarray) -> Misfit:
+    """Misfits of the observations of `model` at theta (P,).
 
-    The amplitude of a free source is the most likely one at each frequency, hence the misfit is
-    then that of the ratios between sensors.
+    A free source gets its most likely amplitude at each frequency, so the misfit then is that of
+    the ratios between sensors.
     """
     pairs = {}
-    for o, h in zip(likelihood.observations, likelihood.forward(theta)):
-        measured = comparable(o, likelihood.twin.rig).values
+    for o, (measured, h, _) in zip(model.observations, model.by_observation(model.predict(theta))):
         if o.source == "free":
             h = h * (np.sum(np.conj(h) * measured, 0) / np.sum(np.abs(h) ** 2, 0))
         for name, v, x in zip(_names(o), measured, h):
@@ -85,28 +84,12 @@ class Score:
 def score_fit(fit: Fit, observations: Sequence, turn: bool = False) -> Score:
     """Misfits of a fit's predictions; free sources get their most likely amplitude.
 
-    With `turn` the shaft angles, which every recording has anew, are fitted first, alone.
+    turn   whether the shaft angles are fitted first; every recording has its own
     """
-    twin = fit.twin
-    posterior = Posterior(twin, observations, None, fit.source_free)
+    posterior = Posterior(fit.twin, observations, None, fit.source_free)
     posterior.model_error, posterior.source_sd = fit.model_error, fit.source_sd
-    theta = twin.theta
+    theta = fit.twin.theta
     if turn:
-        theta = _fit_shaft_angles(posterior, theta)
+        theta = fit_shaft_angles(posterior, theta)
     h = posterior.best_source(posterior.predict(theta))
     return Score(relative_misfit(posterior.values, h), theil(posterior.values, h))
-
-
-def _fit_shaft_angles(posterior: Posterior, theta: np.ndarray) -> np.ndarray:
-    """theta with the shaft angles fitted and all else held."""
-    angles = np.flatnonzero(~posterior.prior)
-    used = [k for k in angles if k in posterior.forward.source.angles]
-    if not used:
-        return theta
-    theta = align_shaft_angles(posterior, theta)[1]
-    for _ in range(6):
-        r, jacobian = posterior.linearise(theta, posterior.predict(theta))
-        step = np.linalg.lstsq(jacobian[:, used], -r, rcond=None)[0]
-        theta = theta.copy()
-        theta[used] += np.clip(step, -5.0, 5.0)
-    return theta

@@ -18,14 +18,13 @@ import numpy as np
 
 from rippletwin.calibration.calibrate import (
     DEFAULTS,
-    EVENNESS,
     Calibration,
     Settings,
-    align,
     conclude,
-    limits_of,
 )
-from rippletwin.calibration.likelihood import Likelihood, comparable
+from rippletwin.calibration.frequency_continuation import continuation_limits
+from rippletwin.calibration.likelihood import EVENNESS, Likelihood
+from rippletwin.calibration.shaft_angles import align_shaft_angles
 from rippletwin.twin.twin import Twin
 
 BOX = 3.0  # prior standard deviations
@@ -62,7 +61,8 @@ def calibrate_pareto(
 
     if not observations:
         raise ValueError("calibration needs at least one observation")
-    limits = limits_of(observations, settings)
+    whole = Likelihood(twin, observations, settings.max_frequency_hz, evenness=EVENNESS)
+    limits = continuation_limits(whole.observations, settings.limits_hz)
     searched = np.array([not p.flat for p in twin.parameters])
 
     class Ripple(ElementwiseProblem):
@@ -74,7 +74,7 @@ def calibrate_pareto(
         def whole(self, x):
             theta = twin.theta.copy()
             theta[searched] = x
-            return align(self.likelihood, theta)
+            return align_shaft_angles(self.likelihood, theta)[1]
 
         def _evaluate(self, x, out, *args, **kwargs):
             out["F"] = objectives(self.likelihood, self.whole(x))
@@ -83,7 +83,7 @@ def calibrate_pareto(
     members = np.clip(rng.standard_normal((population, searched.sum())), -BOX, BOX)
     members[0] = twin.theta[searched]
     for stage, limit in enumerate(limits):
-        problem = Ripple(Likelihood(twin, observations, limit, evenness=EVENNESS))
+        problem = Ripple(whole.below(limit))
         result = minimize(
             problem,
             NSGA2(pop_size=population, sampling=members),
@@ -95,14 +95,13 @@ def calibrate_pareto(
             progress(f"below {limit:.0f} Hz: {len(result.X)} members, {result.F.min(0)}")
     order = np.argsort(np.sum(result.F, axis=1))
     theta = np.array([problem.whole(x) for x in result.X[order]])
-    return ParetoSet(theta, result.F[order], conclude(problem.likelihood, theta[0], limits[0]))
+    return ParetoSet(theta, result.F[order], conclude(problem.likelihood, theta[0], settings))
 
 
 def objectives(likelihood: Likelihood, theta: np.ndarray) -> np.ndarray:
     """Squared relative misfit of each sensor, (S,), all observations together."""
     left, total = 0.0, 0.0
-    for o, h in zip(likelihood.observations, likelihood.forward(theta)):
-        measured = comparable(o, likelihood.twin.rig).values
+    for measured, h, _ in likelihood.by_observation(likelihood.predict(theta)):
         left = left + np.sum(np.abs(measured - h) ** 2, axis=1)
         total = total + np.sum(np.abs(measured) ** 2, axis=1)
     return left / total

@@ -1,4 +1,4 @@
-"""What whitens residuals of which noise, a model error and a nominal source's error make part."""
+"""Whitening of residuals by noise, model error and source error."""
 
 from __future__ import annotations
 
@@ -6,19 +6,37 @@ from functools import cached_property
 
 import numpy as np
 
-CORRELATION_HZ = 1000.0  # l and f0 of `rippletwin.calibration.posterior`
-LEAST = 0.01  # of the strongest harmonic: smaller ones are uncertain by more than their own share
-KEPT = 1e-3  # of the kernel's largest eigenvalue
+
+class NoiseBasis:
+    """Eigenbasis of the sensor noise at each frequency.
+
+    In it the noise and a model error common to all sensors are both diagonal.
+
+    covariance   (F, S, S) Hermitian, E[e e^H]
+    variances    (S, F) eigenvalues
+    """
+
+    def __init__(self, covariance: np.ndarray):
+        variances, basis = np.linalg.eigh(covariance)
+        self.variances = np.maximum(variances, 0.0).T
+        self.rotation = np.conj(basis)
+
+    def rotate(self, x: np.ndarray) -> np.ndarray:
+        """Sensor values x (..., S, F) in the eigenbasis."""
+        return np.einsum("fsk,...sf->...kf", self.rotation, x)
 
 
 class Whitening:
-    """Multiplication by an inverse root of the covariance sd^2 + source h h^H + smooth part.
+    """Multiplication by an inverse root of the covariance sd^2 + source^2 h h^H + smooth part.
 
-    h (S, F), sd (S, F), source (F,) the error of each frequency's source (0 known, inf free),
-    nominal the N frequencies that have a smooth error and its basis (J, N).
+    h         (S, F) prediction
+    sd        (S, F) standard deviations of what is independent between sensors
+    source    (F,) relative error of the source at each frequency; 0 known, inf free
+    nominal   (N,) indices of the frequencies that have a smooth source error as well
+    basis     (J, N) basis of that error, in standard deviations; None for none
     """
 
-    def __init__(self, h, sd, source, nominal, basis):
+    def __init__(self, h, sd, source, nominal=(), basis=None):
         self._sd, self._u = sd, h / sd
         self._size = np.maximum(np.sum(np.abs(self._u) ** 2, axis=0), 1e-300)
         free = np.isinf(source)
@@ -27,7 +45,7 @@ class Whitening:
         power = np.sum(np.abs(h) ** 2, axis=0)
         self._volume = np.where(free, self._size / np.maximum(power, 1e-300), stretch)
         self._part, self._columns, self._grown = nominal, None, np.zeros(0)
-        if np.any(basis):
+        if basis is not None and np.any(basis):
             # Whitened so far, the smooth error is B c with unit c: I + B B^H in the span of B.
             gram = (basis * (self._size / stretch)[nominal]) @ basis.T
             grown, turn = np.linalg.eigh(gram)
@@ -39,12 +57,12 @@ class Whitening:
 
     @cached_property
     def log_determinant(self) -> float:
-        """Of the covariance, but for what a free source takes with it."""
+        """Log determinant of the covariance; of a free source only the volume that is left."""
         rough = 2.0 * np.sum(np.log(self._sd)) + np.sum(np.log(self._volume))
         return float(rough + np.sum(np.log1p(self._grown)))
 
     def apply(self, x: np.ndarray) -> np.ndarray:
-        """x (..., S, F) multiplied."""
+        """x (..., S, F) multiplied by the inverse root."""
         return self._shorten_smooth(self._shorten_rough(x / self._sd))
 
     def adjoint(self, x: np.ndarray) -> np.ndarray:
@@ -66,20 +84,9 @@ class Whitening:
         return y
 
 
-def smooth_basis(frequency_hz: np.ndarray, recording: np.ndarray) -> np.ndarray:
-    """Basis (J, N) of errors smooth in frequency, basis.T @ basis = K; recording (N,) numbers."""
-    f = np.asarray(frequency_hz, float) / CORRELATION_HZ
-    kernel = 1.0 + (1.0 + np.outer(f, f)) * np.exp(-0.5 * np.subtract.outer(f, f) ** 2)
-    kernel = kernel * (0.5 + 0.5 * np.equal.outer(recording, recording))
-    values, vectors = np.linalg.eigh(kernel)
-    kept = values > KEPT * np.max(values, initial=0.0)
-    return np.sqrt(values[kept])[:, None] * vectors[:, kept].T
+def as_real(r: np.ndarray) -> np.ndarray:
+    """Complex residuals (..., S, F) of unit variance as real ones (..., 2, S, F).
 
-
-def source_scale(source: np.ndarray) -> np.ndarray:
-    """g (F,) of a ripple's harmonics (F,) in ascending order, two neighbours a side counting."""
-    power = np.abs(source) ** 2
-    kernel = np.exp(-0.5 * np.arange(-2, 3) ** 2.0)
-    about = np.convolve(power, kernel / kernel.sum())[2:-2]
-    about = np.maximum(about, power) + LEAST**2 * np.max(power)
-    return np.sqrt(about / np.maximum(power, 1e-300))
+    The real and the imaginary part have half the variance each, hence the factor sqrt 2.
+    """
+    return np.sqrt(2.0) * np.stack([r.real, r.imag], axis=-3)

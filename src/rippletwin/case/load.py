@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection
 from pathlib import Path
 
-from rippletwin.case import checks, tables
+import numpy as np
+
+from rippletwin.case import tables
 from rippletwin.case.model import (
     STATE_CODES,
     Case,
@@ -17,71 +19,75 @@ from rippletwin.case.model import (
     Sensor,
     Uncertainty,
 )
-from rippletwin.case.readers.registry import reader_of
-from rippletwin.case.rig_yaml import read_sheet
-from rippletwin.errors import InputError
+from rippletwin.case.plausibility import implausible
+from rippletwin.case.readers.registry import read_signals
+from rippletwin.case.rig_yaml import find_sheet, read_sheet, schema_errors
+from rippletwin.case.sheet_checks import sheet_errors
+from rippletwin.case.signal_checks import sampling_rate, signal_errors
+from rippletwin.errors import InputError, raise_any
 
 SAMPLED = ("periodic", "random")
+SMALLEST_MEAN = 1e-6  # of the largest flow; a smaller mean is none
 
 
 def load_case(folder: str | Path, states: Collection[str] | None = None) -> Case:
-    """Read and check a case folder.
+    """Read and check a case.
 
     Parameters
     ----------
-    folder : holds rig.yaml and the files it names.
+    folder : holds rig.yaml and the files it names; or that rig.yaml.
     states : read only recordings of these states (labels of rig.yaml, e.g. {"healthy"}); all where
         None. The sheet is checked whole in any case.
 
     Raises
     ------
-    InputError : at the first fault of the sheet or of a recording.
+    InputError : for all faults of the sheet; where it has none, for all faults of the recordings.
     ValueError : where `states` holds a label that does not exist.
     """
     if states is not None and (strange := set(states) - set(STATE_CODES)):
         raise ValueError(f"unknown states {sorted(strange)}; known: {', '.join(STATE_CODES)}")
-    folder = Path(folder)
-    sheet_path = folder / "rig.yaml"
+    sheet_path = find_sheet(folder)
+    folder = sheet_path.parent
     sheet = read_sheet(sheet_path)
-    rig = _rig(folder, sheet_path, sheet)
-    checks.check_sheet(sheet_path, sheet, rig)
-    recordings = tuple(
-        _recording(folder, sheet_path, entry, rig)
-        for entry in sheet["recordings"]
-        if states is None or entry["state"] in states
-    )
-    return Case(folder=folder, rig=rig, recordings=recordings)
+    errors, warnings = implausible(sheet_path, sheet)
+    raise_any([*schema_errors(sheet_path, sheet), *sheet_errors(sheet_path, sheet), *errors])
+    rig = _rig(folder, sheet)
+    recordings, faults = [], []
+    for entry in sheet["recordings"]:
+        if states is not None and entry["state"] not in states:
+            continue
+        try:
+            recordings.append(_recording(folder, entry, rig))
+        except InputError as error:
+            faults.append(error)
+    raise_any(faults)
+    return Case(folder=folder, rig=rig, recordings=tuple(recordings), warnings=tuple(warnings))
 
 
-def _rig(folder: Path, sheet_path: Path, sheet: dict) -> Rig:
+def _rig(folder: Path, sheet: dict) -> Rig:
+    pump = dict(sheet.get("pump", {}))
+    if "pistons" in pump:
+        pump["pistons"] = int(pump["pistons"])  # 9.0 is a whole number too
     return Rig(
         fluid=Fluid(**sheet["fluid"]),
-        pump=dict(sheet.get("pump", {})),
+        pump=pump,
         line=tuple(Segment(**segment) for segment in sheet["line"]["segments"]),
         sensors=tuple(Sensor(**sensor) for sensor in sheet.get("sensors", [])),
-        load=_load(folder, sheet_path, sheet["load"]),
+        load=_load(folder, sheet["load"]),
         uncertainty=Uncertainty(**sheet.get("uncertainty", {})),
     )
 
 
-def _load(folder: Path, sheet_path: Path, entry: dict) -> Load:
+def _load(folder: Path, entry: dict) -> Load:
     numbers = {key: entry[key] for key in ("coefficient", "back_pressure") if key in entry}
     kind = entry.get("kind", "impedance")
-    if (kind == "impedance") != ("impedance" in entry):
-        raise InputError(
-            sheet_path,
-            "load.impedance",
-            "missing" if kind == "impedance" else f"given, but the load's kind is {kind}",
-            "A load of kind impedance names its file in the key impedance; no other kind does",
-        )
     if kind != "impedance":
         return Load(kind=kind, **numbers)
-    path = checks.existing(folder, sheet_path, "load.impedance", entry["impedance"])
-    frequency_hz, impedance = tables.read_impedance(path)
+    frequency_hz, impedance = tables.read_impedance(folder / entry["impedance"])
     return Load(kind=kind, frequency_hz=frequency_hz, impedance=impedance, **numbers)
 
 
-def _recording(folder: Path, sheet_path: Path, entry: dict, rig: Rig) -> Recording:
+def _recording(folder: Path, entry: dict, rig: Rig) -> Recording:
     path = folder / entry["file"]
     kind = entry.get("kind", "periodic")
     fields = {
@@ -91,14 +97,27 @@ def _recording(folder: Path, sheet_path: Path, entry: dict, rig: Rig) -> Recordi
     }
     fields.update(file=path, kind=kind, label=entry.get("label", path.stem))
     if "flow_ripple" in entry:
-        fields["flow_ripple"] = tables.read_flow_ripple(folder / entry["flow_ripple"])
+        ripple = tables.read_flow_ripple(folder / entry["flow_ripple"])
+        _check_mean_flow(folder / entry["flow_ripple"], ripple.flow, rig)
+        fields["flow_ripple"] = ripple
     if kind not in SAMPLED:
         files = [path, *(folder / name for name in entry.get("repeats", []))]
         names = [sensor.name for sensor in rig.sensors] if kind == "spectrum" else None
         frequency_hz, spectra = tables.read_repeats(files, names)
         return Recording(**fields, frequency_hz=frequency_hz, spectra=spectra)
-    signals = reader_of(path)(path, [sensor.name for sensor in rig.sensors])
-    rate = checks.sampling_rate(path, signals, entry.get("sampling_rate_hz"))
+    signals = read_signals(path, [sensor.name for sensor in rig.sensors])
+    rate = sampling_rate(path, signals, entry.get("sampling_rate_hz"))
     recording = Recording(**fields, pressure=signals.pressure, sampling_rate_hz=rate)
-    checks.check_signals(recording, rig)
+    raise_any(signal_errors(recording, rig))
     return recording
+
+
+def _check_mean_flow(path: Path, flow: np.ndarray, rig: Rig) -> None:
+    """Raise InputError where an orifice's coefficient has to come from a mean flow of zero."""
+    if rig.load.passes_flow and abs(np.mean(flow)) < SMALLEST_MEAN * np.max(np.abs(flow)):
+        raise InputError(
+            path,
+            "flow_m3_s",
+            "the mean flow is zero, but the orifice's coefficient follows from it",
+            "Add the mean flow, or give load.coefficient in rig.yaml",
+        )

@@ -1,9 +1,11 @@
-"""rig.yaml: parse it and hold it against its schema."""
+"""rig.yaml: read it and compare it with its schema."""
 
 from __future__ import annotations
 
 import difflib
+import math
 import re
+from collections.abc import Iterator
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -11,32 +13,23 @@ from pathlib import Path
 import jsonschema
 import yaml
 
+from rippletwin.case.yaml_limits import read_yaml
 from rippletwin.errors import InputError
 
-_FLOAT = re.compile(r"^[-+]?(\d[\d_]*\.?[\d_]*|\.\d[\d_]*)([eE][-+]?\d+)?$")
+TYPES = {
+    "number": "a number",
+    "integer": "a whole number",
+    "string": "text",
+    "boolean": "true or false",
+    "array": "a list",
+    "object": "a mapping of keys to values",
+}
+"""What the schema's types are called in messages."""
 
-
-class _Loader(yaml.SafeLoader):
-    """YAML as people write it: 9.5e6 is a number, a key given twice is an error."""
-
-    yaml_implicit_resolvers = {  # noqa: RUF012
-        first: [(tag, pattern) for tag, pattern in resolvers if tag != "tag:yaml.org,2002:float"]
-        for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
-    }
-
-    def construct_mapping(self, node, deep=False):
-        seen = set()
-        for key, _ in node.value:
-            if str(key.value) in seen:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f"the key {key.value!r} is given twice", key.start_mark
-                )
-            seen.add(str(key.value))
-        return super().construct_mapping(node, deep)
-
-
-# YAML 1.1 reads 9.5e6 as text; .nan and .inf stay text here so that the schema refuses them.
-_Loader.add_implicit_resolver("tag:yaml.org,2002:float", _FLOAT, list("-+0123456789."))
+NOT_FINITE = {".nan", ".inf", "-.inf", "+.inf", "nan", "inf", "-inf"}
+_DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?")
+_BASE_60 = re.compile(r"[-+]?\d+(:\d+)+(\.\d+)?")
+_WITH_UNIT = re.compile(r"([-+]?[\d.]+([eE][-+]?\d+)?)\s*[^\d\s].*")
 
 
 @cache
@@ -46,52 +39,156 @@ def schema() -> dict:
     return yaml.safe_load(text)
 
 
+def find_sheet(case: str | Path) -> Path:
+    """The path of a case's rig.yaml, given its folder or that file; raises InputError."""
+    case = Path(case)
+    try:
+        path = case if case.name == "rig.yaml" and case.is_file() else case / "rig.yaml"
+        if path.is_file():
+            return path
+        folder = case.is_dir()
+    except (OSError, ValueError) as error:
+        raise InputError(case, "case", f"cannot be opened ({error})", "Correct the path") from error
+    if folder:
+        problem, remedy = "not there", "A case is a folder that holds a rig.yaml"
+    else:
+        problem = "the case is a file" if case.exists() else "there is no such folder"
+        remedy = "Give the folder that holds rig.yaml"
+    raise InputError(path, "rig.yaml", problem, remedy)
+
+
 def read_sheet(path: Path) -> dict:
-    """Parse and validate `path` (a rig.yaml); raises InputError at the first fault."""
-    if not path.is_file():
+    """The mapping in a rig.yaml, not yet compared with the schema; raises InputError."""
+    sheet = read_yaml(path)
+    if not isinstance(sheet, dict):
         raise InputError(
             path,
-            "rig.yaml",
-            "not there",
-            "A case is a folder that holds a rig.yaml; see docs/cases.md",
+            "the whole file",
+            f"holds {_shown(sheet)}, not a mapping of keys to values",
+            "Write fluid, line, load and recordings, each followed by a colon",
         )
-    try:
-        sheet = yaml.load(path.read_text("utf-8"), Loader=_Loader)
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        mark = getattr(error, "problem_mark", None)
-        place = f"line {mark.line + 1}, column {mark.column + 1}" if mark else "the whole file"
-        problem = getattr(error, "problem", None) or str(error)
-        raise InputError(path, place, f"not YAML: {problem}", "Correct the syntax there") from error
-    errors = jsonschema.Draft202012Validator(schema()).iter_errors(sheet)
-    first = min(errors, key=lambda error: [str(part) for part in error.absolute_path], default=None)
-    if first is not None:
-        raise _explained(path, first)
     return sheet
 
 
-def _explained(path: Path, error: jsonschema.ValidationError) -> InputError:
-    """The InputError that says what a schema violation means."""
-    field = _field(error.absolute_path)
-    rule, value = error.validator, error.instance
+def schema_errors(path: Path, sheet: dict) -> list[InputError]:
+    """Where a sheet violates its schema, one error a field, in the order of the fields."""
+    errors = list(jsonschema.Draft202012Validator(schema()).iter_errors(sheet))
+    errors.sort(key=lambda error: [str(part) for part in error.absolute_path])
+    found = [one for error in errors for one in _explained(path, error)]
+    told = {error.field for error in found}
+    for field, value in leaves(sheet):
+        if isinstance(value, float) and not math.isfinite(value) and field not in told:
+            problem = "the number is not finite: beyond 1.8e308"
+            found.append(InputError(path, field, problem, "Correct it"))
+    return list({error.field: error for error in reversed(found)}.values())[::-1]
+
+
+def leaves(value: object, field: str = "") -> Iterator[tuple[str, object]]:
+    """(field, value) of everything in a sheet that is neither a list nor a mapping.
+
+    Fields are written as in messages: recordings[0].file.
+    """
+    if isinstance(value, dict):
+        for key, part in value.items():
+            yield from leaves(part, f"{field}.{key}" if field else str(key))
+    elif isinstance(value, list):
+        for index, part in enumerate(value):
+            yield from leaves(part, f"{field}[{index}]")
+    else:
+        yield field, value
+
+
+def _explained(path: Path, error: jsonschema.ValidationError) -> list[InputError]:
+    """What a violation of the schema means, one error a key."""
+    place, value = list(error.absolute_path), error.instance
+    field, rule = _field(place), error.validator
     if rule == "additionalProperties":
         known = list(error.schema["properties"])
         unknown = [key for key in value if key not in known]
-        field = ", ".join(_field([*error.absolute_path, key]) for key in unknown)
-        near = difflib.get_close_matches(str(unknown[0]), known, n=1)
-        hint = f"Did you mean {near[0]}? " if near else ""
-        return InputError(path, field, "unknown key", f"{hint}Known here: {', '.join(known)}")
+        return [_unknown(path, _field([*place, key]), str(key), known) for key in unknown]
     if rule == "required":
-        missing = [key for key in error.validator_value if key not in value]
-        field = _field([*error.absolute_path, missing[0]])
-        described = error.schema["properties"][missing[0]].get("description", "")
-        return InputError(path, field, "missing", f"Give it: {described}")
+        properties = error.schema["properties"]
+        return [
+            InputError(
+                path,
+                _field([*place, key]),
+                "missing",
+                f"Give it: {properties[key].get('description', '')}",
+            )
+            for key in error.validator_value
+            if key not in value
+        ]
+    if rule == "dependentRequired":
+        return [
+            InputError(path, _field([*place, other]), "missing", f"{key} needs {other} beside it")
+            for key, others in error.validator_value.items()
+            for other in others
+            if key in value and other not in value
+        ]
+    if rule == "anyOf":
+        keys = " or ".join(option["required"][0] for option in error.validator_value)
+        return [InputError(path, field, f"has neither {keys}", f"Give {keys}")]
     description = error.schema.get("description", "")
-    if rule == "type" and isinstance(value, str) and value.lower() in {".nan", ".inf", "-.inf"}:
-        return InputError(path, field, f"{value} is not a finite number", f"Give {description}")
+    give = f"Give {description}" if description else "Correct it"
+    if rule == "type":
+        return [_wrong_type(path, field, value, error.validator_value, give)]
     if rule == "enum":
         choices = ", ".join(str(choice) for choice in error.validator_value)
-        return InputError(path, field, f"{value!r} is not known", f"Choose one of: {choices}")
-    return InputError(path, field, error.message, f"Give {description}" if description else "")
+        near = difflib.get_close_matches(str(value).lower(), error.validator_value, n=1)
+        hint = f"Did you mean {near[0]}? " if near else ""
+        problem = f"{_shown(value)} is not known"
+        return [InputError(path, field, problem, f"{hint}Choose one of: {choices}")]
+    limits = {
+        "minimum": "less than",
+        "maximum": "more than",
+        "exclusiveMinimum": "not more than",
+        "exclusiveMaximum": "not less than",
+    }
+    if rule in limits:
+        problem = f"{_shown(value)} is {limits[rule]} {error.validator_value:g}"
+    elif rule in ("minItems", "minLength"):
+        problem = "empty"
+    else:
+        problem = error.message
+    return [InputError(path, field, problem, give)]
+
+
+def _unknown(path: Path, field: str, key: str, known: list[str]) -> InputError:
+    near = difflib.get_close_matches(key, known, n=1)
+    hint = f"Did you mean {near[0]}? " if near else ""
+    return InputError(path, field, "unknown key", f"{hint}Known here: {', '.join(known)}")
+
+
+def _wrong_type(path: Path, field: str, value, wanted: str, give: str) -> InputError:
+    """A value of the wrong type, with what it may have been meant for."""
+    problem = f"{_shown(value)} is not {TYPES[wanted]}"
+    if value is None:
+        problem = "nothing is given"
+    elif wanted == "string":
+        give = (
+            f'Put it in quotes: "{value}"'
+            if not isinstance(value, bool)
+            else ("Put it in quotes: YAML reads yes, no, on and off as true or false")
+        )
+    elif wanted in ("number", "integer") and isinstance(value, str):
+        if value.lower() in NOT_FINITE:
+            problem = f"{value} is not a finite number"
+        elif _DECIMAL_COMMA.fullmatch(value):
+            give = f"Write a decimal point: {value.replace(',', '.')}"
+        elif _BASE_60.fullmatch(value):
+            give = f"Write a decimal number; colons (base 60) are not read. {give}"
+        elif unit := _WITH_UNIT.fullmatch(value):
+            give = f"Give the number alone, as {unit[1]}, in SI units. {give}"
+    return InputError(path, field, problem, give)
+
+
+def _shown(value: object) -> str:
+    """A value as a message shows it, without its content where it is a list or a mapping."""
+    if isinstance(value, dict):
+        return "a mapping"
+    if isinstance(value, list):
+        return "a list"
+    return repr(value)
 
 
 def _field(parts) -> str:

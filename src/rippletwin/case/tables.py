@@ -8,9 +8,14 @@ import numpy as np
 import pandas as pd
 
 from rippletwin.case.model import FlowRipple
-from rippletwin.errors import InputError
+from rippletwin.case.readers.file_checks import DOUBLE, check_readable, check_size
+from rippletwin.case.readers.signals import similar_name
+from rippletwin.case.readers.text_tables import fields, first_lines, is_numeric, separator_error
+from rippletwin.errors import InputError, raise_any
 
 LARGEST_PLAUSIBLE_FLOW = 1.0  # m3/s; a pump of 60,000 L/min
+SMALLEST_RIPPLE = 1e-9  # of the largest flow; less is rounding
+MAX_TABLE_GIB = 0.05
 
 
 def read_table(path: Path, columns: list[str]) -> np.ndarray:
@@ -19,21 +24,25 @@ def read_table(path: Path, columns: list[str]) -> np.ndarray:
     A table without a header, of numbers only, is taken column by column; it may be separated by
     white space. Raises InputError where a column is absent or a number is not finite.
     """
+    check_readable(path)
+    check_size(path, "file", path.stat().st_size // DOUBLE, MAX_TABLE_GIB)
+    lines = first_lines(path)
+    bare = is_numeric(lines[0])
+    named = set(fields(lines[0])) | set(lines[0].split())
+    if not bare and not set(columns) <= named:
+        raise_any(filter(None, [separator_error(path, lines, columns)]))
     try:
-        with open(path, encoding="utf-8-sig") as file:
-            first = file.readline()
-        separator = "," if "," in first else r"\s+"
-        bare = _is_numeric(first.replace(",", " "))
         table = pd.read_csv(
             path,
-            sep=separator,
+            sep="," if "," in lines[0] else r"\s+",
             header=None if bare else 0,
             skipinitialspace=True,
             encoding="utf-8-sig",
         )
-    except (OSError, ValueError, pd.errors.ParserError) as error:
+    except (OSError, ValueError) as error:  # those of pandas are ValueErrors
+        reason = str(error).removeprefix("Error tokenizing data. C error: ").strip()
         raise InputError(
-            path, "file", f"cannot be read as a table ({error})", f"Columns: {','.join(columns)}"
+            path, "file", f"cannot be read as a table ({reason})", f"Columns: {','.join(columns)}"
         ) from error
     if bare:
         if table.shape[1] < len(columns):
@@ -45,13 +54,16 @@ def read_table(path: Path, columns: list[str]) -> np.ndarray:
             )
         table = table.iloc[:, : len(columns)].set_axis(columns, axis=1)
     table.columns = [str(column).strip() for column in table.columns]
+    if table.empty:
+        raise InputError(path, "file", "no rows", f"Columns: {','.join(columns)}")
     for column in columns:
         if column not in table:
+            near = similar_name(column, table.columns)
             raise InputError(
                 path,
                 column,
                 f"missing: the table has {', '.join(table.columns)}",
-                f"Columns: {','.join(columns)}",
+                f"{f'Did you mean {near}? ' if near else ''}Columns: {','.join(columns)}",
             )
         values = pd.to_numeric(table[column], errors="coerce").to_numpy(float)
         bad = np.flatnonzero(~np.isfinite(values))
@@ -63,16 +75,7 @@ def read_table(path: Path, columns: list[str]) -> np.ndarray:
                 "Correct or remove these rows",
             )
         table[column] = values
-    if table.empty:
-        raise InputError(path, "file", "no rows", f"Columns: {','.join(columns)}")
     return table[columns].to_numpy(float).T
-
-
-def _is_numeric(line: str) -> bool:
-    try:
-        return bool([float(word) for word in line.split()])
-    except ValueError:
-        return False
 
 
 def read_flow_ripple(path: Path) -> FlowRipple:
@@ -91,16 +94,27 @@ def read_flow_ripple(path: Path) -> FlowRipple:
             f"{angle.size} angles from {angle[0]:g} to {angle[-1]:g} are not one revolution",
             "Give at least 32 angles over one whole revolution, 0 to 360 degrees",
         )
-    if np.max(np.abs(flow)) > LARGEST_PLAUSIBLE_FLOW:
-        raise InputError(
-            path,
-            "flow_m3_s",
-            f"up to {np.max(np.abs(flow)):g} m3/s is implausible",
-            "Give m3/s: divide L/min by 60000",
-        )
+    _check_flow(path, flow)
     if angle[-1] - angle[0] > 360 - 1e-6:  # the end repeats the beginning
         angle, flow = angle[:-1], flow[:-1]
     return FlowRipple(angle_deg=angle, flow=flow)
+
+
+def _check_flow(path: Path, flow: np.ndarray) -> None:
+    """Raise InputError where `flow` (M,), m3/s, cannot be a pump's flow into a line."""
+    largest, mean = float(np.max(np.abs(flow))), float(np.mean(flow))
+    if largest > LARGEST_PLAUSIBLE_FLOW:
+        problem = f"up to {largest:g} m3/s is implausible"
+        remedy = "Give m3/s: divide L/min by 60000"
+    elif np.ptp(flow) <= SMALLEST_RIPPLE * largest:
+        problem = f"the flow is {mean:g} m3/s throughout, without any ripple"
+        remedy = "Give the flow against the shaft angle, or leave flow_ripple out"
+    elif mean < -SMALLEST_RIPPLE * largest:
+        problem = f"the mean flow is negative, {mean:g} m3/s"
+        remedy = "Flow from the pump into the line is positive: change the sign"
+    else:
+        return
+    raise InputError(path, "flow_m3_s", problem, remedy)
 
 
 def read_impedance(path: Path) -> tuple[np.ndarray, np.ndarray]:

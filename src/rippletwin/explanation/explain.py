@@ -140,7 +140,7 @@ def explain_observations(
         # Steps 11 to 14: checks
         point_fits = fit_each_observation(workers, search.base)
         alarms = read_alarms(search.base, point_fits, early, late, rig.delay)
-        source_free_fits = refit_source_free(workers, search)
+        source_free_fits = refit_source_free(workers, search.leading_fits)
         explanation = best_explanation(search)
         validation = cross_validate(workers, search.base, explanation, held_out)
         null_distribution = None

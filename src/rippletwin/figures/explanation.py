@@ -162,7 +162,8 @@ def plot_evidence(e: Explanation) -> Figure | None:
     ax.barh(heights, values, color=colours, height=0.6)
     ax.barh(heights[:1], 0.0, color=style.CORRECTED, label="source as stated")  # for the legend
     source_free = {
-        row["effects"]: row["source_free"] for row in compare_evidence(search, e.source_free_fits)
+        row["effects"]: row["source_free"]
+        for row in compare_evidence(search.leading_fits, e.source_free_fits)
     }
     points = [
         (source_free[f.label], y) for y, f in zip(heights, shown.values()) if f.label in source_free

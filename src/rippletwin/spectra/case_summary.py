@@ -1,8 +1,9 @@
-"""What `rippletwin check` says of a case."""
+"""The summary of a case that `rippletwin check` prints."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 
@@ -11,11 +12,17 @@ from rippletwin.spectra.angular_resampling import Revolutions
 from rippletwin.spectra.noise import noise_cycle_scatter, noise_mad
 from rippletwin.spectra.observation import Observation, observe, revolutions_of
 
-STANDS_OUT = 20.0  # |X|^2 over its variance; pure noise exceeds it once in 5e8
+SIGNIFICANT_POWER = 20.0  # |X|^2 over its variance; pure noise exceeds it once in 5e8
 
 
-def summarise_case(case: Case) -> Iterator[str]:
-    """Lines of text: the rig in one, then every recording as it is analysed."""
+def summarise_case(
+    case: Case, progress: Callable[[str, int, int], None] | None = None
+) -> Iterator[str]:
+    """Lines of text: the rig in one, then every recording as it is analysed.
+
+    `progress` is called with a recording's label, how many steps of its analysis are done, and of
+    how many.
+    """
     rig = case.rig
     sensors = ", ".join(f"{s.name} at {s.position:g} m" for s in rig.sensors) or "none"
     yield f"{case.folder}: {len(rig.line)} segment(s), {rig.length:g} m, load: {rig.load.kind}"
@@ -24,13 +31,16 @@ def summarise_case(case: Case) -> Iterator[str]:
     for recording in case.recordings:
         yield f"{recording.label} ({recording.kind}, {recording.state})"
         if recording.kind == "periodic":
-            yield from _periodic(recording, revolutions_of(recording, rig), rig)
+            step = None if progress is None else partial(progress, recording.label)
+            yield from _periodic(recording, revolutions_of(recording, rig), rig, step)
         else:
             yield from _spectral(recording, observe(recording, rig))
 
 
-def _periodic(recording: Recording, revolutions: Revolutions, rig: Rig) -> Iterator[str]:
-    observation = observe(recording, rig, revolutions=revolutions)
+def _periodic(
+    recording: Recording, revolutions: Revolutions, rig: Rig, progress: Callable | None
+) -> Iterator[str]:
+    observation = observe(recording, rig, revolutions=revolutions, progress=progress)
     speed = revolutions.speed_hz
     yield (
         f"  {len(speed)} whole revolutions at {60 * observation.speed_hz:.2f} r/min (nominal "
@@ -38,7 +48,7 @@ def _periodic(recording: Recording, revolutions: Revolutions, rig: Rig) -> Itera
     )
     mad, scatter = noise_mad(recording.pressure), noise_cycle_scatter(revolutions.windows)
     variance = np.einsum("fss->sf", observation.covariance).real
-    above = np.abs(observation.values) ** 2 > STANDS_OUT * variance
+    above = np.abs(observation.values) ** 2 > SIGNIFICANT_POWER * variance
     piston = observation.orders % rig.pump["pistons"] == 0
     for s, sensor in enumerate(rig.sensors):
         yield (

@@ -1,40 +1,56 @@
-"""Harmonics at the mean speed from revolutions whose speed wanders.
+"""Harmonics at the mean speed from revolutions of varying speed, by Gaussian process regression.
 
-A line answers differently at another speed: a path of 5 m of oil turns the phase at 5 kHz by half a
-radian for 0.3 %, and a resonance can be narrower than the speed wanders, so that the mean over the
-revolutions is that of no speed at all. Each order of each sensor is therefore taken for a smooth
-function of the speed, and its value at the mean speed is what the revolutions say of it by Gaussian
-process regression (Rasmussen & Williams 2006, Gaussian Processes for Machine Learning, sec. 2.2
-and 2.7), with the width and the size of what the speed does chosen for each by the restricted
-likelihood (Patterson & Thompson 1971, Biometrika 58, 545).
+A line responds differently at another speed: over a path of 5 m of oil 0.3 % of speed changes the
+phase at 5 kHz by half a radian. A resonance can be narrower than the range of speeds, so that the
+mean over the revolutions is the response at no speed at all. Each order of each sensor is therefore
+modelled as a smooth function of the speed, and its value at the mean speed is estimated by Gaussian
+process regression (Rasmussen & Williams 2006, Gaussian Processes for Machine Learning, sec. 2.2 and
+2.7). Width and variance of the function are chosen for each by the restricted likelihood (Patterson
+& Thompson 1971, Biometrika 58, 545).
 
-A resonance remembers the speed it had: on the way up it answers otherwise than on the way down.
-Where the angular frequency w rises at the rate r, a system of response H answers
-exp(-j r/2 d^2/dw^2) H(w) (expand H about w under the integral over a linear chirp; its first term
-is in Carson & Fry 1937, Bell Syst. Tech. J. 16, 513). That operator turns a Gaussian covariance of
-H into another Gaussian of complex width, in closed form, and so the memory is part of the model.
+A resonance also depends on the speed's rate of change. Where the angular frequency w rises at the
+rate r, a system with response H responds as exp(-j r/2 d^2/dw^2) H(w) (expand H about w under the
+integral over a linear chirp; its first term is in Carson & Fry 1937, Bell Syst. Tech. J. 16, 513).
+This operator transforms a Gaussian covariance of H into another Gaussian of complex width, in
+closed form, so that the covariance below includes it.
+
+A regression over R revolutions costs R^3. A long recording is therefore regressed in blocks: every
+n-th revolution belongs to one block, so that each block has all of the speeds. The blocks share one
+width and one variance, which maximise the sum of their likelihoods. Their values are averaged.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import NamedTuple
+
 import numpy as np
 
-ENOUGH = 8  # revolutions: below it the mean is taken
-WIDTHS = 1e-4 * 2.0 ** np.arange(9)  # relative speed over which an order may change
-RATIOS = 10.0 ** np.arange(-1, 8)  # variance of what the speed does over that of the noise
-BANDS = 3  # an octave, in which the memory is one
-GAIN = 5.0  # log likelihood that an order's dependence on the speed must be worth
+MIN_REVOLUTIONS = 8  # for the regression; of fewer the mean is taken
+WIDTHS = 1e-4 * 2.0 ** np.arange(9)  # candidates: relative speed over which an order changes
+VARIANCE_RATIOS = 10.0 ** np.arange(-1, 8)  # candidates: variance of the function over the noise's
+BANDS_PER_OCTAVE = 3  # in each of which one rate of change of the frequency is used
+MIN_GAIN = 5.0  # of log likelihood, for an order to depend on the speed
+MIN_CORRELATION = 3.0  # of neighbouring residuals, in standard errors, to be believed
+MAX_CORRELATION = 0.98  # beyond which the noise of a mean is not increased
+MAX_REVOLUTIONS_TOGETHER = 256  # in one regression; more are regressed in blocks
+MAX_BLOCK_REVOLUTIONS = 128
 
 
 def harmonics_at_mean_speed(
-    spectra: np.ndarray, speed_hz: np.ndarray, orders: np.ndarray
+    spectra: np.ndarray,
+    speed_hz: np.ndarray,
+    orders: np.ndarray,
+    progress: Callable[[int, int], None] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Values (S, F) at the mean speed of spectra (R, S, F), and their covariance (F, S, S).
 
     speed_hz (R,) of the revolutions, which follow each other; orders (F,) from 1. The covariance is
-    that of the scatter about the function of speed and of what is not known of the function;
-    `S + 2` revolutions' worth of the sensor's typical noise is mixed into the scatter, which keeps
-    it positive definite where there are few revolutions.
+    that of the scatter about the function of speed plus that of the function itself. The scatter is
+    averaged with the sensors' typical noise, weighted as S + 2 revolutions, which keeps it positive
+    definite where there are few revolutions. `progress` is called with the number of frequency
+    bands that are regressed, and of all of them.
     """
     count, sensors, _ = spectra.shape
     data = spectra.reshape(count, -1)
@@ -42,15 +58,21 @@ def harmonics_at_mean_speed(
     unknown = np.zeros(data.shape[1])
     residual = data - data.mean(axis=0)
     freedom = max(count - 1, 1)
-    if count >= ENOUGH:
+    if count >= MIN_REVOLUTIONS:
         mean = mean_speed(speed_hz)
         deviation = speed_hz / mean - 1
         rate = np.gradient(deviation, np.cumsum(1 / speed_hz))
-        band = np.tile(np.round(BANDS * np.log2(orders * mean)).astype(int), sensors)
-        for each in np.unique(band):
-            own, chirp = np.flatnonzero(band == each), rate / (4 * np.pi * 2.0 ** (each / BANDS))
-            for which, *found in _regress(data[:, own], deviation, chirp):
-                weights[own[which]], unknown[own[which]], residual[:, own[which]] = found
+        band = np.tile(np.round(BANDS_PER_OCTAVE * np.log2(orders * mean)).astype(int), sensors)
+        bands = np.unique(band)
+        for done, each in enumerate(bands, 1):
+            own, chirp = (
+                np.flatnonzero(band == each),
+                rate / (4 * np.pi * 2.0 ** (each / BANDS_PER_OCTAVE)),
+            )
+            for which, *result in _regress(data[:, own], deviation, chirp):
+                weights[own[which]], unknown[own[which]], residual[:, own[which]] = result
+            if progress is not None:
+                progress(done, len(bands))
     weights = weights.reshape(*spectra.shape[1:], count)
     unknown = unknown.reshape(spectra.shape[1:])
     residual = residual.reshape(spectra.shape)
@@ -70,62 +92,134 @@ def mean_speed(speed_hz: np.ndarray) -> float:
     return float(1 / np.mean(1 / speed_hz))
 
 
-def _regress(data, deviation, chirp):
+class _Kernel(NamedTuple):
+    """The covariance (B, B) of what B revolutions answer, with its part free of the mean."""
+
+    covariance: np.ndarray
+    to_mean: np.ndarray  # (B,) covariance with the answer at the mean speed
+    sizes: np.ndarray  # (B - 1,) eigenvalues of the part that is free of the mean
+    basis: np.ndarray  # (B, B - 1) its eigenvectors
+
+
+def _regress(data, deviation, chirp) -> Iterator[tuple]:
     """Columns of data (R, N) that depend on the speed: (which, weights, variance of the unknown,
     residual) of each group of them that takes one covariance.
 
     chirp (R,) is the rate of the relative deviation over twice the angular frequency.
     """
     count = len(deviation)
-    contrasts = np.linalg.svd(np.ones((1, count)))[2][1:].T  # (R, R - 1), free of the mean
-    plain = (count - 1) * np.log(np.sum(np.abs(contrasts.T @ data) ** 2, axis=0) + 1e-300)
-    best = -plain + GAIN
+    blocks = _blocks(count)
+    chosen, tried = _choose_covariances(data, deviation, chirp, blocks)
+    for k in np.unique(chosen[chosen >= 0]):
+        which = chosen == k
+        ratio, kernels = tried[k]
+        row = np.empty(count, complex)
+        rest = np.empty((count, np.count_nonzero(which)), complex)
+        noise, missed = 0.0, 0.0
+        for own, kernel in zip(blocks, kernels(), strict=True):
+            size = len(own)
+            system = np.ones((size + 1, size + 1), complex)
+            system[:size, :size] = ratio * kernel.covariance + np.eye(size)
+            system[size, size] = 0.0
+            solved = np.linalg.solve(system, np.append(ratio * kernel.to_mean, 1.0))[:size]
+            part = kernel.basis.conj().T @ data[np.ix_(own, which)]
+            shrink = (1 / (1 + ratio * kernel.sizes))[:, None]
+            noise += np.sum(shrink * np.abs(part) ** 2, axis=0)
+            rest[own] = kernel.basis @ (shrink * part)
+            # an error of the function is the same in every block
+            error = 1 + np.vdot(solved, kernel.covariance @ solved - 2 * kernel.to_mean).real
+            missed += size / count * max(error, 0.0)
+            row[own] = size / count * solved
+        noise = noise / (count - len(blocks)) * _variance_inflation(rest)
+        # as large as the noise is, for some of it went into the function
+        rest *= np.sqrt(noise * (count - 1) / (np.sum(np.abs(rest) ** 2, axis=0) + 1e-300))
+        yield which, row.conj(), noise * ratio * missed, rest
+
+
+def _blocks(count: int) -> list[np.ndarray]:
+    """Indices of the revolutions that are regressed together: all, or every n-th of them."""
+    number = 1 if count <= MAX_REVOLUTIONS_TOGETHER else -(-count // MAX_BLOCK_REVOLUTIONS)
+    return [np.arange(first, count, number) for first in range(number)]
+
+
+def _choose_covariances(data, deviation, chirp, blocks) -> tuple[np.ndarray, list]:
+    """For each column of data (R, N) the most likely covariance: its index, -1 where none is worth
+    MIN_GAIN, and for each index (ratio, a function that gives the kernels of the blocks)."""
+    plain = 0.0
+    for own in blocks:
+        contrast = _off_mean(data[own])
+        plain = plain + (len(own) - 1) * np.log(np.sum(np.abs(contrast) ** 2, axis=0) + 1e-300)
+    best = -plain + MIN_GAIN
     chosen = np.full(data.shape[1], -1)
     tried = []
     for width in WIDTHS:
-        to_mean = _covariance(deviation, chirp, width)
-        apart = deviation[:, None] - deviation, chirp[:, None] - chirp
-        kernel = _covariance(*apart, width)
-        size, basis = np.linalg.eigh(contrasts.T @ kernel @ contrasts)
-        size, basis = np.maximum(size, 0.0), contrasts @ basis
-        power = np.abs(basis.conj().T @ data) ** 2
-        for ratio in RATIOS:
-            shrink = 1 / (1 + ratio * size)
-            likelihood = np.sum(np.log(shrink)) - (count - 1) * np.log(shrink @ power + 1e-300)
-            chosen[likelihood > best] = len(tried)
-            best = np.maximum(best, likelihood)
-            tried.append((kernel, to_mean, size, basis, ratio))
-    for k in np.unique(chosen[chosen >= 0]):
-        kernel, to_mean, size, basis, ratio = tried[k]
-        which = chosen == k
-        system = np.ones((count + 1, count + 1), complex)
-        system[:count, :count] = ratio * kernel + np.eye(count)
-        system[count, count] = 0.0
-        row = np.linalg.solve(system, np.append(ratio * to_mean, 1.0))[:count]
-        part = basis.conj().T @ data[:, which]
-        shrink = (1 / (1 + ratio * size))[:, None]
-        noise = np.sum(shrink * np.abs(part) ** 2, axis=0) / (count - 1)
-        rest = basis @ (shrink * part)
-        noise *= _dependence(rest)
-        # as large as the noise is, for some of it went into the function
-        rest *= np.sqrt(noise * (count - 1) / (np.sum(np.abs(rest) ** 2, axis=0) + 1e-300))
-        missed = 1 + np.vdot(row, kernel @ row - 2 * to_mean).real
-        yield which, row.conj(), noise * ratio * max(missed, 0.0), rest
+        likelihood = np.zeros((len(VARIANCE_RATIOS), data.shape[1]))
+        kernels = (_kernel(deviation[own], chirp[own], width) for own in blocks)
+        if len(blocks) == 1:  # kept; of many blocks they are calculated again where they are chosen
+            kernels = list(kernels)
+        for own, kernel in zip(blocks, kernels, strict=True):
+            power = np.abs(kernel.basis.conj().T @ data[own]) ** 2
+            for k, ratio in enumerate(VARIANCE_RATIOS):
+                shrink = 1 / (1 + ratio * kernel.sizes)
+                likelihood[k] += np.sum(np.log(shrink))
+                likelihood[k] -= (len(own) - 1) * np.log(shrink @ power + 1e-300)
+        again = partial(_kernels, kernels, blocks, deviation, chirp, width)
+        for k, ratio in enumerate(VARIANCE_RATIOS):
+            chosen[likelihood[k] > best] = len(tried)
+            best = np.maximum(best, likelihood[k])
+            tried.append((ratio, again))
+    return chosen, tried
 
 
-def _dependence(rest):
-    """How many times the variance of a mean is what independent rests (R, N) would give, (N,).
+def _kernels(kept, blocks, deviation, chirp, width) -> Iterator[_Kernel]:
+    """The kernels of the blocks: those that were kept, else calculated again."""
+    if isinstance(kept, list):
+        return iter(kept)
+    return (_kernel(deviation[own], chirp[own], width) for own in blocks)
 
-    Where neighbours are alike the function has missed something, and many revolutions say it again:
-    (1 + r)/(1 - r) for the correlation r of neighbours, where that is more than chance.
+
+def _kernel(deviation, chirp, width) -> _Kernel:
+    """The covariance of what revolutions answer whose speeds deviate so and change so fast."""
+    covariance = _covariance(deviation[:, None] - deviation, chirp[:, None] - chirp, width)
+    inner = _off_mean(_off_mean(covariance).conj().T)
+    sizes, basis = np.linalg.eigh(inner)
+    padded = np.vstack([np.zeros(basis.shape[1]), basis])
+    return _Kernel(
+        covariance,
+        _covariance(deviation, chirp, width),
+        np.maximum(sizes, 0.0),
+        _reflect(padded),
+    )
+
+
+def _off_mean(data):
+    """Coordinates (B - 1, N) of columns (B, N) in an orthonormal basis free of the mean."""
+    return _reflect(data)[1:]
+
+
+def _reflect(data):
+    """Columns (B, N) reflected so that a constant column becomes the first axis (Householder)."""
+    normal = np.full(len(data), 1 / np.sqrt(len(data)))
+    normal[0] -= 1.0
+    square = normal @ normal
+    return data if square == 0.0 else data - np.outer(normal, 2 / square * (normal @ data))
+
+
+def _variance_inflation(rest):
+    """Factor (N,) on the variance of a mean of residuals (R, N) that are not independent.
+
+    (1 + r)/(1 - r) for a significant correlation r of neighbours: they are alike where the function
+    has missed something, and then more revolutions add less information.
     """
     r = np.sum(rest[1:] * rest[:-1].conj(), axis=0).real
     r = r / (np.sum(np.abs(rest) ** 2, axis=0) + 1e-300)
-    r = np.where(r > 3 / np.sqrt(2 * len(rest)), np.minimum(r, 0.98), 0.0)
+    least = MIN_CORRELATION / np.sqrt(2 * len(rest))
+    r = np.where(r > least, np.minimum(r, MAX_CORRELATION), 0.0)
     return (1 + r) / (1 - r)
 
 
 def _covariance(deviation, chirp, width):
-    """Of what is answered at two speeds `deviation` apart while they change by `chirp` more."""
+    """Covariance of the responses at two speeds that differ by `deviation`, and their rates of
+    change by `chirp`."""
     square = width**2 - 2j * chirp
     return width / np.sqrt(square) * np.exp(-0.5 * deviation**2 / square)

@@ -11,7 +11,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from rippletwin.case.readers.signals import Signals, numbers, rows_of
+from rippletwin.case.readers.hdf5_items import names_in, read_attribute, read_dataset
+from rippletwin.case.readers.signals import Signals, one_number, rows_of
 from rippletwin.errors import InputError
 
 
@@ -19,17 +20,18 @@ def read(path: Path, sensors: list[str]) -> Signals:
     """Read an HDF5 recording; raises InputError."""
     try:
         with h5py.File(path, "r") as file:
-            if "pressure" not in file:
+            found = read_dataset(path, file, "pressure")
+            if found is None:
                 raise InputError(
                     path,
                     "pressure",
-                    f"no such dataset; the file has {', '.join(file) or 'nothing'}",
+                    f"no such dataset; the file has {', '.join(names_in(file)) or 'nothing'}",
                     "Store the recording as `pressure`, shape (sensors, samples), in Pa",
                 )
-            dataset = file["pressure"]
-            pressure = numbers(path, "pressure", dataset[()])
-            attributes = {**file.attrs, **dataset.attrs}
-            time = numbers(path, "time_s", file["time_s"][()]) if "time_s" in file else None
+            pressure, dataset = found
+            names = read_attribute(path, (dataset, file), "sensors")
+            rate = read_attribute(path, (dataset, file), "sampling_rate_hz")
+            time = read_dataset(path, file, "time_s")
     except OSError as error:
         raise InputError(
             path,
@@ -37,12 +39,14 @@ def read(path: Path, sensors: list[str]) -> Signals:
             f"cannot be read, is cut short or not HDF5 ({error})",
             "Copy it again from where it was recorded",
         ) from error
-    names = attributes.get("sensors")
     if names is not None:
-        names = [n.decode() if isinstance(n, bytes) else str(n) for n in np.atleast_1d(names)]
-    rate = attributes.get("sampling_rate_hz")
+        names = [_text(name) for name in np.atleast_1d(names).ravel()]
     return Signals(
         pressure=rows_of(path, pressure, sensors, names),
-        sampling_rate_hz=None if rate is None else float(np.squeeze(rate)),
-        time_s=time,
+        sampling_rate_hz=one_number(path, "sampling_rate_hz", rate),
+        time_s=None if time is None else time[0],
     )
+
+
+def _text(name) -> str:
+    return name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name)

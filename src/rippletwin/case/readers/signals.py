@@ -1,13 +1,15 @@
-"""What every reader returns, and the shape questions readers share."""
+"""What every reader returns, and the questions of type and shape that readers share."""
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from rippletwin.errors import InputError
+from rippletwin.errors import InputError, raise_any
 
 
 @dataclass(frozen=True)
@@ -20,27 +22,68 @@ class Signals:
 
 
 def numbers(path: Path, field: str, values) -> np.ndarray:
-    """`values` as floats: single precision stays single, everything else becomes double."""
+    """`values` as floats: single precision stays single, every other number becomes double.
+
+    Raises InputError where they are not real numbers.
+    """
     array = np.asarray(values)
-    if array.dtype == np.float32:
-        return array
-    try:
-        return array.astype(float)
-    except (TypeError, ValueError) as error:
-        raise InputError(
-            path, field, f"not all numbers ({error})", "Export plain decimal numbers"
-        ) from error
+    check_type(path, field, array.dtype)
+    return array if array.dtype == np.float32 else array.astype(float)
 
 
-def missing_sensor(path: Path, name: str, present) -> InputError:
+def check_type(path: Path, field: str, dtype: np.dtype) -> None:
+    """Raise InputError where values of a type are not real numbers."""
+    if dtype.kind in "fiu":
+        return
+    if dtype.kind == "c":
+        problem, remedy = "complex numbers", "A pressure against time is real; give its real values"
+    elif dtype.names is not None:
+        names = ", ".join(dtype.names)
+        problem, remedy = f"a structure of {names}", f"Store {field} by itself, as plain numbers"
+    else:
+        problem, remedy = f"not all numbers (type {dtype})", "Export plain decimal numbers"
+    raise InputError(path, field, problem, remedy)
+
+
+def one_number(path: Path, field: str, value) -> float | None:
+    """`value` as one float; None stays None. Raises InputError for text, none or several."""
+    if value is None:
+        return None
+    if isinstance(value, (str, bytes)):
+        raise InputError(path, field, f"{value!r} is text, not a number", "Store it as a number")
+    array = numbers(path, field, value)
+    if array.size != 1:
+        problem = "empty" if not array.size else f"{array.size} values, one is needed"
+        raise InputError(path, field, problem, "Store one number")
+    return float(array.ravel()[0])
+
+
+def missing_sensor(path: Path, name: str, present: Iterable) -> InputError:
     """The error for a file that lacks a sensor of the rig."""
-    found = ", ".join(map(str, present)) or "nothing"
+    present = [str(other) for other in present]
+    found = ", ".join(present) or "nothing"
+    near = similar_name(name, present)
+    hint = f"Did you mean {near}? Rename it to {name}" if near else "Add it to the file"
+    if near and set(near) & set("[(/"):
+        hint += " and give Pa"
     return InputError(
         path,
         name,
         f"no data for this sensor; the file has {found}",
-        "Add it to the file, or take it out of `sensors` or correct its name in rig.yaml",
+        f"{hint}; or take the sensor out of `sensors`, or correct its name in rig.yaml",
     )
+
+
+def similar_name(name: str, present: Iterable[str]) -> str | None:
+    """The name among `present` that differs from `name` by case, spaces, a unit or a letter."""
+    present = list(present)
+    wanted = name.casefold()
+    for other in present:
+        plain = other.strip().casefold()
+        rest = plain[len(wanted) : len(wanted) + 1]
+        if plain.startswith(wanted) and not rest.isalnum() and other != name:
+            return other
+    return next(iter(difflib.get_close_matches(name, present, n=1, cutoff=0.7)), None)
 
 
 def rows_of(path: Path, pressure: np.ndarray, sensors: list[str], names: list[str] | None):
@@ -53,19 +96,25 @@ def rows_of(path: Path, pressure: np.ndarray, sensors: list[str], names: list[st
             "Store it as (sensors, samples)",
         )
     if names is not None:
-        for sensor in sensors:
-            if sensor not in names:
-                raise missing_sensor(path, sensor, names)
+        if len(names) != len(pressure) or len(set(names)) < len(names):
+            raise InputError(
+                path,
+                "sensors",
+                f"names {', '.join(names)} for {len(pressure)} row(s) of pressure",
+                "Give each row one name, in the order of the rows",
+            )
+        raise_any(missing_sensor(path, s, names) for s in sensors if s not in names)
         order = [names.index(sensor) for sensor in sensors]
         return pressure if order == list(range(len(pressure))) else pressure[order]
     if len(pressure) < len(sensors):
         present = f"{len(pressure)} row(s) of {pressure.shape[1]} samples"
         raise missing_sensor(path, sensors[len(pressure)], [present])
     if len(pressure) > len(sensors):
+        turned = "; it looks transposed" if pressure.shape[1] == len(sensors) else ""
         raise InputError(
             path,
             "pressure",
-            f"shape {pressure.shape}, but rig.yaml lists {len(sensors)} sensor(s)",
+            f"shape {pressure.shape}, but rig.yaml lists {len(sensors)} sensor(s){turned}",
             "Store it as (sensors, samples), one row a sensor of rig.yaml, in its order",
         )
     return pressure

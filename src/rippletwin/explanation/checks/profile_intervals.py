@@ -101,8 +101,8 @@ def trace_profile(base: Twin, observations: Sequence, job: ProfileJob) -> Profil
         start = theta + side * (distance - last) * ridge
         # First keep the previous error estimates: re-estimated at the start, they would attribute
         # the misfit that is not yet removed to the source and stop the descent.
-        theta, _ = descend(posterior, start, PROFILE_STEPS, held=[k], errors=False)
-        theta, value = descend(posterior, theta, PROFILE_STEPS, held=[k])
+        theta, _ = descend(posterior, start, PROFILE_STEPS, fixed=[k], errors=False)
+        theta, value = descend(posterior, theta, PROFILE_STEPS, fixed=[k])
         if not np.isfinite(value):
             break
         last = distance

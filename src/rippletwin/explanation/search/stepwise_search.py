@@ -38,6 +38,7 @@ from rippletwin.twin.effects.base import Effect, Place
 
 RIVAL_MARGIN = 4.0 * MIN_LOG_BAYES_FACTOR
 """Log evidence below the best within which a resumed search refits a rival."""
+LEADING_SINGLE_EFFECTS = 6
 SHAFT_ORDER_EFFECTS = ("piston_spread", "speed_fluctuation")
 """Effects at shaft orders that are not fitted; `localise.shaft_orders` looks for them."""
 
@@ -85,6 +86,13 @@ class Search:
     def log_bayes_factor(self, fit: Fit) -> float:
         """Log evidence of a fit less that of the base."""
         return fit.evidence - self.base.evidence
+
+    @property
+    def leading_fits(self) -> list[Fit]:
+        """The base, the best fit, the best single effects and the best passive network."""
+        singles = self.single_effect_fits[:LEADING_SINGLE_EFFECTS]
+        fits = [self.base, self.best, *singles, *self.passive_networks[:1]]
+        return list({fit.label: fit for fit in fits}.values())
 
 
 def search_effects(

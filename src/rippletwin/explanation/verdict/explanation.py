@@ -28,7 +28,7 @@ class Explanation:
     validation         cross-validation of base and explanation
     decision           the verdict and the accepted fit
     point_fits         the base fitted to each observation alone; empty for a single one
-    source_free_fits   fits with an unknown source (`source_free_fits.fits_to_compare`)
+    source_free_fits   the leading fits of the search, with an unknown source
     prior_sensitivity  fits with wide priors without each accepted effect
     shaft_orders       ripple at orders that are no multiples of the number of pistons
     location           where the base lacks something; None where that cannot be said

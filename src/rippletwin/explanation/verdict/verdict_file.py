@@ -163,7 +163,9 @@ def _where(e: Explanation, entries: list[dict]) -> dict:
                 for which, fit in (("before", base), ("after", e.decision.accepted))
             }
     if e.source_free_fits:
-        where["source_informed_and_free"] = compare_evidence(e.search, e.source_free_fits)
+        where["source_informed_and_free"] = compare_evidence(
+            e.search.leading_fits, e.source_free_fits
+        )
     return where
 
 

@@ -13,8 +13,8 @@ J. Sound Vib. 39, 1, eq. 32)
 
     gamma - (gamma - 1) I2(r)/I0(r) = 1 + (gamma - 1) sum_n 4/(r^2 + j_n^2),   r^2 = s R^2 Pr/nu,
 
-j_n the zeros of J0: an endless sum of terms that yield with delay. Ten positive ones, hence
-passive, are fitted to it.
+j_n the zeros of J0: an infinite sum of retarded compliances. Ten positive ones, hence passive, are
+fitted to it.
 """
 
 from __future__ import annotations
@@ -34,18 +34,6 @@ HEAT_WEIGHTS = np.array(
 HEAT_RATES = np.array(
     [5.87781, 36.8627, 151.283, 606.245, 2430.60, 9747.55, 39025.4, 155662, 642385, 5.64739e6]
 )
-
-
-def summed_friction(sigma: np.ndarray) -> np.ndarray:
-    """sigma + 8 + 4 sum_k m_k sigma/(sigma + n_k): stands for `segment.scaled_friction`.
-
-    `sigma` = s R^2/nu, any shape; exact it would be sigma I0/I2.
-    """
-    sigma = np.asarray(sigma, dtype=complex)
-    memory = np.sum(
-        FRICTION_WEIGHTS * sigma[..., None] / (sigma[..., None] + FRICTION_RATES), axis=-1
-    )
-    return sigma + 8.0 + 4.0 * memory
 
 
 def recursion(step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

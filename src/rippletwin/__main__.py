@@ -1,0 +1,8 @@
+"""python -m rippletwin: the command line."""
+
+import sys
+
+from rippletwin.cli import main
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,59 @@
+"""Alignment of the shaft angles: recordings have no tachometer."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rippletwin.calibration.error_model import ErrorModel
+from rippletwin.calibration.levenberg_marquardt import descend
+
+ANGLES_PER_TURN = 16  # points of the grid in a turn of the highest order
+REFINING_STEPS, REFINED = 6, 1e-9  # most steps after the grid, and gain of the last
+
+
+def align_shaft_angles(model: ErrorModel, theta: np.ndarray) -> tuple[float, np.ndarray]:
+    """Relative misfit, and theta (P,) with each recording's shaft angle aligned on a grid.
+
+    An angle turns order k by k times itself. The grid covers one turn of the orders' greatest
+    common divisor. Each frequency weighs as the relative model error has it. The misfit is the
+    mean square of the residuals over that weight, infinite where the prediction is.
+    """
+    theta, twin = np.array(theta), model.twin
+    parts = model.by_observation(model.predict(theta))
+    if not all(np.all(np.isfinite(part.predicted)) for part in parts):
+        return np.inf, theta
+    misfit, count = 0.0, 0
+    for o, (measured, predicted, power) in zip(model.observations, parts):
+        square = np.sum(np.abs(predicted) ** 2 + np.abs(measured) ** 2, axis=0)
+        weighted = np.sum(np.conj(predicted) * measured, axis=0) / power
+        match = np.sum(np.abs(weighted))  # of a source whose phase is free
+        index = twin.index.get(f"angle[{o.label}]")
+        if index is not None and not model.source_free:
+            orders = np.asarray(o.orders, int)
+            order = np.gcd.reduce(orders)
+            lines = np.zeros(ANGLES_PER_TURN * orders[-1] // order, complex)
+            lines[orders // order] = weighted
+            matches = np.fft.fft(lines).real
+            turn = 2 * np.pi * np.argmax(matches) / (len(lines) * order)
+            match = np.max(matches)
+            parameter = twin.parameters[index]
+            angle = parameter.value(theta[index]) + turn
+            angle = (angle + np.pi / order) % (2 * np.pi / order) - np.pi / order
+            theta[index] = parameter.prior.coordinate(angle)
+        misfit += float(np.sum(square / power) - 2 * match)
+        count += measured.size
+    return misfit / count, theta
+
+
+def fit_shaft_angles(model: ErrorModel, theta: np.ndarray) -> np.ndarray:
+    """theta (P,) with the shaft angles fitted, all else and the errors of `model` fixed.
+
+    Only the angles of the recordings in `model` move.
+    """
+    labels = [f"angle[{o.label}]" for o in model.observations]
+    angles = [model.twin.index[name] for name in labels if name in model.twin.index]
+    if not angles or model.source_free:
+        return theta
+    theta = align_shaft_angles(model, theta)[1]
+    others = np.setdiff1d(np.arange(len(theta)), angles)
+    return descend(model, theta, REFINING_STEPS, others, errors=False, converged=REFINED)[0]

@@ -1,0 +1,68 @@
+"""Whether a recorded pressure can be pascals: against the load pressure and against the sign."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rippletwin.case.model import Recording, Rig
+from rippletwin.errors import InputError
+
+UNITS = (("bar", 1e5), ("MPa", 1e6), ("kPa", 1e3), ("psi", 6894.76))
+LARGEST_COUNT = 2**24  # of a converter of 24 bits
+VACUUM = -1.1e5  # Pa; gauge pressure cannot be lower
+
+
+def unit_error(recording: Recording, rig: Rig, name: str, row: np.ndarray) -> InputError | None:
+    """What is implausible in a sensor's samples (N,): unit, raw counts, sign; None where nothing.
+
+    Mean and ripple are compared with the load pressure. Sensors may be AC-coupled: then the ripple
+    alone is compared.
+    """
+    load = recording.load_pressure
+    mean, ripple = float(np.mean(row)), float(np.std(row))
+    if mean < VACUUM and abs(mean) > 10 * ripple:
+        return InputError(
+            recording.file,
+            name,
+            f"a mean of {mean:.3g} Pa is below vacuum: the sign is inverted",
+            "Multiply the sensor's samples by -1, or correct its offset",
+        )
+    problem = _problem(abs(mean), ripple, load, rig)
+    if problem is None:
+        return None
+    counts = _looks_like_counts(row)
+    unit = _unit_guess(abs(mean), load)
+    looks, remedy = "", "Give pressure in Pa"
+    if unit:
+        looks, remedy = f" and looks like {unit[0]}", f"{remedy}: multiply by {unit[1]:g}"
+    if counts:
+        looks += f"{' or' if unit else ' and looks like'} raw counts: whole numbers only"
+        remedy += "; raw counts need the recorder's scale, Pa a count"
+    return InputError(recording.file, name, problem + looks, f"{remedy}; or correct load_pressure")
+
+
+def _problem(mean: float, ripple: float, load: float | None, rig: Rig) -> str | None:
+    """What contradicts pascals in a mean and a ripple (rms); None where nothing does."""
+    if load is None:
+        if rig.fluid.is_gas or ripple > 10:
+            return None
+        return f"a ripple of {ripple:.3g} rms is implausible as Pa"
+    if mean > 3 * load + 1e6:
+        return f"a mean of {mean:.3g} is implausible beside a load pressure of {load:.3g} Pa"
+    if ripple < 1e-4 * load and (mean < 10 * ripple or mean < load / 1000):
+        return f"a ripple of {ripple:.3g} rms is implausible beside {load:.3g} Pa of load"
+    if mean > 10 * ripple and mean < load / 3 - 2e5:
+        return f"a mean of {mean:.3g} is implausible beside a load pressure of {load:.3g} Pa"
+    return None
+
+
+def _looks_like_counts(row: np.ndarray) -> bool:
+    """Whether samples are whole numbers that a converter could have put out."""
+    return bool(np.max(np.abs(row)) < LARGEST_COUNT and np.all(row == np.round(row)))
+
+
+def _unit_guess(mean: float, load: float | None) -> tuple[str, float] | None:
+    if load is None:
+        return UNITS[0]
+    near = min(UNITS, key=lambda unit: abs(np.log(max(mean, 1e-12) * unit[1] / load)))
+    return near if 0.5 < mean * near[1] / load < 2 else None

@@ -1,0 +1,43 @@
+"""What is asked of a file before it is read: it may be opened, and what it holds fits in memory."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rippletwin.errors import InputError
+
+MAX_GIB = 1.0  # of one recording's numbers: 21 minutes of two sensors at 51.2 kHz
+GIB = 2**30
+DOUBLE = 8  # bytes
+
+
+def check_readable(path: Path) -> bytes:
+    """The first bytes of a file; raises InputError where it is empty or may not be read."""
+    try:
+        with open(path, "rb") as file:
+            head = file.read(16)
+    except PermissionError as error:
+        raise InputError(
+            path, "file", "you are not allowed to read it", "Correct the file's permissions"
+        ) from error
+    except (OSError, ValueError) as error:
+        raise InputError(
+            path, "file", f"cannot be opened ({error})", "Correct its name, or copy it again"
+        ) from error
+    if not head:
+        raise InputError(
+            path, "file", "empty: cut short to nothing", "Copy it again from where it was recorded"
+        )
+    return head
+
+
+def check_size(path: Path, field: str, count: int, limit_gib: float = MAX_GIB) -> None:
+    """Raise InputError where `count` numbers in double precision exceed `limit_gib`."""
+    if count * DOUBLE > limit_gib * GIB:
+        raise InputError(
+            path,
+            field,
+            f"{count:.6g} values need {count * DOUBLE / GIB:.3g} GiB; the limit is "
+            f"{limit_gib:.3g} GiB",
+            "Cut the recording to a shorter stretch; a hundred revolutions and more are enough",
+        )

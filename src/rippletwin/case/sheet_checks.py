@@ -1,0 +1,194 @@
+"""What the schema of rig.yaml cannot say: files exist, kinds have their keys, names are unique.
+
+A sheet is a mapping that may still violate its schema: every fault is found at once, so each check
+looks only at values of the right type.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+from rippletwin.errors import InputError, printable
+
+LONGEST_LABEL = 100
+FORBIDDEN_IN_LABELS = "/\\"  # labels name files of results
+SAME_PLACE = 1e-3  # m; closer together two sensors are one
+
+
+def sheet_errors(path: Path, sheet: dict) -> list[InputError]:
+    """Every fault of a sheet that concerns several of its values, or files beside it."""
+    return [
+        *_load_errors(path, sheet),
+        *_sensor_errors(path, sheet),
+        *_recording_errors(path, sheet),
+        *_label_errors(path, sheet),
+    ]
+
+
+def mapping(sheet: object, key: str) -> dict:
+    """The mapping under a key; empty where there is none."""
+    value = sheet.get(key) if isinstance(sheet, dict) else None
+    return value if isinstance(value, dict) else {}
+
+
+def entries(sheet: dict, key: str) -> list[dict]:
+    """The mappings in the list under a key; one that is no mapping stands as an empty one."""
+    value = sheet.get(key)
+    return [e if isinstance(e, dict) else {} for e in value] if isinstance(value, list) else []
+
+
+def number(sheet: dict, key: str) -> float | None:
+    """The finite number under a key; None where there is none."""
+    value = sheet.get(key)
+    good = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return float(value) if good and math.isfinite(value) else None
+
+
+def line_length(sheet: dict) -> float | None:
+    """Length of the line, m; None where a segment's is not a number."""
+    lengths = [number(segment, "length") for segment in entries(mapping(sheet, "line"), "segments")]
+    return None if not lengths or None in lengths else sum(lengths)
+
+
+def _load_errors(path: Path, sheet: dict) -> Iterator[InputError]:
+    load = mapping(sheet, "load")
+    kind = load.get("kind", "impedance")
+    if not load or not isinstance(kind, str):
+        return
+    if (kind == "impedance") != ("impedance" in load):
+        yield InputError(
+            path,
+            "load.impedance",
+            "missing" if kind == "impedance" else f"given, but the load's kind is {kind}",
+            "A load of kind impedance names its file in the key impedance; no other kind does",
+        )
+    elif "impedance" in load:
+        yield from _missing_file(path, "load.impedance", load["impedance"])
+
+
+def _sensor_errors(path: Path, sheet: dict) -> Iterator[InputError]:
+    sensors, length = entries(sheet, "sensors"), line_length(sheet)
+    placed: list[tuple[object, float]] = []
+    names: dict[str, int] = {}
+    for index, sensor in enumerate(sensors):
+        name, position = sensor.get("name"), number(sensor, "position")
+        if isinstance(name, str):
+            if name in names:
+                problem = f"{name} is the name of sensors[{names[name]}] too"
+                yield InputError(path, f"sensors[{index}].name", problem, "Give each its own name")
+            names.setdefault(name, index)
+        if position is None:
+            continue
+        field = f"sensors[{index}].position"
+        if length is not None and position > length:
+            in_mm = f"; {position:g} mm would be {position / 1000:g} m"
+            hint = in_mm if position / 1000 <= length and position >= 10 else ""
+            yield InputError(
+                path,
+                field,
+                f"{position:g} m is outside the line, which is {length:g} m long{hint}",
+                "Positions count from the pump outlet, in metres; correct it or the segments",
+            )
+        for other, place in placed:
+            if abs(position - place) < SAME_PLACE:
+                yield InputError(
+                    path,
+                    field,
+                    f"{position:g} m is where {other} is too",
+                    "Two sensors at one place tell nothing of the line between them: correct one "
+                    "of the positions, or take one sensor out",
+                )
+        placed.append((name, position))
+
+
+def _recording_errors(path: Path, sheet: dict) -> Iterator[InputError]:
+    names = [sensor.get("name") for sensor in entries(sheet, "sensors")]
+    load_kind = mapping(sheet, "load").get("kind")
+    told = set()
+    for index, entry in enumerate(entries(sheet, "recordings")):
+        field = f"recordings[{index}]"
+        kind = entry.get("kind", "periodic")
+        for key in ("file", "flow_ripple"):
+            if key in entry:
+                yield from _missing_file(path, f"{field}.{key}", entry[key])
+        repeats = entry.get("repeats")
+        for count, name in enumerate(repeats if isinstance(repeats, list) else []):
+            yield from _missing_file(path, f"{field}.repeats[{count}]", name)
+        for key, why in _needed(kind, load_kind):
+            whole = key in ("pump", "sensors")
+            if (sheet.get(key) if whole else key in entry) or (key, whole) in told:
+                continue
+            if whole:  # once for all recordings
+                told.add((key, whole))
+            yield InputError(path, key if whole else f"{field}.{key}", "missing", f"{why}; give it")
+        if kind == "random" and len(names) == 1 and "random" not in told:
+            told.add("random")
+            yield InputError(
+                path, "sensors", "one sensor only", "A random recording needs two or more"
+            )
+
+
+def _needed(kind: object, load_kind: object) -> list[tuple[str, str]]:
+    """Keys that a kind of recording needs, and why."""
+    if kind == "periodic":
+        needed = [
+            ("pump", "The number of pistons of a periodic recording must be known"),
+            ("sensors", "A periodic recording needs sensors"),
+            ("speed_rpm", "A periodic recording needs its nominal speed"),
+        ]
+        if load_kind == "orifice":
+            needed.append(("load_pressure", "The orifice's law needs the mean load pressure"))
+        return needed
+    known = kind in ("random", "spectrum")
+    return [("sensors", f"A {kind} recording needs sensors")] if known else []
+
+
+def _label_errors(path: Path, sheet: dict) -> Iterator[InputError]:
+    """Labels that are given twice, or cannot be part of a file's name.
+
+    Without `label` a recording is called after its file, without folder and suffix.
+    """
+    first: dict[str, int] = {}
+    for index, entry in enumerate(entries(sheet, "recordings")):
+        file, label = entry.get("file"), entry.get("label")
+        given = isinstance(label, str)
+        if not given:
+            if "label" in entry or not isinstance(file, str):
+                continue
+            label = Path(file).stem
+        field = f"recordings[{index}].label"
+        bad = any(c in FORBIDDEN_IN_LABELS or not c.isprintable() for c in label)
+        if given and (bad or not label.strip(" .") or len(label) > LONGEST_LABEL):
+            yield InputError(
+                path,
+                field,
+                f"{printable(label, 50)!r} cannot be part of a file's name",
+                f"Give up to {LONGEST_LABEL} characters without / and \\",
+            )
+        if label in first:
+            source = "" if given else " (the file's name, as there is no label)"
+            yield InputError(
+                path,
+                field,
+                f"{label!r}{source} is that of recordings[{first[label]}] too",
+                "Give each recording a label of its own",
+            )
+        first.setdefault(label, index)
+
+
+def _missing_file(path: Path, field: str, name: object) -> Iterator[InputError]:
+    """An error where `name` is text, but not the name of a file that may be read."""
+    if not isinstance(name, str):
+        return
+    remedy = "Correct the name (relative to rig.yaml) or add the file"
+    try:
+        if (path.parent / name).is_file():
+            return
+        folder = (path.parent / name).is_dir()
+        problem = f"{name} is a folder" if folder else f"there is no file {name} beside rig.yaml"
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        problem = f"{printable(name, 80)} cannot be opened: {reason}"
+    yield InputError(path, field, problem, remedy)

@@ -1,0 +1,96 @@
+"""The error model of explaining against its definition."""
+
+import numpy as np
+import pytest
+
+from rippletwin.calibration.posterior import SIZE_SD, Posterior
+from rippletwin.calibration.smooth_source import source_scale
+from synthetic_observations import POINTS, make
+
+
+def test_whitened_residual_of_the_truth_has_unit_variance():
+    """At the true parameters, with noise alone, the residuals have mean square 1 (chi-square)."""
+    _, observations, truth = make(np.random.default_rng(2), source=0.0, noise=4e5)
+    posterior = Posterior(truth, observations)
+    posterior.model_error, posterior.source_sd = 0.0, 0.0
+    r = posterior.whitened(posterior.predict(truth.theta))[0]
+    assert abs(np.mean(np.abs(r) ** 2) - 1) < 5 / np.sqrt(r.size)
+
+
+def test_source_free_residual_ignores_the_amplitude_of_the_source():
+    """Any complex factor of the source at each frequency leaves the source-free residual alone."""
+    rng = np.random.default_rng(3)
+    _, observations, truth = make(rng)
+    posterior = Posterior(truth, observations, source_free=True)
+    prediction = posterior.predict(truth.theta)
+    other = prediction * np.exp(rng.normal(size=prediction.shape[1]) * 1j) * 1.7
+    np.testing.assert_allclose(
+        np.abs(posterior.whitened(prediction)[0]) ** 2,
+        np.abs(posterior.whitened(other)[0]) ** 2,
+        atol=1e-6,
+    )
+
+
+def test_log_likelihood_is_that_of_the_whole_covariance_matrix():
+    """Sum of squares and log determinant of the whitened residual equal those of one dense Gaussian
+    with noise, model error and the source's error (independent, smooth, of size) over all sensors,
+    frequencies and recordings."""
+    rng = np.random.default_rng(12)
+    _, observations, truth = make(rng, points=POINTS[:2])
+    posterior = Posterior(truth, observations, 2000.0)
+    posterior.model_error, posterior.source_sd, posterior.smooth_sd = 0.02, 0.03, 0.1
+    prediction = posterior.predict(truth.theta + 0.05 * rng.normal(size=len(truth.theta)))
+    f, recording = posterior.forward.frequency_hz, posterior.forward.recording
+    kernel = (1 + np.outer(f, f) / 1e6) * np.exp(-0.5 * np.subtract.outer(f, f) ** 2 / 1e6)
+    kernel += 1.0
+    kernel *= 0.5 + 0.5 * (recording[:, None] == recording)
+    source = 0.03**2 * np.eye(len(f)) + 0.1**2 * kernel
+    scale = [source_scale(posterior.forward.source.flow[part]) for part in posterior.forward.slices]
+    h = (prediction * np.concatenate(scale)).ravel()
+    sensors = len(prediction)
+    dense = np.outer(h, h.conj()) * np.kron(np.ones((sensors, sensors)), source)
+    dense += SIZE_SD**2 * np.outer(prediction.ravel(), prediction.ravel().conj())
+    noise = np.concatenate([o.covariance[:, 0, 0].real for o in posterior.observations])
+    dense += np.diag(np.tile(noise + 0.02**2 * posterior.power, sensors))
+    e = (posterior.values - prediction).ravel()
+    r, log_determinant = posterior.whitened(prediction)
+    square = np.sum(np.abs(r) ** 2)
+    assert square == pytest.approx((e.conj() @ np.linalg.solve(dense, e)).real, rel=2e-3)
+    # The kernel is cut at 0.1 % of its largest eigenvalue; evidence is compared in whole units.
+    assert log_determinant == pytest.approx(np.linalg.slogdet(dense)[1], abs=0.7)
+
+
+@pytest.mark.parametrize("source_free", [False, True])
+def test_gradient_is_that_of_the_objective(source_free):
+    """The covariance depends on the prediction. Residual and Jacobian nevertheless give the change
+    of the objective by difference quotients in any direction of the prediction."""
+    _, observations, truth = make(np.random.default_rng(8))
+    posterior = Posterior(truth, observations, None, source_free)
+    theta = truth.theta + 0.05
+    h = posterior.predict(theta)
+    posterior.estimate_errors(h, theta)
+    rng = np.random.default_rng(9)
+    ways = 0.1 * np.abs(h).mean() * (rng.normal(size=(5, *h.shape, 2)) @ np.array([1, 1j]))
+    r, jacobian = posterior.linearise(theta, h, ways)
+    gradient = (jacobian.T @ r)[len(theta) :]
+    step = 1e-5
+    quotients = [
+        (posterior.objective(theta, h + step * d) - posterior.objective(theta, h - step * d))
+        / (2 * step)
+        for d in ways
+    ]
+    tolerance = 1e-4 * np.max(np.abs(quotients))
+    np.testing.assert_allclose(gradient, quotients, rtol=1e-5, atol=tolerance)
+
+
+def test_smaller_prediction_is_not_likelier():
+    """The size of a ripple is uncertain by SIZE_SD. Data that equal the prediction have the least
+    objective; 1 % more and 1 % less have about the same, and only the size's own error enters."""
+    _, observations, truth = make(np.random.default_rng(8), source=0.0, noise=1.0)
+    posterior = Posterior(truth, observations)
+    h = posterior.predict(truth.theta)
+    posterior.estimate_errors(h, truth.theta)
+    costs = [posterior.objective(truth.theta, (1 + x) * h) for x in (-0.01, 0.0, 0.01)]
+    assert costs[1] < min(costs[0], costs[2])
+    assert abs(costs[0] - costs[2]) < 0.1
+    assert max(costs) - costs[1] < 1.5 * (0.01 / SIZE_SD) ** 2

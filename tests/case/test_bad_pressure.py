@@ -1,0 +1,64 @@
+"""Pressures that are none: raw counts, a wrong sign, several sensors at once."""
+
+import h5py
+import numpy as np
+import pytest
+
+from case_folders import RATE, refused, ripple, sheet, write_case
+from rippletwin.case.load import load_case
+from rippletwin.errors import InputErrors
+
+
+def test_raw_counts_of_a_converter(tmp_path):
+    """Sixteen-bit counts, 600 Pa each, are told as counts and not as MPa only."""
+    counts = np.round(ripple() / 600).astype(np.int16)
+    write_case(tmp_path, sheet(), counts)
+    with pytest.raises(InputErrors) as caught:
+        load_case(tmp_path)
+    assert [error.field for error in caught.value.errors] == ["p1", "p2"]
+    for error in caught.value.errors:
+        assert "raw counts" in error.problem and "scale, Pa a count" in error.remedy
+
+
+def test_whole_pascals_are_no_counts(tmp_path):
+    """Pressures stored as whole numbers of Pa are read."""
+    write_case(tmp_path, sheet(), np.round(ripple()).astype(np.int32))
+    assert load_case(tmp_path).recordings[0].pressure.dtype == float
+
+
+def test_inverted_pressure(tmp_path):
+    """A mean of -9.5 MPa is below vacuum."""
+    pressure = ripple()
+    pressure[1] *= -1
+    write_case(tmp_path, sheet(), pressure)
+    refused(tmp_path, "healthy_0.h5", "p2", "sign is inverted", "Multiply")
+
+
+def test_faults_of_all_sensors_and_recordings_are_told_at_once(tmp_path):
+    """NaN in one, a stuck sensor in both rows of another: three errors of two files."""
+    content = sheet()
+    first = content["recordings"][0]
+    content["recordings"] = [first, {**first, "file": "second.h5"}]
+    pressure = ripple()
+    pressure[0, 5] = np.nan
+    write_case(tmp_path, content, pressure)
+    with h5py.File(tmp_path / "second.h5", "w") as file:
+        file["pressure"] = np.full((2, 51200), 9.5e6)
+        file.attrs["sampling_rate_hz"] = RATE
+    with pytest.raises(InputErrors) as caught:
+        load_case(tmp_path)
+    told = [(error.file.split("/")[-1], error.field) for error in caught.value.errors]
+    assert told == [("healthy_0.h5", "p1"), ("second.h5", "p1"), ("second.h5", "p2")]
+
+
+def test_the_row_of_a_gap_in_time_is_the_real_one(tmp_path):
+    """The clock jumps before row 5001."""
+    content = sheet()
+    content["recordings"][0]["file"] = "r.csv"
+    write_case(tmp_path, content, pressure=None)
+    pressure = ripple(0.3)
+    time = np.arange(pressure.shape[1]) / RATE
+    time[5000:] += 0.01
+    table = np.column_stack([time, *pressure])
+    np.savetxt(tmp_path / "r.csv", table, delimiter=",", header="time_s,p1,p2", comments="")
+    refused(tmp_path, "r.csv", "time_s", "not evenly spaced (first at row 5001)")

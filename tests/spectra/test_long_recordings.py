@@ -1,0 +1,88 @@
+"""Long recordings: the cost of an analysis grows with their length, not with its cube."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from case_folders import RATE, ripple
+from rippletwin.spectra import speed_regression
+from rippletwin.spectra.angular_resampling import cut_revolutions
+from rippletwin.spectra.speed_regression import (
+    MAX_BLOCK_REVOLUTIONS,
+    harmonics_at_mean_speed,
+    mean_speed,
+)
+
+MEAN_HZ, DELAY_S, NOISE = 1000 / 60, 60e-3, 0.05
+ORDER, COPIES = 180, 40
+
+
+def delayed(count, seed):
+    """Speeds (R,), spectra (R, 1, COPIES) of a delay seen at them, and what it is at their mean."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(count) / MEAN_HZ
+    deviation = 1e-3 * np.sin(2 * np.pi * 0.02 * time) + 5e-4 * np.sin(2 * np.pi * 0.07 * time + 1)
+    speed = MEAN_HZ * (1 + deviation)
+
+    def answer(hz):
+        return np.exp(-2j * np.pi * ORDER * hz * DELAY_S)
+
+    noise = rng.standard_normal((count, 1, COPIES)) + 1j * rng.standard_normal((count, 1, COPIES))
+    spectra = answer(speed)[:, None, None] + NOISE * noise
+    return speed, spectra, answer(mean_speed(speed))
+
+
+def test_blocks_are_as_good_as_one_regression(monkeypatch):
+    """Statistics: 300 revolutions in three blocks and in one, against the delay itself. The blocks'
+    error is at most a quarter larger, and both are as large as the covariance says. The mean of the
+    revolutions errs ten times as much."""
+    speed, spectra, true = delayed(300, 0)
+    orders = np.full(COPIES, ORDER)
+    errors = []
+    for most in (speed_regression.MAX_IN_ONE, 1000):
+        monkeypatch.setattr(speed_regression, "MAX_IN_ONE", most)
+        values, covariance = harmonics_at_mean_speed(spectra, speed, orders)
+        error = np.abs(values[0] - true) ** 2
+        assert np.mean(error / covariance[:, 0, 0].real) == pytest.approx(1.0, abs=0.5)
+        errors.append(np.sqrt(np.mean(error)))
+    assert errors[0] < 1.25 * errors[1]
+    plain = np.sqrt(np.mean(np.abs(spectra.mean(axis=0) - true) ** 2))
+    assert plain > 10 * errors[0]
+
+
+def test_no_matrix_is_larger_than_a_block(monkeypatch):
+    """What is decomposed of 2000 revolutions has no more rows than a block, so that cost and memory
+    are proportional to the revolutions; each band is reported."""
+    sizes, steps = [], []
+    decompose = np.linalg.eigh
+
+    def recorded(matrix):
+        sizes.append(len(matrix))
+        return decompose(matrix)
+
+    monkeypatch.setattr(np.linalg, "eigh", recorded)
+    speed, spectra, true = delayed(2000, 1)
+    tracemalloc.start()
+    try:
+        values, _ = harmonics_at_mean_speed(
+            spectra, speed, np.full(COPIES, ORDER), lambda *step: steps.append(step)
+        )
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert max(sizes) < MAX_BLOCK_REVOLUTIONS and steps == [(1, 1)]
+    assert peak < 15 * spectra.nbytes + 30 * 16 * MAX_BLOCK_REVOLUTIONS**2
+    assert np.abs(values[0] - true).max() < 0.02
+
+
+def test_cutting_takes_memory_in_proportion_to_the_recording():
+    """Windows overlap four times; transformed together they would take ten times as much."""
+    pressure = ripple(8.0)
+    tracemalloc.start()
+    try:
+        cut_revolutions(pressure, RATE, 9, 1000.0)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 8 * pressure.nbytes

@@ -1,0 +1,173 @@
+"""The command line: options are checked before anything is fitted, and it ends quietly."""
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from case_folders import sheet, spoilt, write_case
+from paths import ROOT
+from rippletwin.cli import main
+
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT / "src"), "OMP_NUM_THREADS": "1"}
+
+OPTIONS = {
+    "negative frequency": ("calibrate", ["--max-frequency", "-5"], "--max-frequency", "-5"),
+    "no frequency": ("calibrate", ["--max-frequency", "nan"], "--max-frequency", "nan"),
+    "infinite frequency": ("calibrate", ["--max-frequency", "inf"], "--max-frequency", "inf"),
+    "no processes": ("explain", ["--processes", "0"], "--processes", "0 processes"),
+    "negative processes": ("explain", ["--processes", "-1"], "--processes", "-1 processes"),
+    "too many processes": ("explain", ["--processes", "99999"], "--processes", "99999"),
+    "too few draws": ("explain", ["--bootstrap", "3"], "--bootstrap", "3 draws"),
+    "no folder": ("explain", ["--out", ""], "--out", "no folder is named"),
+    "blanks": ("calibrate", ["--out", "  "], "--out", "no folder is named"),
+    "a file": ("calibrate", ["--out", "{file}"], "--out", "is a file"),
+    "below a file": ("explain", ["--out", "{file}/deeper/results"], "--out", "is a file"),
+    "a name too long": ("explain", ["--out", "x" * 5000], "--out", "cannot be opened"),
+}
+
+
+@pytest.mark.parametrize("name", OPTIONS)
+def test_option_that_makes_no_sense(tmp_path, capsys, name):
+    """Refused with exit code 2 before the case is even read: there is none in this folder."""
+    command, options, option, words = OPTIONS[name]
+    (tmp_path / "file").touch()
+    options = [text.format(file=tmp_path / "file") for text in options]
+    if "--out" not in options:
+        options += ["--out", str(tmp_path / "out")]
+    assert main([command, str(tmp_path), *options]) == 2
+    told = capsys.readouterr()
+    assert told.out == "" and len(told.err.splitlines()) == 1
+    assert option in told.err and words in told.err
+    assert not (tmp_path / "out").exists()
+
+
+@contextmanager
+def another_user():
+    """Not root, who may write everywhere."""
+    root = os.geteuid() == 0
+    if root:
+        os.seteuid(65534)
+    try:
+        yield
+    finally:
+        if root:
+            os.seteuid(0)
+
+
+@pytest.mark.parametrize("command", ["calibrate", "explain"])
+def test_folder_that_may_not_be_written(capsys, command):
+    """Results that could not be written are told before the fit."""
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder).chmod(0o555)
+        with another_user():
+            assert main([command, folder, "--out", f"{folder}/out"]) == 2
+    assert "not allowed to write" in capsys.readouterr().err
+
+
+def test_frequency_below_the_first_piston_harmonic(tmp_path, capsys):
+    """10 Hz leaves nothing of a pump at 150 Hz; told before the fit."""
+    write_case(tmp_path, sheet())
+    command = ["calibrate", str(tmp_path), "--out", str(tmp_path / "out"), "--max-frequency", "10"]
+    assert main(command) == 2
+    told = capsys.readouterr()
+    assert "lowest frequency is 150" in told.err and told.out == ""
+
+
+def test_every_fault_is_a_line(tmp_path, capsys):
+    """Three mistakes in a sheet are three lines on standard error, and exit code 2."""
+
+    def spoil(content):
+        content["fluid"]["density"] = 0.87
+        content["fluid"]["kinematic_viscosity"] = 32
+        content["recordings"][0]["state"] = "worn"
+
+    spoilt(tmp_path, spoil)
+    assert main(["check", str(tmp_path / "rig.yaml")]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 3 and all(line.startswith("rippletwin: ") for line in lines)
+
+
+def test_warnings_are_told(tmp_path, capsys):
+    """A value that is possible but unusual is a line on standard error; the case is read."""
+    spoilt(tmp_path, lambda c: c["line"]["segments"][0].update(wave_speed=150))
+    assert main(["check", str(tmp_path)]) == 0
+    told = capsys.readouterr()
+    assert "warning: line.segments[0].wave_speed" in told.err
+    assert "revolutions" in told.out
+
+
+def test_interrupt_ends_without_a_traceback(tmp_path, capsys, monkeypatch):
+    """Ctrl-C is exit code 130 and nothing is printed."""
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("rippletwin.case.load.load_case", interrupted)
+    assert main(["check", str(tmp_path)]) == 130
+    assert capsys.readouterr().err == ""
+
+
+FITS = """
+import sys, time
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+import rippletwin.explanation.explain as module
+
+def work(_):
+    print("ready", flush=True)
+    time.sleep(100)
+
+def slow(*_):
+    with ProcessPoolExecutor(2, get_context("fork")) as pool:
+        list(pool.map(work, range(2)))
+
+module.explain = slow
+from rippletwin.cli import main
+sys.exit(main(["explain", sys.argv[1], "--out", sys.argv[1] + "/out"]))
+"""
+
+
+def test_interrupt_ends_the_fitting_processes_too(tmp_path):
+    """Ctrl-C reaches every process of the terminal; none of them prints a traceback."""
+    write_case(tmp_path, sheet())
+    run = subprocess.Popen(
+        [sys.executable, "-c", FITS, str(tmp_path)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=ENVIRONMENT,
+        start_new_session=True,
+    )
+    assert [run.stdout.readline() for _ in range(2)] == ["ready\n", "ready\n"]
+    os.killpg(run.pid, signal.SIGINT)
+    _, told = run.communicate(timeout=60)
+    assert (run.returncode, told) == (130, "")
+
+
+def test_reader_that_leaves_ends_without_a_traceback(tmp_path):
+    """rippletwin check CASE | head -1"""
+    write_case(tmp_path, sheet())
+    run = subprocess.Popen(
+        [sys.executable, "-m", "rippletwin", "check", str(tmp_path)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=ENVIRONMENT,
+    )
+    assert "segment" in run.stdout.readline()
+    run.stdout.close()
+    told = run.stderr.read()
+    assert (run.wait(timeout=60), told) == (141, "")
+
+
+def test_module_is_the_command(tmp_path):
+    """python -m rippletwin takes the same command line."""
+    command = [sys.executable, "-m", "rippletwin", "check", str(tmp_path / "nowhere")]
+    run = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT)
+    assert run.returncode == 2 and "there is no such folder" in run.stderr
