@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from paper_rig import paper_rig
 from rippletwin.calibration.calibrate import calibrate
 from rippletwin.calibration.frequency_continuation import fit_hypothesis, refine
 from rippletwin.calibration.levenberg_marquardt import descend
@@ -14,7 +15,7 @@ from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.shaft_angles import align_shaft_angles, fit_shaft_angles
 from rippletwin.case.model import Load
 from rippletwin.twin.twin import Twin
-from synthetic_recordings import paper_rig, point, recordings
+from synthetic_recordings import point, recordings
 
 ERROR_MODELS = pytest.mark.parametrize("error_model", [Likelihood, Posterior])
 

@@ -8,7 +8,11 @@ import pytest
 from case_folders import RATE, ripple
 from rippletwin.spectra import speed_regression
 from rippletwin.spectra.angular_resampling import cut_revolutions
-from rippletwin.spectra.speed_regression import BLOCK, harmonics_at_mean_speed, mean_speed
+from rippletwin.spectra.speed_regression import (
+    MAX_BLOCK_REVOLUTIONS,
+    harmonics_at_mean_speed,
+    mean_speed,
+)
 
 MEAN_HZ, DELAY_S, NOISE = 1000 / 60, 60e-3, 0.05
 ORDER, COPIES = 180, 40
@@ -67,8 +71,8 @@ def test_no_matrix_is_larger_than_a_block(monkeypatch):
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert max(sizes) < BLOCK and steps == [(1, 1)]
-    assert peak < 15 * spectra.nbytes + 30 * 16 * BLOCK**2
+    assert max(sizes) < MAX_BLOCK_REVOLUTIONS and steps == [(1, 1)]
+    assert peak < 15 * spectra.nbytes + 30 * 16 * MAX_BLOCK_REVOLUTIONS**2
     assert np.abs(values[0] - true).max() < 0.02
 
 

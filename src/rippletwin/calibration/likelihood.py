@@ -37,7 +37,7 @@ wholly wrong. With an error relative to each harmonic they would weigh as much a
 ones."""
 
 MODEL_ERRORS = np.geomspace(1e-4, 2.0, 13)  # of the first search, which two finer ones follow
-FINER_MODEL_ERRORS = 7
+FINER_MODEL_ERRORS = 9
 SOURCE_SHARES = np.array([0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0])
 """Of the largest source error, `twin.source_sd`: the values tried for sigma."""
 
@@ -59,6 +59,9 @@ class Likelihood:
     """
 
     source_free, smooth_sd = False, 0.0
+    needs_full_jacobian = True
+    """Derivatives that freeze the nonlinear load are wrong by up to 2 %. The model error may be far
+    less, and then a descent by them ends too far from the mode."""
 
     def __init__(
         self,
@@ -169,14 +172,6 @@ class Likelihood:
             model_errors = np.geomspace(*model_errors[ends], FINER_MODEL_ERRORS)
             sigmas = sigmas[source : source + 1]
         self.model_error = min(self.model_error, self.max_model_error)
-
-    @property
-    def needs_full_jacobian(self) -> bool:
-        """Whether derivatives with a frozen nonlinear load end a descent too far from the mode.
-
-        They are wrong by up to 2 %, and the model error may be far less.
-        """
-        return not self._use_quotients
 
     def use_full_jacobian(self, theta: np.ndarray) -> None:
         """From here on derivatives near theta include those of nonlinear load and compliance."""
