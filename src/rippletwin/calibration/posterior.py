@@ -23,9 +23,9 @@ named where only the ripple is wrong.
 The residual determines tau, with one exception. An error of the ripple's size that is common to all
 operating points is absorbed by the impedance of the line, all segments alike: displacement fixes
 the mean flow, but not the backflow, which makes most of a ripple and goes with the bulk modulus. So
-a size common to all is uncertain by s = 3 % whatever tau is. Without s the impedances of concealed
-cases were off by 1 to 4 % and stated to 0.8 % (docs/explain.md). Where the bulk modulus is a
-parameter of its own, s = 1 % is left for dead volumes, ports and leakage.
+a size common to all is uncertain by s = 3 % whatever tau is. Without s the stated standard
+deviations of the impedances would be several times too small. Where the bulk modulus is a parameter
+of its own, s = 1 % is left for dead volumes, ports and leakage.
 
 g >= 1 is the size of the nominal ripple around a harmonic over that of the harmonic itself. Where
 two parts of the ripple cancel, or 40 dB below the strongest harmonic, a few per cent of the parts
