@@ -70,6 +70,11 @@ def no_samples(file):
     file["pressure"] = np.zeros((2, 0))
 
 
+def no_times(file):
+    file["pressure"] = ripple()
+    file["time_s"] = np.zeros(0)
+
+
 def compound(file):
     file["pressure"] = np.zeros(5, dtype=[("p1", "f8"), ("p2", "f8")])
 
@@ -103,6 +108,7 @@ STRUCTURES = {
     "data in a raw file": (elsewhere, "pressure", ["data lie in another file"]),
     "an empty dataspace": (no_values, "pressure", ["empty"]),
     "no samples": (no_samples, "pressure", ["empty"]),
+    "no times": (no_times, "time_s", ["empty"]),
     "a compound type": (compound, "pressure", ["a structure of p1, p2"]),
     "complex numbers": (complex_numbers, "pressure", ["complex numbers"]),
     "words": (words, "pressure", ["not all numbers"]),

@@ -124,8 +124,8 @@ def implausible(path: Path, sheet: dict) -> tuple[list[InputError], list[str]]:
         error, warning = _compare(path, field, value, allowed)
         errors += error
         warnings += warning
-    told = {error.field for error in errors}
-    errors += (e for fields, e in _contradictions(path, sheet) if told.isdisjoint(fields))
+    reported = {error.field for error in errors}
+    errors += (e for fields, e in _contradictions(path, sheet) if reported.isdisjoint(fields))
     return errors, warnings
 
 

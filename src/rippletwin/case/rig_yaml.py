@@ -75,9 +75,9 @@ def schema_errors(path: Path, sheet: dict) -> list[InputError]:
     errors = list(jsonschema.Draft202012Validator(schema()).iter_errors(sheet))
     errors.sort(key=lambda error: [str(part) for part in error.absolute_path])
     found = [one for error in errors for one in _explained(path, error)]
-    told = {error.field for error in found}
+    reported = {error.field for error in found}
     for field, value in leaves(sheet):
-        if isinstance(value, float) and not math.isfinite(value) and field not in told:
+        if isinstance(value, float) and not math.isfinite(value) and field not in reported:
             problem = "the number is not finite: beyond 1.8e308"
             found.append(InputError(path, field, problem, "Correct it"))
     return list({error.field: error for error in reversed(found)}.values())[::-1]

@@ -97,8 +97,8 @@ def _sensor_errors(path: Path, sheet: dict) -> Iterator[InputError]:
                     path,
                     field,
                     f"{position:g} m is where {other} is too",
-                    "Two sensors at one place tell nothing of the line between them: correct one "
-                    "of the positions, or take one sensor out",
+                    "Two sensors need different positions: correct one of them, or take one sensor "
+                    "out",
                 )
         placed.append((name, position))
 
@@ -106,7 +106,7 @@ def _sensor_errors(path: Path, sheet: dict) -> Iterator[InputError]:
 def _recording_errors(path: Path, sheet: dict) -> Iterator[InputError]:
     names = [sensor.get("name") for sensor in entries(sheet, "sensors")]
     load_kind = mapping(sheet, "load").get("kind")
-    told = set()
+    reported = set()
     for index, entry in enumerate(entries(sheet, "recordings")):
         field = f"recordings[{index}]"
         kind = entry.get("kind", "periodic")
@@ -118,13 +118,13 @@ def _recording_errors(path: Path, sheet: dict) -> Iterator[InputError]:
             yield from _missing_file(path, f"{field}.repeats[{count}]", name)
         for key, why in _needed(kind, load_kind):
             whole = key in ("pump", "sensors")
-            if (sheet.get(key) if whole else key in entry) or (key, whole) in told:
+            if (sheet.get(key) if whole else key in entry) or (key, whole) in reported:
                 continue
             if whole:  # once for all recordings
-                told.add((key, whole))
+                reported.add((key, whole))
             yield InputError(path, key if whole else f"{field}.{key}", "missing", f"{why}; give it")
-        if kind == "random" and len(names) == 1 and "random" not in told:
-            told.add("random")
+        if kind == "random" and len(names) == 1 and "random" not in reported:
+            reported.add("random")
             yield InputError(
                 path, "sensors", "one sensor only", "A random recording needs two or more"
             )

@@ -32,7 +32,12 @@ class Prior:
         return self.centre + self.scale * ndtr(u)
 
     def coordinate(self, x):
-        """Inverse of `value`; a uniform's ends are clipped to finite coordinates."""
+        """Inverse of `value`; a uniform's ends are clipped to finite coordinates.
+
+        0 where the prior has no width: its parameter is exact, whatever x is.
+        """
+        if self.scale == 0.0:
+            return np.zeros(np.shape(x))[()]
         if self.kind == "normal":
             return (x - self.centre) / self.scale
         if self.kind == "lognormal":
