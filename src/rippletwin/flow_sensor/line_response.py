@@ -11,6 +11,7 @@ from rippletwin.case.model import FlowRipple
 from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.twin.forward_model import ForwardModel
 from rippletwin.twin.operating_point import OperatingCondition
+from rippletwin.twin.twin import Twin
 
 LineFactory = Callable[[float, np.ndarray], FrequencyDomainLine]
 """(speed_hz, orders (F,)) -> FrequencyDomainLine at s = 2 pi j orders speed_hz, its load linear."""
@@ -65,7 +66,7 @@ def own_admittance(line: FrequencyDomainLine, of: str) -> np.ndarray:
     return np.broadcast_to(own, line.s.shape)
 
 
-def line_factory(twin, load_pressure: float, ripple: FlowRipple | None = None) -> LineFactory:
+def line_factory(twin: Twin, load_pressure: float, ripple: FlowRipple | None = None) -> LineFactory:
     """Networks of a calibrated twin at one operating point, the load linearised there.
 
     `load_pressure` in Pa. The mean of `ripple` (m3/s) determines an orifice whose coefficient the

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rippletwin.case.model import FlowRipple
 from rippletwin.harmonics import flow_harmonics, peak_amplitudes, phase_modulate
+from rippletwin.twin.operating_point import OperatingPoint
+
+if TYPE_CHECKING:
+    from rippletwin.twin.twin import Twin
 
 
 class FlowSource:
@@ -20,7 +25,13 @@ class FlowSource:
     angles      index in theta of each observation's shaft angle, None for those without
     """
 
-    def __init__(self, twin, observations: Sequence, points: Sequence, slices: Sequence[slice]):
+    def __init__(
+        self,
+        twin: Twin,
+        observations: Sequence,
+        points: Sequence[OperatingPoint],
+        slices: Sequence[slice],
+    ):
         self._parameters, self._slices = twin.parameters, slices
         self._orders = [o.orders for o in observations]
         count = slices[-1].stop if slices else 0

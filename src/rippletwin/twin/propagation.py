@@ -12,12 +12,13 @@ from rippletwin.harmonics import one_period
 from rippletwin.line.time_domain import method_of_characteristics
 from rippletwin.line.time_domain.line_elements import End, Pipe, TimeDomainLine, capacitance
 from rippletwin.twin.effects.base import LineState
+from rippletwin.twin.twin import Twin
 
 MAX_PERIODS = 200  # until the line is periodic
 
 
 def propagate(
-    twin,
+    twin: Twin,
     flow: np.ndarray,
     healthy_flow: np.ndarray,
     speed_hz: float,
@@ -55,7 +56,7 @@ def propagate(
 
 
 def line_in_time(
-    twin, flow, healthy_flow, speed_hz, load_pressure, source_capacitance=0.0
+    twin: Twin, flow, healthy_flow, speed_hz, load_pressure, source_capacitance=0.0
 ) -> TimeDomainLine:
     """The twin as a `TimeDomainLine`, every effect in it; arguments as `propagate`'s."""
     rig = twin.calibrated_rig()
@@ -105,7 +106,7 @@ def line_in_time(
     return line
 
 
-def pump_change(twin, healthy_flow, speed_hz: float, load_pressure: float):
+def pump_change(twin: Twin, healthy_flow, speed_hz: float, load_pressure: float):
     """Flow (M,), m3/s, and capacitance, m3/Pa, that the twin's parameters of the pump add to the
     data sheet's, for a healthy and for a faulty pump alike."""
     count, mean = len(healthy_flow), float(np.mean(healthy_flow))
