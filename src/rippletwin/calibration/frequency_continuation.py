@@ -33,9 +33,9 @@ from rippletwin.calibration.multistart import (
     FEW_STARTS,
     MAX_MODEL_ERROR_BELOW_LIMIT,
     State,
+    choose_starts,
     distinct_modes,
     draw_around_modes,
-    first_starts,
     select_by_score_test,
 )
 from rippletwin.calibration.posterior import Posterior
@@ -81,7 +81,7 @@ def fit_by_continuation(
     """
     limits = continuation_limits(model.observations, limits_hz)
     many = len(starts) > FEW_STARTS or not model.twin.effects
-    states = first_starts(_with_frozen_compliance(model, limits[0]), starts, STARTS_FITTED[many])
+    states = choose_starts(_with_frozen_compliance(model, limits[0]), starts, STARTS_FITTED[many])
     for stage, limit in enumerate(limits):
         last = stage == len(limits) - 1
         part = _with_frozen_compliance(model, limit)

@@ -80,7 +80,7 @@ class Likelihood:
         self.model_error, self.source_sd = model_error, 0.0
         self.max_model_error = np.inf
         self.prior = np.array([not p.flat for p in twin.parameters])
-        data = [comparable(o, twin.rig) for o in self.observations]
+        data = [to_predicted_quantity(o, twin.rig) for o in self.observations]
         impedance = [o.kind == "input_impedance" for o in data]
         self._members = [np.flatnonzero(np.equal(impedance, which)) for which in (False, True)]
         self._members = [members for members in self._members if len(members)]
@@ -253,7 +253,7 @@ class _Group:
         return cost - np.sum(np.log(weight), axis=(1, 2))[:, None]
 
 
-def comparable(observation, rig):
+def to_predicted_quantity(observation, rig):
     """The observation in the quantity that `ForwardModel` predicts.
 
     An input impedance becomes a reflection coefficient (see `reflection`), its

@@ -49,7 +49,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rippletwin.calibration.error_model import ObservedRipple
-from rippletwin.calibration.likelihood import comparable
+from rippletwin.calibration.likelihood import to_predicted_quantity
 from rippletwin.calibration.smooth_source import SmoothSourceError, source_scale
 from rippletwin.calibration.whitening import NoiseBasis, Whitening, as_real
 from rippletwin.spectra.frequency_selection import select_below
@@ -95,7 +95,7 @@ class Posterior:
         self.max_model_error, self._products = np.inf, 0.0
         self._known_for, self._known_determinant = None, 0.0
         self.prior = np.array([not p.flat for p in twin.parameters])
-        data = [comparable(o, twin.rig) for o in self.observations]
+        data = [to_predicted_quantity(o, twin.rig) for o in self.observations]
         self._noise = NoiseBasis(np.concatenate([o.covariance for o in data]))
         self.values = np.concatenate([o.values for o in data], axis=1)  # (S, F)
         self._rotated = self._rotate(self.values)
