@@ -148,7 +148,7 @@ def _solve_junction(supply, slope, first, stop, junctions, state, ends, kept, jo
     the branches, which get their pressure in `joint` (pipes, 2).
     Returns the pressures on the pump's and the load's side.
     """
-    _, kinds, filters, references, _ = junctions
+    kinds, filters, references = junctions.kinds, junctions.filters, junctions.references
     s, b = supply[0], slope[0]
     for r in range(first, stop):
         kept[r, 0], kept[r, 1] = s, b
