@@ -25,7 +25,11 @@ def open_log(snakemake) -> Callable[[str], None]:
 
     def fail(kind, error, trace):
         traceback.print_exception(kind, error, trace, file=log)
-        print(f"{name}: {error if kind is InputError else repr(error)}", file=terminal, flush=True)
+        print(
+            f"{name}: {error if issubclass(kind, InputError) else repr(error)}",
+            file=terminal,
+            flush=True,
+        )
 
     sys.excepthook = fail
     return report_progress
