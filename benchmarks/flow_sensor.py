@@ -10,14 +10,14 @@ import argparse
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import torch
 
-from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor
 from rippletwin.flow_sensor import pinn
 from rippletwin.flow_sensor.estimate import band_limit
-from rippletwin.flow_sensor.line_response import network_of
+from rippletwin.flow_sensor.line_response import line_factory
 from rippletwin.flow_sensor.spectral_inversion import estimate_flow
 from rippletwin.harmonics import one_period
 from rippletwin.pump.faults import Slipper
@@ -25,31 +25,27 @@ from rippletwin.pump.outlets import ConstantPressure
 from rippletwin.pump.simulation import simulate
 from rippletwin.twin.twin import Twin
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "helpers"))
+
+from paper_rig import OIL, paper_rig
+
 SPEED, PRESSURE, BAND, SAMPLES, WINDOWS = 1000 / 60, 9.484e6, 1500.0, 3072, 40
-SENSORS = {
-    2: (Sensor("p1", 0.4167), Sensor("p2", 2.5895)),
-    3: (Sensor("p1", 0.4167), Sensor("p2", 2.5895), Sensor("p3", 4.6)),
-}
+SENSORS = (2, 3)
 
 
 def rig(sensors, wave_speed_factor=1.0):
     """The paper's calibrated line with two or three sensors."""
-    line = (
-        Segment(5.953, 0.01971, 1022.9),
-        Segment(1.144, 0.02307, 982.7),
-        Segment(1.675, 0.01486, 1308.4),
-    )
-    line = tuple(replace(s, wave_speed=s.wave_speed * wave_speed_factor) for s in line)
-    return Rig(Fluid(870.0, 3.2e-5), {"pistons": 9}, line, SENSORS[sensors], Load("orifice"))
+    nominal = paper_rig(sensors, third_sensor=4.6)
+    line = (replace(s, wave_speed=s.wave_speed * wave_speed_factor) for s in nominal.line)
+    return replace(nominal, line=tuple(line))
 
 
 def main() -> None:
     argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     torch.set_num_threads(1)
     rng = np.random.default_rng(0)
-    fluid = Fluid(870.0, 3.2e-5)
     healthy, worn = (
-        simulate({"pistons": 9}, fluid, 60 * SPEED, ConstantPressure(PRESSURE), fault)
+        simulate({"pistons": 9}, OIL, 60 * SPEED, ConstantPressure(PRESSURE), fault)
         for fault in (None, Slipper(4e-7))
     )
     truth = band_limit(worn.flow, SPEED, BAND)
@@ -60,9 +56,9 @@ def main() -> None:
         response = Twin(rig(sensors)).respond(worn, SPEED, PRESSURE, orders)
         clean = one_period(response, SAMPLES, orders)
         for factor in (1.0, 1.01):
-            network = network_of(Twin(rig(sensors, factor)), PRESSURE, healthy)
+            line_at = line_factory(Twin(rig(sensors, factor)), PRESSURE, healthy)
             started = time.perf_counter()
-            trunk, _ = pinn.train(network, SPEED, BAND)
+            trunk, _ = pinn.train(line_at, SPEED, BAND)
             trained = time.perf_counter() - started
             for noise in (0.0, 500.0, 4000.0):
                 shape = (WINDOWS, sensors, SAMPLES)
@@ -70,7 +66,7 @@ def main() -> None:
                 for name, arguments in (("spectral", ()), ("PINN", (trunk,))):
                     run = pinn.estimate_flow if arguments else estimate_flow
                     started = time.perf_counter()
-                    estimate = run(windows, SPEED, network, *arguments, max(noise, 50.0), BAND)
+                    estimate = run(windows, SPEED, line_at, *arguments, max(noise, 50.0), BAND)
                     spent = (time.perf_counter() - started) / WINDOWS
                     cells = row(sensors, noise, factor, name, estimate.flow, truth)
                     print(f"{cells} {1e3 * spent:.1f} |")

@@ -31,7 +31,7 @@ from rippletwin.case.model import Case
 from rippletwin.explanation.explain import explain
 from rippletwin.flow_sensor import pinn
 from rippletwin.flow_sensor.estimate import band_limit
-from rippletwin.flow_sensor.line_response import network_of
+from rippletwin.flow_sensor.line_response import line_factory
 from rippletwin.flow_sensor.spectral_inversion import estimate_flow
 from rippletwin.harmonics import peak_amplitudes
 from rippletwin.learning.dataset import augment
@@ -196,8 +196,8 @@ def main() -> None:
         pressure = np.concatenate([windows for _, windows, *_ in taken.values()])
         states = np.repeat(list(taken), [len(windows) for _, windows, *_ in taken.values()])
         for name, twin in lines(case, options.folder / str(count)).items():
-            network = network_of(twin, point.load_pressure)
-            trunk, _ = pinn.train(network, speed.mean(), BAND, pinn.Settings(steps=options.steps))
+            line_at = line_factory(twin, point.load_pressure)
+            trunk, _ = pinn.train(line_at, speed.mean(), BAND, pinn.Settings(steps=options.steps))
             for noise in (0.0, EXTRA_NOISE):
                 extra = noise * np.random.default_rng(0).standard_normal(pressure.shape)
                 noise_level = np.hypot(own, noise)
@@ -205,7 +205,7 @@ def main() -> None:
                     ("spectral", estimate_flow, ()),
                     ("PINN", pinn.estimate_flow, (trunk,)),
                 ):
-                    given = (pressure + extra, speed, network, *trained, noise_level, BAND)
+                    given = (pressure + extra, speed, line_at, *trained, noise_level, BAND)
                     started = time.process_time()
                     estimate = run(*given, of="outlet").harmonics
                     spent = 1e3 * (time.process_time() - started) / len(pressure)

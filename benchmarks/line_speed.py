@@ -26,8 +26,9 @@ sys.path[:0] = [str(TESTS / "reference"), str(TESTS / "helpers")]
 
 from harmonic_balance import balance_orifice  # noqa: E402
 from paper_line import DENSITY, MEAN_FLOW, MEAN_PRESSURE, PIPES, VISCOSITY  # noqa: E402
+from paper_rig import SENSORS  # noqa: E402
 
-SENSORS = (0.4167, 2.5895, 8.0)
+POSITIONS = (*SENSORS, 8.0)
 SHAFT_HZ, PISTONS = 1000 / 60, 9
 STEPS = 3072  # a revolution: 51.2 kHz
 
@@ -58,7 +59,7 @@ def network(orders: np.ndarray, friction: str = "unsteady") -> FrequencyDomainLi
         shunt=shunt_admittance(s, density=DENSITY, wave_speed=speed, diameter=diameter),
         source_flow=flow,
         load=("admittance", MEAN_FLOW / (2 * MEAN_PRESSURE) + 0 * s),
-        sensor_positions=SENSORS,
+        sensor_positions=POSITIONS,
     )
 
 
@@ -80,7 +81,7 @@ def revolution(friction: str, steps: int, periods: int = 1):
         density=DENSITY,
         viscosity=VISCOSITY,
         friction=friction,
-        positions=SENSORS,
+        positions=POSITIONS,
     )
     return simulate(line, periods=periods, tolerance=1e-4)
 

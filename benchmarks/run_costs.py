@@ -38,6 +38,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("results", type=Path, nargs="?", default=Path("results"))
     results = parser.parse_args().results
+    if not any((results / "benchmarks").rglob("*.tsv")):
+        parser.error(f"{results}: holds no benchmark files; run the workflow first")
     table = costs(results)
     print(table.to_string())
     size = sum(path.stat().st_size for path in results.rglob("*") if path.is_file())

@@ -15,7 +15,8 @@ import pandas as pd
 import yaml
 from snakemake.exceptions import WorkflowError
 
-from rippletwin.case.rig_yaml import read_sheet
+from rippletwin.case.load import load_case
+from rippletwin.case.rig_yaml import find_sheet, read_sheet
 from rippletwin.errors import InputError
 
 MAX_VALUE_CHARACTERS = 60  # of a wrong value that a message shows
@@ -55,12 +56,19 @@ def check_datasets(table: pd.DataFrame) -> None:
     check_names("datasets.tsv: uncorrected", compared, list(table["name"]))
 
 
-def read_rig(path: Path) -> dict:
-    """The sheet of the configured case; raises WorkflowError with what is wrong with it."""
+def read_rig(case: str) -> tuple[str, dict]:
+    """Path and content of the rig.yaml of the configured case, a folder or that file.
+
+    The sheet is checked as a job would check it, without the recordings. Raises WorkflowError with
+    a line for each thing that is wrong.
+    """
     try:
-        return read_sheet(path)
+        load_case(case, states=())
+        path = find_sheet(case)
+        return str(path), read_sheet(path)
     except InputError as error:
-        raise WorkflowError(f"config: case: {error}") from None
+        lines = [f"config: case: {one}" for one in error.errors]
+        raise WorkflowError("\n".join(lines)) from None
 
 
 def _lines(error: jsonschema.ValidationError) -> Iterator[str]:

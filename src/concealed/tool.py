@@ -67,8 +67,8 @@ def compute_baselines(explanation) -> dict:
 
     nominal    relative misfit of the whole data with nominal values; of each recording only the
                shaft angle is fitted
-    segments   delay and impedance of each segment with standard deviations, from the calibration
-               without effects ("calibrated") and from the explanation ("corrected")
+    segments   delay and impedance of each segment with standard deviations: "calibrated" from the
+               fit without effects with which the verdict compares, "corrected" from the explanation
     bic        name and element of the effect that `pick_by_bic` picks, or None
     sparse     the same of `pick_by_matching_pursuit`
     """
@@ -81,7 +81,7 @@ def compute_baselines(explanation) -> dict:
     return {
         "nominal": misfit(likelihood, nominal).relative,
         "segments": {
-            "calibrated": _segments(base),
+            "calibrated": _segments(explanation.without_effects),
             "corrected": _segments(accepted),
         },
         "bic": pick_by_bic(explanation),

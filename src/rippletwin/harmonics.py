@@ -9,18 +9,18 @@ from rippletwin.case.model import FlowRipple
 
 
 def phase_modulate(spectrum: np.ndarray, modulation: complex, count: int) -> np.ndarray:
-    """Flow (count,) at even instants of a revolution of a shaft that is ahead of even turning by
-    Re(b exp(j t)) rad at angle t, b = `modulation`: q(angle(t)) d angle/dt.
+    """Flow (count,) at even instants t of a revolution of a shaft that leads uniform rotation by
+    Re(b exp(j t)) rad, b = `modulation`: q(angle(t)) d angle/dt.
 
-    spectrum (F,) is that of q at even speed: peak amplitudes of orders 0 to F - 1, the mean first.
-    By Jacobi and Anger order k spreads to order n as j^(n-k) J_(n-k)(k |b|): small swings make
-    sidebands, and larger ones leave little of a high order itself.
+    spectrum (F,) is that of q at uniform speed: peak amplitudes of orders 0 to F - 1. By Jacobi and
+    Anger order k spreads to order n as j^(n-k) J_(n-k)(k |b|): a small modulation makes sidebands,
+    and a larger one leaves little of a high order itself.
     """
     instant = 2.0 * np.pi * np.arange(count) / count
-    swing = modulation * np.exp(1j * instant)
+    lead = modulation * np.exp(1j * instant)
     orders = np.flatnonzero(spectrum)
-    flow = (np.exp(1j * np.outer(instant + swing.real, orders)) @ spectrum[orders]).real
-    return flow * (1.0 - swing.imag)
+    flow = (np.exp(1j * np.outer(instant + lead.real, orders)) @ spectrum[orders]).real
+    return flow * (1.0 - lead.imag)
 
 
 def peak_amplitudes(period: np.ndarray) -> np.ndarray:
@@ -48,9 +48,8 @@ def one_period(
 def flow_harmonics(ripple: FlowRipple, orders: np.ndarray) -> np.ndarray:
     """Peak complex amplitudes (F,), m3/s, at shaft `orders` (F,); that of order 0 is the mean.
 
-    Angles need not be evenly spaced: the ripple is taken as piecewise linear over the revolution.
-    A ripple's harmonics at the same orders are calculated once, and read-only: fits ask for them
-    at every limit of frequency and for every hypothesis.
+    Angles need not be evenly spaced: the ripple is interpolated linearly over the revolution. The
+    result is cached with the ripple and read-only, since fits need the same orders very often.
     """
     key = np.asarray(orders, dtype=float).tobytes()
     known = ripple.known_harmonics

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from paper_rig import paper_rig
 from rippletwin import cli
 from rippletwin.calibration.calibrate import calibrate
 from rippletwin.calibration.pareto import calibrate_pareto
@@ -17,14 +18,7 @@ from rippletwin.line.time_domain import method_of_characteristics
 from rippletwin.line.time_domain.line_elements import End, Pipe, TimeDomainLine
 from rippletwin.twin import twin_file
 from rippletwin.twin.twin import Twin
-from synthetic_recordings import (
-    line_errors,
-    noisy,
-    paper_rig,
-    point,
-    recordings,
-    three_points,
-)
+from synthetic_recordings import line_errors, noisy, point, recordings, three_points
 
 HALF_PERCENT = 0.005
 

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from paper_rig import paper_rig
 from rippletwin.calibration.likelihood import Likelihood
 from rippletwin.case.model import Load
 from rippletwin.twin.twin import Twin
-from synthetic_recordings import paper_rig, point, recordings
+from synthetic_recordings import point, recordings
 
 
 @pytest.mark.parametrize("source", ["known", "nominal", "free"])

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from paper_rig import paper_rig
 from rippletwin.calibration.likelihood import Likelihood
 from rippletwin.calibration.misfit import misfit, theil
 from rippletwin.twin.twin import Twin
-from synthetic_recordings import paper_rig, point, recordings
+from synthetic_recordings import point, recordings
 
 
 def test_theil_from_harmonics_is_theil_from_the_time_signals():

@@ -1,10 +1,19 @@
-"""The score test on starts along the line."""
+"""Starts of wave speeds, and the score test on starts along the line."""
 
 import numpy as np
 import pytest
 
+from rippletwin.calibration import multistart
 from rippletwin.calibration.frequency_continuation import refine
-from rippletwin.calibration.multistart import MAX_FOLLOWED, select_by_score_test
+from rippletwin.calibration.multistart import (
+    MAX_FOLLOWED,
+    RANDOM_START_SD,
+    RANDOM_STARTS,
+    SCALINGS,
+    choose_starts,
+    distinct_modes,
+    select_by_score_test,
+)
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.explanation.fit_jobs import transfer_theta, weak_effect_starts
 from rippletwin.twin.twin import Twin
@@ -30,3 +39,26 @@ def test_score_test_keeps_a_start_near_the_true_position(place):
     positions = [twin.values(theta)["line_volume@position.position"] for theta in kept]
     assert len(kept) == MAX_FOLLOWED
     assert min(abs(x - place) for x in positions) < 1000 / 4000 / 8
+
+
+def test_starts_are_all_pairs_of_scalings_and_random_wave_speeds(monkeypatch):
+    """A line of three segments without effects starts from 49 pairs of scalings, the longest
+    segment's and the others', and from 400 draws of all wave speeds with their standard deviation;
+    everything else is that of the data sheet. With an effect there are no draws."""
+    monkeypatch.setattr(multistart, "align_shaft_angles", lambda model, theta: (0.0, theta))
+    bench, observations, _ = make(np.random.default_rng(1))
+    base = Twin(bench, observations)
+    thetas = np.array([t for _, t in choose_starts(Posterior(base, observations), ({},), 1000)])
+    pairs, drawn = thetas[: len(SCALINGS) ** 2], thetas[len(SCALINGS) ** 2 :]
+    assert {(t[0], t[1], t[2]) for t in pairs} == {(a, b, b) for a in SCALINGS for b in SCALINGS}
+    assert len(drawn) == RANDOM_STARTS
+    assert np.std(drawn[:, :3]) == pytest.approx(RANDOM_START_SD, rel=0.05)
+    assert not np.any(thetas[:, 3:])
+    model = Posterior(base.with_(effects=VOLUME), observations)
+    assert len(choose_starts(model, ({},), 1000)) == len(SCALINGS) ** 2
+
+
+def test_modes_near_a_better_one_are_dropped():
+    """Of two modes that differ by 0.03 in one coordinate the better stays, and one farther away."""
+    modes = [(2.0, np.array([0.0, 0.03])), (1.0, np.zeros(2)), (3.0, np.array([0.0, 1.0]))]
+    assert [value for value, _ in distinct_modes(modes)] == [1.0, 3.0]

@@ -12,14 +12,22 @@ from synthetic_observations import make
 
 
 def test_drift_is_detected_and_noise_is_not():
-    """Two equal states agree; with a wave speed that differs by half its prior deviation they
-    do not."""
-    _, early, truth = make(np.random.default_rng(9))
+    """Two noisy recordings of one state agree. With a wave speed that differs by half its prior
+    deviation they do not."""
+    rng = np.random.default_rng(9)
+    _, early, truth = make(rng, source=0.0)
     changed = truth.theta.copy()
     changed[truth.index["wave_speed[1]"]] += 0.5
-    late = [replace(o, values=h) for o, h in zip(early, ForwardModel(truth, early)(changed))]
-    assert drift_p_value(early, early, truth.rig.delay)[0] > 0.01
-    assert drift_p_value(early, late, truth.rig.delay)[0] < 1e-6
+
+    def record(theta):
+        recorded = []
+        for o, h in zip(early, ForwardModel(truth, early)(theta)):
+            noise = rng.normal(size=(*h.shape, 2)) @ np.array([1, 1j]) / np.sqrt(2)
+            recorded.append(replace(o, values=h + noise * np.sqrt(o.covariance[0, 0, 0].real)))
+        return recorded
+
+    assert drift_p_value(early, record(truth.theta), truth.rig.delay)[0] > 0.01
+    assert drift_p_value(early, record(changed), truth.rig.delay)[0] < 1e-6
 
 
 def test_the_pull_names_the_parameter_farthest_from_the_data_sheet():

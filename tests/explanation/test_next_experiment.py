@@ -109,13 +109,13 @@ def test_the_scaled_ripple_keeps_everything_but_its_size(uncertain_pump):
     """The ripple at another speed is that of the recording in proportion to the speed, by a shaft
     with the same phase modulation."""
     fit, observations = uncertain_pump
-    old = replace(observations[0].flow_ripple, swing=0.003 + 0.001j)
+    old = replace(observations[0].flow_ripple, modulation=0.003 + 0.001j)
     observations = [replace(observations[0], flow_ripple=old)]
     for recording, _, o in candidate_recordings(fit.twin, observations):
         if recording.startswith("record at"):
             scale = o.speed_hz / observations[0].speed_hz
             np.testing.assert_allclose(o.flow_ripple.flow, scale * old.flow)
-            assert o.flow_ripple.swing == old.swing
+            assert o.flow_ripple.modulation == old.modulation
 
 
 def test_gains_of_two_sensors_are_one_class():

@@ -16,7 +16,7 @@ from rippletwin.spectra.frequency_selection import select_fitted_frequencies
 from rippletwin.twin.twin import Twin
 from synthetic_observations import POINTS, make
 
-HIGHEST_HZ = 1500.0
+HIGHEST_HZ = 1000.0
 RIPPLE_SD = 0.02  # relative, of each harmonic of the nominal ripple
 NOISE = 100.0  # Pa, rms of each reading's amplitude
 MODULATION = 4e-3 * np.exp(0.3j)  # rad
@@ -91,7 +91,7 @@ def intervals(fit, covariance, blank, ripple_of, expected_name):
         wide = replace(fit, covariance=covariance)
         shaft_orders = analyse_shaft_orders(fit.twin, [o], HIGHEST_HZ)
         assert shaft_orders.name == expected_name
-        results.append(add_amplitude_interval(shaft_orders, wide, [o], HIGHEST_HZ, draws=50))
+        results.append(add_amplitude_interval(shaft_orders, wide, [o], HIGHEST_HZ, draws=40))
     return results
 
 

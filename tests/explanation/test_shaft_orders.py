@@ -145,4 +145,4 @@ def test_the_modulation_is_estimated_again_with_the_explained_line():
     assert found.search.best.names == ("unsteady_friction",)
     assert found.shaft_orders.name == "speed_fluctuation"
     assert found.shaft_orders.value == pytest.approx(6e-3, rel=0.01)
-    assert abs(found.observations[0].flow_ripple.swing) == pytest.approx(6e-3, rel=0.01)
+    assert abs(found.observations[0].flow_ripple.modulation) == pytest.approx(6e-3, rel=0.01)

@@ -7,7 +7,7 @@ import pytest
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders
 from rippletwin.explanation.verdict.summary_text import liquid_like_air, summary_text
 
-SPREAD = ShaftOrders(0.02, 1e-9, 0.95, "piston_spread", 0.03)
+SPREAD = ShaftOrders(0.02, 1e-9, 0.95, "piston_spread", 0.03, interval=(0.025, 0.036))
 
 
 def summarise(verdict, shaft_orders=None, raised=(), pull=(0.1, "load"), pump=None, **decision):
@@ -27,7 +27,8 @@ def test_shaft_orders_alone_are_named_without_an_effect_of_the_line():
     """A verdict that names an effect at shaft orders only says that the rest is complete."""
     sentence = summarise("named", SPREAD)
     assert "At the piston orders nothing is missing" in sentence
-    assert "2.0% of the ripple and indicate a spread of the pistons" in sentence
+    assert "2.0% of the ripple and indicate a spread of the pistons of 0.03" in sentence
+    assert "95 % interval 0.025 to 0.036" in sentence
 
 
 def test_an_unexplained_verdict_mentions_the_shaft_orders():

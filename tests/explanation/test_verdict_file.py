@@ -74,3 +74,15 @@ def test_shaft_effects_are_not_listed_where_nothing_is_established(explanation, 
     assert result["mismatch"]["where"]["element"] != "source"
     is_mentioned = "indicate a speed fluctuation" in result["sentence"]
     assert is_mentioned is (verdict == "unexplained")
+
+
+def test_before_is_the_best_that_calibration_without_effects_reaches(explanation):
+    """A plain calibration that fits better than the base gives the misfits before, in sample and
+    held out. The model error before stays that of the base."""
+    plain = {"in_sample": Score(0.015, 0.008), "held_out": Score(0.017, 0.009)}
+    validation = replace(explanation.validation, calibrated=plain)
+    fit = verdict_dict(replace(explanation, validation=validation))["fit"]
+    assert (fit["before"]["in_sample"], fit["before"]["held_out"]) == (0.015, 0.017)
+    assert fit["before"]["theil_held_out"] == 0.009
+    assert fit["after"]["in_sample"] == 0.02
+    assert fit["model_error"]["before"] == explanation.search.base.model_error

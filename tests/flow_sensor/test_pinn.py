@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 import torch
-from test_spectral_inversion import SPEED, TWO, line, record, ripples
 
+from flow_windows import SPEED, TWO, line, record, ripples
 from rippletwin.flow_sensor import pinn
 from rippletwin.flow_sensor.estimate import band_limit
 from rippletwin.flow_sensor.line_response import line_response

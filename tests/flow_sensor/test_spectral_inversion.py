@@ -3,62 +3,14 @@
 import numpy as np
 import pytest
 
+from flow_windows import RESISTANCE, SAMPLES, SPEED, THREE, TWO, line, record, ripples
+from paper_rig import SEGMENTS, SENSORS
 from rippletwin.flow_sensor.estimate import band_limit, orders_within
 from rippletwin.flow_sensor.line_response import line_response
 from rippletwin.flow_sensor.spectral_inversion import estimate_flow
-from rippletwin.harmonics import one_period, peak_amplitudes
-from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
-from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
+from rippletwin.harmonics import peak_amplitudes
 
-SAMPLES, SPEED, BAND = 3072, 1000 / 60, 1500.0
-WAVE_SPEEDS = np.array([1022.9, 982.7, 1308.4])
-DIAMETERS = np.array([0.01971, 0.02307, 0.01486])
-LENGTHS = np.array([5.953, 1.144, 1.675])
-TWO, THREE = (0.4167, 2.5895), (0.4167, 2.5895, 4.5)
-RESISTANCE = 2 * 9.5e6 / 6.8e-4  # of the orifice, Pa s/m3
-
-
-def line(positions=TWO, wave_speed_factor=1.0, resistance=RESISTANCE, own=0.0):
-    """Factory of the paper's calibrated line with a linear orifice."""
-
-    def network(speed_hz, orders):
-        s = 2j * np.pi * orders * speed_hz
-        series = [
-            series_impedance(s, density=870, viscosity=3.2e-5, diameter=d, friction="steady")
-            for d in DIAMETERS
-        ]
-        shunt = [
-            shunt_admittance(s, density=870, wave_speed=a * wave_speed_factor, diameter=d)
-            for a, d in zip(WAVE_SPEEDS, DIAMETERS)
-        ]
-        return FrequencyDomainLine(
-            s=s,
-            lengths=LENGTHS,
-            series=np.array(series),
-            shunt=np.array(shunt),
-            source_admittance=own * s,
-            load=("impedance", np.full(len(s), resistance, complex)),
-            sensor_positions=np.array(positions),
-        )
-
-    return network
-
-
-def ripples(count, rng):
-    """Smooth random flow ripples (count, M), m3/s: all shaft orders, falling with frequency."""
-    orders = np.arange(1, SAMPLES // 2)
-    size = 2e-5 / (1 + orders / 30)
-    shape = (count, len(orders))
-    harmonics = size * (rng.standard_normal(shape) + 1j * rng.standard_normal(shape))
-    return one_period(harmonics, SAMPLES, orders)
-
-
-def record(network, flow, noise, rng, speed=SPEED):
-    """Windows (n, S, M) that the sensors read for `flow` (n, M)."""
-    orders = np.arange(1, SAMPLES // 2)
-    response = network(speed, orders).readings()  # of unit flow
-    windows = one_period(response * peak_amplitudes(flow)[:, None, orders], SAMPLES, orders)
-    return windows + noise * rng.standard_normal(windows.shape)
+BAND = 1500.0
 
 
 def error(flow, truth):
@@ -147,8 +99,8 @@ def test_stated_standard_deviation_is_that_of_the_errors():
 def test_half_wave_blind_sensors_neither_explode_nor_blind_the_estimate():
     """Sensors half a wavelength apart at order 18: bounded without the load, right with it."""
     rng = np.random.default_rng(5)
-    apart = WAVE_SPEEDS[0] / (2 * 18 * SPEED)
-    blind = line((0.4167, 0.4167 + apart))
+    apart = SEGMENTS[0].wave_speed / (2 * 18 * SPEED)
+    blind = line((SENSORS[0], SENSORS[0] + apart))
     flow = ripples(50, rng)
     windows = record(blind, flow, 1000.0, rng)
     truth = peak_amplitudes(flow)[:, 18]

@@ -1,19 +1,15 @@
-"""The paper's pipe as the line's tests use it (its table of calibrated parameters)."""
+"""The paper's line as the tests of both line solvers use it."""
 
 import numpy as np
 
+from paper_rig import OIL, SEGMENTS
 from rippletwin.harmonics import one_period
 from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
 from rippletwin.line.time_domain.line_elements import Pipe
 
-DENSITY, VISCOSITY = 870.0, 3.2e-5
-PIPES = (
-    Pipe(5.953, 19.71e-3, 1022.9),
-    Pipe(1.144, 23.07e-3, 982.7),
-    Pipe(1.675, 14.86e-3, 1308.4),
-)
-SENSORS = (0.4167, 2.5895)
+DENSITY, VISCOSITY = OIL.density, OIL.kinematic_viscosity
+PIPES = tuple(Pipe(s.length, s.diameter, s.wave_speed) for s in SEGMENTS)
 MEAN_PRESSURE, MEAN_FLOW, PUMPING_HZ = 9.484e6, 0.7e-3, 150.0
 COEFFICIENT = MEAN_FLOW / np.sqrt(MEAN_PRESSURE)
 
@@ -52,3 +48,8 @@ def ripple(orders, mean=MEAN_FLOW, depth=0.05, corner_hz=1000.0, base_hz=PUMPING
 def samples(harmonics, orders, mean, count):
     """One period (count,) from peak amplitudes at whole orders."""
     return mean + one_period(harmonics, count, orders)
+
+
+def misfit(a, b):
+    """Norm of the difference over that of b."""
+    return np.linalg.norm(a - b) / np.linalg.norm(b)

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rippletwin.case.model import FlowRipple, Fluid, Load, Rig, Segment, Sensor
+from paper_rig import paper_rig
+from rippletwin.case.model import FlowRipple
 from rippletwin.spectra.observation import Observation
 from rippletwin.twin.forward_model import ForwardModel
 from rippletwin.twin.twin import Twin
@@ -13,15 +14,8 @@ POINTS = ((1000, 9.5e6), (1200, 15e6), (1500, 5e6))  # r/min, Pa
 
 
 def rig(sensors=3):
-    """The paper's calibrated line with two or three sensors."""
-    line = (
-        Segment(5.953, 0.01971, 1022.9),
-        Segment(1.144, 0.02307, 982.7),
-        Segment(1.675, 0.01486, 1308.4),
-    )
-    places = (0.4167, 2.5895, 6.5)[:sensors]
-    named = tuple(Sensor(f"p{k + 1}", x) for k, x in enumerate(places))
-    return Rig(Fluid(870.0, 3.2e-5), {"pistons": 9}, line, named, Load("orifice"))
+    """The paper's line with two or three sensors."""
+    return paper_rig(sensors, third_sensor=6.5)
 
 
 def ripple(speed_hz, pressure, depth=1.0):

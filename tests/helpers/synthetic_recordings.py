@@ -6,28 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from rippletwin.case.model import FlowRipple, Fluid, Load, Rig, Segment, Sensor
+from paper_rig import PISTONS
+from rippletwin.case.model import FlowRipple
 from rippletwin.spectra.observation import Observation
 from rippletwin.twin.twin import Twin
-
-PISTONS = 9
-
-
-def paper_rig(sensors=3, segments=3) -> Rig:
-    """Near the paper's calibrated line, with a third sensor beyond its two."""
-    line = (
-        Segment(5.95, 0.0197, 1020.0),
-        Segment(1.144, 0.0231, 983.0),
-        Segment(1.675, 0.0149, 1308.0),
-    )
-    places = (Sensor("p1", 0.42), Sensor("p2", 2.59), Sensor("p3", 7.5))
-    return Rig(
-        fluid=Fluid(870.0, 3.2e-5),
-        pump={"pistons": PISTONS},
-        line=line[:segments],
-        sensors=places[:sensors],
-        load=Load("orifice"),
-    )
 
 
 def flow_ripple(mean=6.7e-4, seed=0) -> FlowRipple:

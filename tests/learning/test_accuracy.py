@@ -79,8 +79,8 @@ def test_windows_of_unknown_state_are_not_scored():
     assert confusion_of(rows).sum() == 0
 
 
-def test_answers_are_shares_of_windows_and_seeds():
-    """By hand: two seeds, two windows, three answers S and one C2."""
+def test_predictions_are_shares_of_windows_and_seeds():
+    """By hand: two seeds, two windows, three predictions S and one C2."""
     answers = pd.DataFrame(
         {
             "recording": "unknown.csv",

@@ -114,7 +114,7 @@ def test_attention_turns_with_the_shaft():
 
 
 def test_fault_region_is_the_smallest_that_holds_the_energy():
-    """By hand: squared differences 9, 4, 1, 0 (of 14); half is held by the first alone, 0.8 by two,
+    """By hand: squared differences 9, 4, 1, 0 (of 14); half is in the first alone, 0.8 in two,
     0.95 by three."""
     healthy, faulty = np.zeros((1, 1, 4)), np.array([[[1.0, 3.0, 0.0, -2.0]]])
     for energy, expected in ((0.5, [1]), (0.8, [1, 3]), (0.95, [0, 1, 3])):

@@ -1,4 +1,4 @@
-"""Similarity of time-frequency images on cases with a known answer."""
+"""Similarity of time-frequency images on cases with a known result."""
 
 import numpy as np
 import pytest

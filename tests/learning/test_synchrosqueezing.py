@@ -93,7 +93,7 @@ def _continued(frequency):
 
 
 def test_a_moving_tone_is_followed():
-    """Analytic: a tone whose frequency swings 10 % over the window is found at its instantaneous
+    """Analytic: a tone whose frequency varies by 10 % over the window is found at its instantaneous
     frequency, column by column, to a row."""
     depth, slow = 15.0, 1 / (POINTS / RATE)
     phase = 2 * np.pi * 150 * TIME - depth / slow * (np.cos(2 * np.pi * slow * TIME) - 1)

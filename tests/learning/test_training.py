@@ -33,7 +33,7 @@ def ripples(samples_per_class, rng_seed, noise=0.02):
 
 
 def test_a_learnable_problem_is_learned():
-    """Held-out windows of the same simulation, drawn with another generator, are told apart."""
+    """Held-out windows of the same simulation, drawn with another generator, are classified."""
     x, y = ripples(40, 0)
     network, history = train(build("cnn1d_341_100", 1), x, y, QUICK, seed=0)
     x_new, y_new = ripples(25, 1)
@@ -54,7 +54,7 @@ def test_shuffled_labels_teach_nothing():
 
 
 def test_images_train_too():
-    """A 2D network learns which quarter of an image is bright, held out included."""
+    """A 2D network learns which quarter of an image is bright, validation included."""
     rng = np.random.default_rng(0)
     y = np.repeat(np.arange(4), 24)
     x = np.ones((96, 2, 16, 16), dtype=np.float32)

@@ -1,19 +1,11 @@
-"""Harmonic balance of the orifice; against the time domain see test_line_moc.py."""
+"""Harmonic balance of the orifice; test_method_of_characteristics.py compares it in time."""
 
 import numpy as np
 import pytest
 
 from harmonic_balance import balance, balance_orifice
-from paper_line import (
-    COEFFICIENT,
-    MEAN_FLOW,
-    MEAN_PRESSURE,
-    PIPES,
-    PUMPING_HZ,
-    SENSORS,
-    network,
-    ripple,
-)
+from paper_line import COEFFICIENT, MEAN_FLOW, MEAN_PRESSURE, PIPES, PUMPING_HZ, network, ripple
+from paper_rig import SENSORS
 from rippletwin.line.time_domain.method_of_characteristics import Pipe
 
 ORDERS = np.arange(1, 35)
@@ -90,7 +82,7 @@ def test_shaft_orders_contain_the_piston_orders():
 
 
 def test_missing_orders_carry_no_pressure():
-    """Given orders 9, 18, ... of the shaft, the answer is that of 1, 2, ... of the pistons."""
+    """Given orders 9, 18, ... of the shaft, the solution is that of 1, 2, ... of the pistons."""
     one, nine = driven(0.05), driven(0.05)
     first = balance_orifice(one, mean_pressure=MEAN_PRESSURE, mean_flow=MEAN_FLOW)
     second = balance_orifice(
@@ -122,7 +114,7 @@ def test_any_law_can_be_the_load():
 
 
 def test_resonance_of_a_lossless_line_is_no_singularity():
-    """At a closed-end resonance the open-circuit pressure is infinite, the answer is not."""
+    """At a closed-end resonance the open-circuit pressure is infinite, the solution is not."""
     pipe = PIPES[0]
     s = 2j * np.pi * pipe.wave_speed / (2 * pipe.length) * np.arange(1, 9)
     net = network(s, [pipe], "none", source_flow=ripple(np.arange(1, 9)))

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from paper_line import DENSITY, PIPES, SENSORS, immittances, network
+from paper_line import DENSITY, PIPES, immittances, network
+from paper_rig import SENSORS
 from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine, Insert
 
 S = 2j * np.pi * np.array([3.0, 150.0, 1234.5, 4999.0])
@@ -113,7 +114,7 @@ def test_pressures_follow_from_matrices():
         source_flow=source,
         source_admittance=1e-13 * S,
         inserts=with_inserts(S),
-        sensor_positions=(2.5895, 0.4167, 8.0),
+        sensor_positions=(*SENSORS[::-1], 8.0),
         sensor_factor=np.array([[1.0], [1.02], [0.9]]),
     )
     entry = net.transfer() @ np.stack([np.ones_like(S), admittance], axis=1)[..., None]

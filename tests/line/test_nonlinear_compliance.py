@@ -1,13 +1,13 @@
-"""What a line stores beyond proportion to the pressure, against the second harmonic it makes."""
+"""Nonlinear compliance, against the second harmonic that it makes of a progressive wave."""
 
 import numpy as np
 import pytest
 
 from paper_line import DENSITY, network
 from rippletwin.line.frequency_domain.nonlinear_compliance import (
-    TOLERANCE,
+    OUTFLOW_TOLERANCE,
+    NonlinearCompliance,
     NonlinearComplianceSolver,
-    Storage,
 )
 from rippletwin.line.frequency_domain.prescribed_outflows import FundamentalSolutions
 from rippletwin.line.time_domain.line_elements import Pipe
@@ -27,7 +27,9 @@ def driven(amplitude, curvature):
     line.source_admittance = 1.0 / IMPEDANCE
     line.load = "anechoic", None
     line.nonlinear_compliances = [
-        Storage(0, AREA, np.full(len(S), PRESSURE), np.full((1, len(S)), curvature, dtype=float))
+        NonlinearCompliance(
+            0, AREA, np.full(len(S), PRESSURE), np.full((1, len(S)), curvature, dtype=float)
+        )
     ]
     p, q = line.load_state()
 
@@ -35,7 +37,7 @@ def driven(amplitude, curvature):
         scale = c / (a * p + b * q)
         return scale * p, scale * q
 
-    NonlinearComplianceSolver([slice(0, len(S))], ORDERS).drain(line, law)
+    NonlinearComplianceSolver([slice(0, len(S))], ORDERS).solve(line, law)
     return line
 
 
@@ -53,7 +55,7 @@ def test_second_harmonic_grows_as_the_distance(curvature):
     np.testing.assert_allclose(np.abs(forward[:, 0]), amplitude, rtol=1e-3)
 
 
-def test_what_is_stored_is_not_lost():
+def test_nonlinear_storage_conserves_energy():
     """Lossless pipe: the mean power that enters leaves at the end, in whatever harmonic (energy
     is conserved, for what is stored in a crest comes back)."""
     line, ends = driven(0.2 * PRESSURE, -2e-3), [0.0, LENGTH]
@@ -62,12 +64,12 @@ def test_what_is_stored_is_not_lost():
     assert power[1, 0] < 0.995 * power[0, 0]  # some of it in other harmonics
 
 
-def test_nothing_stored_changes_nothing():
+def test_zero_series_is_the_linear_line():
     """Series of zeros: the linear line, to rounding."""
     line = driven(0.05 * PRESSURE, 0.0)
-    drained = line.pressure_at([1.0])
+    forced = line.pressure_at([1.0])
     line.outflows = None
-    np.testing.assert_allclose(drained, line.pressure_at([1.0]), atol=1e-9 * np.abs(drained).max())
+    np.testing.assert_allclose(forced, line.pressure_at([1.0]), atol=1e-9 * np.abs(forced).max())
 
 
 def lossy():
@@ -79,36 +81,36 @@ def lossy():
     return line
 
 
-def test_a_drain_is_the_branch_that_takes_as_much():
-    """What a shunt admittance takes where it sits, drained there instead: the same pressure and
-    flow all along the line, and the same relation at the load."""
-    branched, drained, x = lossy(), lossy(), np.array([0.4, 2.0, 3.5, 5.0])
+def test_an_outflow_is_the_branch_that_takes_as_much():
+    """The flow into a shunt admittance, prescribed instead: the same pressure and flow all along
+    the line, and the same relation at the load."""
+    branched, forced, x = lossy(), lossy(), np.array([0.4, 2.0, 3.5, 5.0])
     places = np.array([1.3, 4.1])
     admittances = [2.0 / IMPEDANCE * (0.1 + 0.02j * ORDERS), S * 1e-13]
     branched.inserts = [(at, "shunt", y) for at, y in zip(places, admittances)]
-    drained.outflows = places, branched.pressure_at(places) * admittances
-    np.testing.assert_allclose(drained.pressure_at(x), branched.pressure_at(x), rtol=1e-10)
-    np.testing.assert_allclose(drained.flow_at(x), branched.flow_at(x), rtol=1e-10)
-    a, b, c = drained.load_relation()
+    forced.outflows = places, branched.pressure_at(places) * admittances
+    np.testing.assert_allclose(forced.pressure_at(x), branched.pressure_at(x), rtol=1e-10)
+    np.testing.assert_allclose(forced.flow_at(x), branched.flow_at(x), rtol=1e-10)
+    a, b, c = forced.load_relation()
     p, q = branched.pressure_at([5.3])[0], branched.flow_at([5.3])[0]
     np.testing.assert_allclose(a * p + b * q, c, rtol=1e-10)
 
 
 def test_variation_of_constants_is_the_sweep():
-    """Two ways to the same pressure with drains: from both solutions without, and in one sweep."""
+    """Pressure with outflows, from both solutions without them and from one sweep with them."""
     line, x = lossy(), np.array([0.4, 2.0, 3.5, 5.0])
-    leaving = 1e-5 * np.exp(1j * np.outer(np.arange(1, 5), ORDERS))
+    outflow = 1e-5 * np.exp(1j * np.outer(np.arange(1, 5), ORDERS))
     basis = FundamentalSolutions(line, x)
-    a, b, c = basis.relation(leaving)
+    a, b, c = basis.load_relation(outflow)
     p, q = line.load_state()
     scale = c / (a * p + b * q)
-    pressure = basis.respond((scale * p, scale * q), leaving)
-    line.outflows = x, leaving
+    pressure = basis.pressure_under((scale * p, scale * q), outflow)
+    line.outflows = x, outflow
     np.testing.assert_allclose(line.pressure_at(x), pressure, rtol=1e-10)
 
 
 @pytest.mark.parametrize("diverging", [2, 8])
-def test_substitution_is_mixed_past_several_sharp_resonances(diverging):
+def test_iteration_converges_despite_several_sharp_resonances(diverging):
     """Against the exact solution: x = A x + b, where A takes `diverging` directions three to six
     times further at every pass, as resonances do, and the rest a tenth."""
     rng = np.random.default_rng(2)
@@ -117,15 +119,15 @@ def test_substitution_is_mixed_past_several_sharp_resonances(diverging):
     map_ = (turn * np.r_[far, np.full(40 - diverging, 0.1)]) @ np.conj(turn).T
     b = rng.normal(size=40) + 1j * rng.normal(size=40)
     full = NonlinearComplianceSolver([slice(0, 10)], np.arange(1, 11))
-    found = full._steady(lambda x: (map_ @ x.ravel() + b).reshape(4, 10), (4, 10))
+    found = full.find_fixed_point(lambda x: (map_ @ x.ravel() + b).reshape(4, 10), (4, 10))
     assert full.solved
     exact = np.linalg.solve(np.eye(40) - map_, b).reshape(4, 10)
-    assert np.abs(found - exact).max() < 10 * TOLERANCE * np.abs(exact).max()
+    assert np.abs(found - exact).max() < 10 * OUTFLOW_TOLERANCE * np.abs(exact).max()
 
 
-def test_a_solution_leads_to_the_next():
-    """Of a map and of one that differs by a hundredth: resumed, the second solution is the exact
-    one too, in at most a third of the passes that it takes from nothing."""
+def test_warm_start_saves_passes():
+    """After a map, one that differs by a hundredth: started from the first solution, the second is
+    exact too, in at most a third of the passes that it takes from zero."""
     rng = np.random.default_rng(5)
     turn = np.linalg.qr(rng.normal(size=(40, 40)) + 1j * rng.normal(size=(40, 40)))[0]
     far = np.r_[np.linspace(-6.0, -3.0, 20), np.full(20, 0.1)]
@@ -139,39 +141,41 @@ def test_a_solution_leads_to_the_next():
             count += 1
             return (map_ @ x.ravel() + b).reshape(4, 10)
 
-        found, exact = full._steady(function, (4, 10)), np.linalg.solve(np.eye(40) - map_, b)
+        found, exact = (
+            full.find_fixed_point(function, (4, 10)),
+            np.linalg.solve(np.eye(40) - map_, b),
+        )
         assert full.solved
-        assert np.abs(found.ravel() - exact).max() < 10 * TOLERANCE * np.abs(exact).max()
+        assert np.abs(found.ravel() - exact).max() < 10 * OUTFLOW_TOLERANCE * np.abs(exact).max()
         passes.append(count)
 
     full = NonlinearComplianceSolver([slice(0, 10)], np.arange(1, 11))
-    full.resumed = True
+    full.warm_start = True
     solve(full, 1.0)
     solve(full, 1.01)
     solve(NonlinearComplianceSolver([slice(0, 10)], np.arange(1, 11)), 1.01)
     assert passes[1] <= passes[2] / 3
 
 
-def test_a_solution_of_another_size_does_not_lead_to_this_one():
-    """After one of four places, one of six that fails and then four again: the first is resumed,
-    with what was seen on its own way."""
+def test_warm_start_skips_a_solution_of_another_shape():
+    """After a problem of four positions, one of six that fails, then four again: it is solved."""
     full = NonlinearComplianceSolver([slice(0, 10)], np.arange(1, 11))
-    full.resumed = True
-    full._steady(lambda x: 1.0 - 3.0 * x, (4, 10))
-    full._steady(lambda x: np.where(x.real > 0.0, -1.0, 1.0) + 0j, (6, 10))
+    full.warm_start = True
+    full.find_fixed_point(lambda x: 1.0 - 3.0 * x, (4, 10))
+    full.find_fixed_point(lambda x: np.where(x.real > 0.0, -1.0, 1.0) + 0j, (6, 10))
     assert not full.solved
-    found = full._steady(lambda x: 1.0 - 3.1 * x, (4, 10))
+    found = full.find_fixed_point(lambda x: 1.0 - 3.1 * x, (4, 10))
     assert full.solved
-    np.testing.assert_allclose(found, 1.0 / 4.1, rtol=10 * TOLERANCE)
+    np.testing.assert_allclose(found, 1.0 / 4.1, rtol=10 * OUTFLOW_TOLERANCE)
 
 
-def test_where_there_is_no_steady_state_none_is_claimed():
-    """What is 1 below nothing and -1 above has no solution, and the next map, x = x/2 + 1, is
-    solved all the same: what was seen of the first is forgotten."""
+def test_a_problem_without_a_solution_is_not_claimed_solved():
+    """f(x) = 1 for x <= 0 and -1 above has no fixed point; the next one, f(x) = x/2 + 1, is solved
+    all the same, for the history of the first is dropped."""
     full = NonlinearComplianceSolver([slice(0, 10)], np.arange(1, 11))
-    full.resumed = True
-    full._steady(lambda x: np.where(x.real > 0.0, -1.0, 1.0) + 0j, (4, 10))
+    full.warm_start = True
+    full.find_fixed_point(lambda x: np.where(x.real > 0.0, -1.0, 1.0) + 0j, (4, 10))
     assert not full.solved
-    found = full._steady(lambda x: 0.5 * x + 1.0, (4, 10))
+    found = full.find_fixed_point(lambda x: 0.5 * x + 1.0, (4, 10))
     assert full.solved
-    np.testing.assert_allclose(found, 2.0, rtol=10 * TOLERANCE)
+    np.testing.assert_allclose(found, 2.0, rtol=10 * OUTFLOW_TOLERANCE)

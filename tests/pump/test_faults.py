@@ -80,7 +80,7 @@ def test_severe_cylinder_loses_more_than_slight():
 
 
 def test_compound_fault_is_the_sum_of_far_apart_faults(constant):
-    """Faults of chambers that do not meet add up when the outlet pressure is held."""
+    """Faults of chambers that do not meet add up when the outlet pressure is constant."""
     outlet = ConstantPressure(LOAD)
     slipper, cylinder = Slipper(4e-7), Cylinder(5e-7, piston=4)
     both = simulate({}, OIL, SPEED, outlet, [slipper, cylinder]).flow

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from paper_rig import paper_rig
 from rippletwin.pump.faults import Cylinder, Slipper
 from rippletwin.pump.named_states import faults_of, simulate_state
 from rippletwin.pump.outlets import ConstantPressure
 from rippletwin.pump.simulation import simulate
-from synthetic_recordings import paper_rig
 
 SPEED_RPM, PRESSURE, LENGTH, SAMPLES = 1000.0, 9.5e6, 5.0, 512
 

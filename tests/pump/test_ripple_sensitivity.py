@@ -1,7 +1,7 @@
-"""What a twin knows of its pump beyond the data sheet: bulk modulus and port timing.
+"""Bulk modulus and port timing of the pump as parameters of a twin.
 
-Truth are whole simulations of pumps with other numbers, which parabolas through one standard
-deviation have to foretell elsewhere, and the library's own time domain.
+Independent truth: whole simulations of pumps with other values, which the parabolas through one
+standard deviation must predict, and the library's own time domain.
 """
 
 from dataclasses import replace
@@ -83,26 +83,26 @@ def misfit(a, b):
 
 
 @pytest.mark.parametrize("numbers", [{"modulus": MODULUS}, {"timing": TIMING}, {"modulus": -1.5}])
-def test_changes_foretell_other_pumps(numbers):
-    """The ripple of a pump simulated with other numbers, from the sheet's and its parabola: a tenth
-    of the change is left at most, the shaft angle being free (consistency with the whole model)."""
+def test_parabolas_predict_other_pumps(numbers):
+    """The ripple of a pump simulated with other values, predicted from the nominal one and its
+    parabola: at most a tenth of the change is left, for the best shaft angle."""
     twin = Twin(bench(), observations(), uncertain_pump=True)
     for o, (speed_rpm, pressure) in zip(observations(), POINTS):
         sheet = flow_harmonics(o.flow_ripple, o.orders)
         mean = float(np.mean(o.flow_ripple.flow))
-        told = sheet.copy()
+        predicted = sheet.copy()
         names = ("modulus", "timing")
         for name, (_, change) in zip(names, twin.pump_changes(o.speed_hz, pressure)):
             u = numbers.get(name, 0.0)
-            told = told + np.array([u, u**2]) @ change.harmonics(o.orders, mean)
+            predicted = predicted + np.array([u, u**2]) @ change.harmonics(o.orders, mean)
         other = flow_harmonics(ripple(speed_rpm, pressure, **numbers), o.orders)
         assert misfit(sheet, other) > 0.005
-        assert misfit(told, other) < 0.1 * misfit(sheet, other)
+        assert misfit(predicted, other) < 0.1 * misfit(sheet, other)
 
 
 def test_readings_are_those_of_the_other_pump():
-    """A twin on the sheet with its pump's numbers moved reads what one reads whose sheet has them,
-    chambers' admittance included: a tenth of the difference is left at most."""
+    """A twin with its pump's parameters moved predicts what a twin of another data sheet does,
+    chambers' admittance included: at most a tenth of the difference is left."""
     sheet, other = bench(), replace(bench(), pump=pump(MODULUS, TIMING))
     o = observations(given=False)[0]
     twin = standing(Twin(sheet, [o], uncertain_pump=True), bulk_modulus=MODULUS, port_timing=TIMING)
@@ -112,7 +112,7 @@ def test_readings_are_those_of_the_other_pump():
 
 def test_derivatives():
     """Columns of the pump's numbers are those of difference quotients, the orifice's remainder
-    held meanwhile, which is worth 1 to 2 % of a column (independent evaluation)."""
+    frozen meanwhile, which changes a column by 1 to 2 % (independent evaluation)."""
     data = observations()
     forward = DifferentiableForward(Twin(bench(), data, uncertain_pump=True), data)
     theta = 0.3 * np.random.default_rng(0).standard_normal(len(forward.twin.theta))
@@ -125,10 +125,10 @@ def test_derivatives():
         assert np.linalg.norm(columns[k] - slope) < 0.02 * np.linalg.norm(slope)
 
 
-def test_numbers_are_found():
-    """Recordings of a pump simulated with other numbers: a fit finds both within two of its
-    standard deviations, at most a fifth of the priors', and leaves a seventh of the misfit of one
-    that takes the sheet's ripple for true."""
+def test_fit_finds_both_values():
+    """Recordings of a pump simulated with other values: a fit finds both within two of its standard
+    deviations, which are at most a fifth of the priors', and leaves a seventh of the misfit of a
+    fit with the nominal ripple."""
     data = observations()
     other = [
         replace(o, flow_ripple=ripple(speed_rpm, pressure, modulus=MODULUS, timing=TIMING))
@@ -161,8 +161,8 @@ def test_numbers_are_found():
 
 
 def test_both_domains_agree():
-    """The corrected pump drives the method of characteristics as it does the chain of transfer
-    matrices: readings agree to 0.5 %, of which the correction is far more."""
+    """With the corrected pump the method of characteristics and the frequency domain agree to
+    0.5 %, far less than the correction."""
     o = observations()[0]
     sheet = Twin(bench(), [o], uncertain_pump=True)
     twin = standing(sheet, bulk_modulus=MODULUS, port_timing=TIMING)

@@ -97,14 +97,14 @@ def test_halving_the_step_leaves_the_ripple(outlet):
 
 
 def test_result_is_periodic(piped):
-    """It says so, and one more run started from its own orifice coefficient says the same."""
+    """It is reported periodic, and a run with its orifice coefficient gives the same flow."""
     assert piped.converged and piped.change < 1e-6
     again = simulate({}, OIL, SPEED, Pipe(PIPE, POSITIONS, orifice=piped.orifice))
     np.testing.assert_allclose(again.flow, piped.flow, atol=1e-5 * np.std(piped.flow))
 
 
-def test_unfinished_run_says_so(monkeypatch):
-    """A run cut off in its transient does not claim to be periodic."""
+def test_unfinished_run_is_not_reported_periodic(monkeypatch):
+    """A run stopped in its transient is not converged."""
     monkeypatch.setattr("rippletwin.pump.simulation.MAX_REVOLUTIONS", 3)
     ripple = simulate({}, OIL, SPEED, Pipe(PIPE, (), load_pressure=LOAD), min_steps=3072)
     assert not ripple.converged and ripple.revolutions == 3 and ripple.change > 1e-6

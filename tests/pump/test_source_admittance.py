@@ -10,7 +10,7 @@ from rippletwin.pump.outlets import ConstantPressure
 from rippletwin.pump.simulation import simulate
 
 
-def test_norton_source_answers_a_line_as_the_coupled_pump_does(piped):
+def test_norton_source_drives_a_line_as_the_coupled_pump_does(piped):
     """Flow into a constant pressure and mean chamber compliance stand in for the coupled pump.
 
     Independent truth: the pump coupled to the pipe step by step in time. The source drives the

@@ -78,7 +78,7 @@ def balance_orifice(
     At most `passes` corrections are made to the linearised orifice's pressure; 1 is enough inside
     a fit (docs/explanation/line.md has the errors).
 
-    Afterwards `network.load` is ("state", (p, q)), so that its answers hold at full amplitude.
+    Afterwards `network.load` is ("state", (p, q)), so that its response is that at full amplitude.
     Raises ValueError where not exactly one of K and mean flow is given, the mean drop is not
     positive, or `network.s` is not in the ratio of `orders`.
     """

@@ -1,4 +1,4 @@
-"""The friction that the time domain's sum of exponentials stands for, in the frequency domain."""
+"""Laminar friction in the frequency domain from the time domain's sum of exponentials."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from rippletwin.line.time_domain.weighting_functions import FRICTION_RATES, FRIC
 
 
 def summed_friction(sigma: np.ndarray) -> np.ndarray:
-    """sigma + 8 + 4 sum_k m_k sigma/(sigma + n_k), same shape as `sigma` = s R^2/nu.
+    """sigma + 8 + 4 sum_k m_k sigma/(sigma + n_k): approximates `pipe_immittance.scaled_friction`.
 
-    It approximates sigma I0/I2 (see `scaled_friction`).
+    `sigma` = s R^2/nu, any shape; exact it would be sigma I0/I2.
     """
     sigma = np.asarray(sigma, dtype=complex)
     memory = np.sum(

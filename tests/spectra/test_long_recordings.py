@@ -8,7 +8,11 @@ import pytest
 from case_folders import RATE, ripple
 from rippletwin.spectra import speed_regression
 from rippletwin.spectra.angular_resampling import cut_revolutions
-from rippletwin.spectra.speed_regression import BLOCK, harmonics_at_mean_speed, mean_speed
+from rippletwin.spectra.speed_regression import (
+    MAX_BLOCK_REVOLUTIONS,
+    harmonics_at_mean_speed,
+    mean_speed,
+)
 
 MEAN_HZ, DELAY_S, NOISE = 1000 / 60, 60e-3, 0.05
 ORDER, COPIES = 180, 40
@@ -36,8 +40,8 @@ def test_blocks_are_as_good_as_one_regression(monkeypatch):
     speed, spectra, true = delayed(300, 0)
     orders = np.full(COPIES, ORDER)
     errors = []
-    for most in (speed_regression.MAX_IN_ONE, 1000):
-        monkeypatch.setattr(speed_regression, "MAX_IN_ONE", most)
+    for most in (speed_regression.MAX_REVOLUTIONS_TOGETHER, 1000):
+        monkeypatch.setattr(speed_regression, "MAX_REVOLUTIONS_TOGETHER", most)
         values, covariance = harmonics_at_mean_speed(spectra, speed, orders)
         error = np.abs(values[0] - true) ** 2
         assert np.mean(error / covariance[:, 0, 0].real) == pytest.approx(1.0, abs=0.5)
@@ -67,8 +71,8 @@ def test_no_matrix_is_larger_than_a_block(monkeypatch):
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert max(sizes) < BLOCK and steps == [(1, 1)]
-    assert peak < 15 * spectra.nbytes + 30 * 16 * BLOCK**2
+    assert max(sizes) < MAX_BLOCK_REVOLUTIONS and steps == [(1, 1)]
+    assert peak < 15 * spectra.nbytes + 30 * 16 * MAX_BLOCK_REVOLUTIONS**2
     assert np.abs(values[0] - true).max() < 0.02
 
 

@@ -1,4 +1,4 @@
-"""Observations against synthetic signals of known harmonics, noise and speed wander."""
+"""Observations against synthetic signals of known harmonics, noise and speed variation."""
 
 import numpy as np
 import pytest
@@ -108,10 +108,10 @@ def test_covariance_is_that_of_repeated_draws():
     assert np.mean(chi2) / 2 == pytest.approx(1.0, abs=0.05)
 
 
-def test_a_line_that_answers_differently_at_another_speed_is_seen_at_the_mean_speed():
-    """A delay of 5 ms between shaft and sensor does not shrink the high harmonics.
+def test_a_line_that_depends_on_the_speed_is_observed_at_the_mean_speed():
+    """A delay of 5 ms between shaft and sensor does not reduce the high harmonics.
 
-    Truth: the amplitude at constant speed. Averaging windows blindly loses 0.2 % at 5 kHz for a
+    Truth: the amplitude at constant speed. Averaging windows loses 0.2 % at 5 kHz for a
     wander of 0.1 % rms and more for more; here 0.2 % rms would lose several per cent.
     """
     truth = harmonics(np.random.default_rng(3), sensors=1)
@@ -213,7 +213,7 @@ def spectrum(values, kind, **fields):
 def test_repeats_of_an_impedance_give_its_covariance():
     """Five repeats with 3 % error in the reflection coefficient: chi^2 of their mean is 1 to 10 %.
 
-    Truth: the impedance of a lossy open tube, whose peaks are a hundred times its valleys.
+    Truth: the impedance of a lossy open tube, whose maxima are a hundred times its minima.
     """
     rng = np.random.default_rng(9)
     frequency = np.linspace(50, 3000, 2951)

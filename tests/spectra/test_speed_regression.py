@@ -1,4 +1,4 @@
-"""Harmonics at the mean speed, from revolutions whose speed wanders through resonances."""
+"""Harmonics at the mean speed, from revolutions whose speed varies across resonances."""
 
 import numpy as np
 import pytest
@@ -6,12 +6,12 @@ from scipy.interpolate import CubicSpline
 
 from rippletwin.spectra.speed_regression import harmonics_at_mean_speed, mean_speed
 
-MEAN_HZ, FINE, COUNT = 25.0, 50, 80
+MEAN_HZ, STEPS_PER_REVOLUTION, COUNT = 25.0, 50, 80
 POLE = -np.pi + 2j * np.pi * 140.02 * MEAN_HZ  # a resonance 1 Hz wide, quality 3500
 
 
 def drift(count, size, seed):
-    """Relative deviations (count,) of the speed: a slow swing and a little more."""
+    """Relative deviations (count,) of the speed: a slow oscillation and a faster one."""
     t = np.arange(count) / count
     phase = np.random.default_rng(seed).uniform(0, 2 * np.pi, 2)
     deviation = np.sin(2 * np.pi * t + phase[0]) + 0.4 * np.sin(5 * np.pi * t + phase[1])
@@ -19,22 +19,22 @@ def drift(count, size, seed):
 
 
 def driven(order, size, seed):
-    """Mean speed, revolutions' speeds (R,) and what a resonance answers in each (R,).
+    """Mean speed, revolutions' speeds (R,) and a resonance's response in each (R,).
 
     The differential equation of the resonance, in time, its drive `order` times a shaft whose
-    speed wanders: exact for each of FINE steps a revolution.
+    speed varies: exact for each of STEPS_PER_REVOLUTION steps a revolution.
     """
     deviation = CubicSpline(np.arange(COUNT) + 0.5, drift(COUNT, size, seed))
-    deviation = deviation(np.arange(COUNT * FINE) / FINE)
-    step = 1 / (MEAN_HZ * (1 + deviation)) / FINE
+    deviation = deviation(np.arange(COUNT * STEPS_PER_REVOLUTION) / STEPS_PER_REVOLUTION)
+    step = 1 / (MEAN_HZ * (1 + deviation)) / STEPS_PER_REVOLUTION
     envelope, track = None, []
     for d, dt in zip(deviation, step, strict=True):
         rate = POLE - 2j * np.pi * order * MEAN_HZ * (1 + d)  # dy/dt = rate y + pi
         steady = -np.pi / rate
         envelope = steady if envelope is None else steady + (envelope - steady) * np.exp(rate * dt)
         track.append(envelope)
-    speed = 1 / step.reshape(COUNT, FINE).sum(1)
-    return mean_speed(speed), speed, np.reshape(track, (COUNT, FINE)).mean(1)
+    speed = 1 / step.reshape(COUNT, STEPS_PER_REVOLUTION).sum(1)
+    return mean_speed(speed), speed, np.reshape(track, (COUNT, STEPS_PER_REVOLUTION)).mean(1)
 
 
 def noisy(values, size, seed):
@@ -49,14 +49,14 @@ def noisy(values, size, seed):
 @pytest.mark.parametrize("order", [139.9, 140.12])
 def test_the_side_of_a_resonance_is_read_at_the_mean_speed(order, seed):
     """Another method: the resonance's differential equation, 0.3 s of memory, swept on its slope by
-    0.1 % of speed. Against the analytic steady answer the value at the mean speed errs by less than
-    a quarter of what the mean over the revolutions does, and by no more than it says."""
-    mean, speed, answer = driven(order, 2e-4, seed)
+    0.1 % of speed. Against the analytic steady response the value at the mean speed errs by less
+    than a quarter of the error of the mean over the revolutions, and within its covariance."""
+    mean, speed, response = driven(order, 2e-4, seed)
     true = -np.pi / (POLE - 2j * np.pi * order * mean)
     values, covariance = harmonics_at_mean_speed(
-        noisy(answer, 1e-4 * abs(true), seed), speed, np.full(40, order)
+        noisy(response, 1e-4 * abs(true), seed), speed, np.full(40, order)
     )
-    plain, found = abs(answer.mean() - true), abs(values.mean() - true)
+    plain, found = abs(response.mean() - true), abs(values.mean() - true)
     assert plain > 0.02 * abs(true)
     assert found < 0.25 * plain
     assert found < 4 * np.sqrt(np.median(covariance[:, 0, 0].real))
@@ -64,22 +64,22 @@ def test_the_side_of_a_resonance_is_read_at_the_mean_speed(order, seed):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_on_a_resonance_the_error_is_stated(seed):
-    """The same on the resonance itself, whose memory is as long as the speed's swing: there the
-    mean over the revolutions errs by a third to two thirds. What is left is stated."""
-    mean, speed, answer = driven(140, 3e-4, seed)
+    """The same on the resonance itself, which decays as slowly as the speed varies: there the mean
+    over the revolutions errs by a third to two thirds. The rest is in the covariance."""
+    mean, speed, response = driven(140, 3e-4, seed)
     true = -np.pi / (POLE - 2j * np.pi * 140 * mean)
     values, covariance = harmonics_at_mean_speed(
-        noisy(answer, 1e-3 * abs(true), seed), speed, np.full(40, 140)
+        noisy(response, 1e-3 * abs(true), seed), speed, np.full(40, 140)
     )
     error = np.abs(values[0] - true)
-    assert np.all(error < 0.6 * abs(answer.mean() - true))
+    assert np.all(error < 0.6 * abs(response.mean() - true))
     assert np.all(error < 4 * np.sqrt(covariance[:, 0, 0].real))
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-6, 1e-3])
-def test_where_speed_does_nothing_nothing_is_paid(size):
-    """Statistics: noise alone, whatever the speed does. The covariance is that of the mean of the
-    revolutions, to 10 %, and errors are as large as it says."""
+def test_independence_of_the_speed_costs_no_variance(size):
+    """Statistics: noise alone, however the speed varies. The covariance is that of the mean of the
+    revolutions, to 10 %, and that of the errors."""
     rng = np.random.default_rng(3)
     speed = MEAN_HZ * (1 + drift(60, size, 3))
     noise = rng.standard_normal((60, 2, 160)) + 1j * rng.standard_normal((60, 2, 160))

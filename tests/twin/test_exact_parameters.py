@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from paper_rig import paper_rig
 from rippletwin.case.model import Uncertainty
 from rippletwin.twin.parameters import coordinates, line_parameters, values
 from rippletwin.twin.priors import lognormal, normal
-from synthetic_recordings import paper_rig
 
 
 @pytest.mark.parametrize("prior", [normal(0.42, 0.0), lognormal(1020.0, 0.0)])

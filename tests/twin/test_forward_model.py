@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from paper_rig import paper_rig
 from rippletwin.harmonics import flow_harmonics
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.forward_model import ForwardModel
 from rippletwin.twin.twin import Twin
-from synthetic_recordings import paper_rig, point
+from synthetic_recordings import point
 
 
 def test_unit_response_is_that_to_a_small_ripple():

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from paper_rig import paper_rig
 from rippletwin.case.model import Fluid
 from rippletwin.twin.operating_point import operating_point
-from synthetic_recordings import paper_rig, point
+from synthetic_recordings import point
 
 RIG = replace(paper_rig(), fluid=Fluid(870.0, 6e-5))
 
@@ -23,7 +24,7 @@ def falls(flow):
     return np.array(lost)
 
 
-def told(load_pressure, means):
+def estimate(load_pressure, means):
     """The load pressure of an observation that states `load_pressure`."""
     o = replace(point(RIG), load_pressure=load_pressure, mean=np.asarray(means, float))
     return operating_point(RIG, o, o.flow_ripple)
@@ -35,23 +36,23 @@ FLOW = float(np.mean(point(RIG).flow_ripple.flow))
 @pytest.mark.parametrize("thicker", (0.85, 1.0, 1.2))
 def test_the_sensors_correct_what_was_set(thicker):
     """Analytic: means that fall to 9.5 MPa, in oil that may be thicker than stated; 0.4 % too much
-    was written down. The answer is within 0.2 %."""
+    was stated. The estimate is within 0.2 %."""
     means = 9.5e6 + thicker * falls(FLOW)
     assert (means[0] - means[-1]) / 9.5e6 > 0.004  # or the fall would not matter
-    found = told(1.004 * 9.5e6, means)
+    found = estimate(1.004 * 9.5e6, means)
     assert found.load_pressure == pytest.approx(9.5e6, rel=2e-3)
     assert found.coefficient * np.sqrt(found.load_pressure) == pytest.approx(FLOW, rel=1e-6)
 
 
-def test_a_sensor_with_a_gain_of_its_own_is_outvoted():
+def test_a_sensor_with_a_gain_error_is_outvoted():
     """One of three reads 5 % too much; the average would be 1.7 % off, this is within 0.1 %."""
     means = (9.5e6 + falls(FLOW)) * [1.0, 1.05, 1.0]
-    assert told(9.5e6, means).load_pressure == pytest.approx(9.5e6, rel=1e-3)
+    assert estimate(9.5e6, means).load_pressure == pytest.approx(9.5e6, rel=1e-3)
 
 
-def test_sensors_without_their_mean_say_nothing():
-    """Coupled without the mean, or with an offset for a mean: what is stated stands."""
-    assert told(9.5e6, [0.0, 2e4, -3e4]).load_pressure == 9.5e6
+def test_sensors_without_a_mean_are_ignored():
+    """AC-coupled, or with an offset instead of a mean: the stated pressure is used."""
+    assert estimate(9.5e6, [0.0, 2e4, -3e4]).load_pressure == 9.5e6
 
 
 def test_no_mean_is_no_error_where_one_is_stated():

@@ -1,4 +1,4 @@
-"""A pump that answers the ripple it makes, as the source of a twin.
+"""The lumped pump coupled to a twin's line.
 
 Independent truth: the pump coupled to its pipe step by step in time.
 """
@@ -47,9 +47,9 @@ def coupled():
     )
 
 
-def test_the_answer_takes_most_of_what_a_mean_admittance_leaves():
-    """The twin of the very line and pump misses the coupled pump's ripple by some per cent; with
-    the answer by little more than half of that, from an outlet pressure that was as wrong."""
+def test_coupling_removes_most_of_the_error_of_a_mean_admittance():
+    """With the true line and pump the twin's ripple is wrong by some per cent; coupled, by little
+    more than half of that, although the outlet pressure it uses was as wrong."""
     rig, o = coupled()
     twin = Twin(rig, [o])
     before = relative_misfit(o.values, twin.predict([o])[0])
@@ -61,8 +61,8 @@ def test_the_answer_takes_most_of_what_a_mean_admittance_leaves():
 
 
 def test_a_turned_shaft_changes_nothing():
-    """The answer is that of the pump at its own angle, whenever the recording began: the ripple
-    of a recording that begins elsewhere is the same."""
+    """The coupled ripple is in the pump's own angle: that of a recording which begins at another
+    shaft angle is the same."""
     rig, o = coupled()
     twin = Twin(rig, [o])
     theta = twin.theta.copy()
@@ -77,7 +77,7 @@ def test_a_turned_shaft_changes_nothing():
 
 
 def test_a_given_ripple_is_an_ideal_source():
-    """A file's ripple has no pump behind it that could answer."""
+    """A ripple from a file has no pump to couple."""
     rig, o = coupled()
     (known,) = couple_pump_to_line(Twin(rig, [o]), [o])
     assert couple_pump_to_line(Twin(rig, [known]), [known]) is None

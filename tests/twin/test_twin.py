@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from harmonic_balance import balance_orifice
+from paper_rig import paper_rig
 from rippletwin.case.model import Load
 from rippletwin.harmonics import flow_harmonics
 from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
@@ -18,13 +19,7 @@ from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.forward_model import ForwardModel, reflection
 from rippletwin.twin.twin import Twin
-from synthetic_recordings import (
-    flow_ripple,
-    line_errors,
-    paper_rig,
-    point,
-    three_points,
-)
+from synthetic_recordings import flow_ripple, line_errors, point, three_points
 
 
 def test_three_points_at_once_equal_newtons_harmonic_balance_one_by_one():

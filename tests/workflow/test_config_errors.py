@@ -104,25 +104,53 @@ def test_datasets_differ_and_are_compared_with_known_ones():
     assert "'CFD-R' is not known" in message(check_datasets, wrong)
 
 
+@pytest.fixture
+def case(tmp_path):
+    """Write a case whose recordings nobody reads; returns its folder."""
+
+    def write(sheet: str):
+        (tmp_path / "rig.yaml").write_text(sheet)
+        for entry in yaml.safe_load(RIG)["recordings"]:
+            (tmp_path / entry["file"]).write_text("time_s,p1\n")
+        return tmp_path
+
+    return write
+
+
 @pytest.mark.parametrize(
     ("sheet", "said"),
     [
-        ("", ["the whole file"]),
-        ("fluid:\n\tdensity: 870\n", ["line 2"]),
-        (RIG.replace("state: healthy", "state: Healthy"), ["recordings[0].state", "'Healthy'"]),
-        (RIG.replace("recordings:", "recording:"), ["recording"]),
+        ("", ["empty"]),
+        ("fluid:\n\tdensity: 870\n", ["line 2", "tab"]),
+        (RIG.replace("state: healthy", "state: Healthy"), ["recordings[0].state", "Healthy"]),
+        (RIG.replace("slipper.csv", "sliper.csv"), ["recordings[1].file", "sliper.csv"]),
+        (RIG.replace("density: 870", "density: 0.87"), ["fluid.density"]),
     ],
 )
-def test_a_wrong_sheet_ends_the_planning_with_one_line(tmp_path, sheet, said):
+def test_a_wrong_sheet_ends_the_planning_with_one_line(case, sheet, said):
     """The file and the place are named; nothing of YAML's own trace or of Python's is shown."""
-    (tmp_path / "rig.yaml").write_text(sheet)
-    text = message(read_rig, tmp_path / "rig.yaml")
-    assert text.startswith(f"config: case: {tmp_path / 'rig.yaml'}: ")
+    folder = case(sheet)
+    text = message(read_rig, str(folder))
+    assert text.startswith(f"config: case: {folder / 'rig.yaml'}: ")
     assert all(word in text for word in said)
     assert "\n" not in text
 
 
-def test_a_sheet_in_order_is_read(tmp_path):
-    """Numbers are numbers, as for the jobs: 3.2e-5 has no sign that YAML 1.1 wants."""
-    (tmp_path / "rig.yaml").write_text(RIG.replace("9500000", "9.5e6"))
-    assert read_rig(tmp_path / "rig.yaml")["recordings"][0]["load_pressure"] == 9.5e6
+def test_every_fault_of_a_sheet_has_a_line(case):
+    """Two wrong values are told at once."""
+    wrong = RIG.replace("state: healthy", "state: Healthy").replace("kind: orifice", "kind: hole")
+    lines = message(read_rig, str(case(wrong))).splitlines()
+    assert len(lines) == 2 and all(line.startswith("config: case: ") for line in lines)
+
+
+def test_a_case_that_is_not_there_is_named(tmp_path):
+    """A misspelt folder: the path that was looked for."""
+    assert "nowhere" in message(read_rig, str(tmp_path / "nowhere"))
+
+
+def test_a_sheet_in_order_is_read(case):
+    """By the folder or by the file; numbers are numbers, 9.5e6 too, as for the jobs."""
+    folder = case(RIG.replace("9500000", "9.5e6"))
+    path, sheet = read_rig(f"{folder}/")
+    assert path == str(folder / "rig.yaml") and read_rig(path) == (path, sheet)
+    assert sheet["recordings"][0]["load_pressure"] == 9.5e6

@@ -10,10 +10,11 @@ import torch
 import xarray as xr
 import yaml
 
+from paper_rig import paper_rig
 from rippletwin import store
 from rippletwin.case.model import Fluid
 from rippletwin.flow_sensor.estimate import band_limit
-from rippletwin.flow_sensor.line_response import network_of
+from rippletwin.flow_sensor.line_response import line_factory
 from rippletwin.learning.training import History
 from rippletwin.pump.faults import Cylinder, Slipper
 from rippletwin.pump.outlets import ConstantPressure
@@ -22,7 +23,7 @@ from rippletwin.twin import twin_file
 from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.twin import Twin
 from run_script import run_script
-from synthetic_recordings import flow_ripple, paper_rig
+from synthetic_recordings import flow_ripple
 from workflow_copy import RIG
 
 SPEED, PRESSURE, SAMPLES = 1000 / 60, 9.5e6, 1024
@@ -145,7 +146,7 @@ def test_flow_sensor_by_either_method_finds_the_flow(tmp_path):
     twin, ripple = Twin(rig), flow_ripple()
     orders = np.arange(1, SAMPLES // 2)
     spectrum = np.zeros((3, SAMPLES // 2 + 1), complex)
-    network = network_of(twin, PRESSURE)(SPEED, orders)
+    network = line_factory(twin, PRESSURE)(SPEED, orders)
     flow = np.interp(np.arange(SAMPLES) * 360 / SAMPLES, ripple.angle_deg, ripple.flow)
     spectrum[:, orders] = network.readings() * np.fft.rfft(flow)[orders]
     pressure = np.fft.irfft(spectrum, SAMPLES)

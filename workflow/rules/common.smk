@@ -32,10 +32,11 @@ for name, value in {"NUMBA_NUM_THREADS": "1", **MALLOC_ENVIRONMENT}.items():
 # ---- the case -------------------------------------------------------------------------------
 
 RECORDED_HERE = config["case"] == "virtualrig"
-CASE = f"{RESULTS}/case" if RECORDED_HERE else config["case"].rstrip("/")
-RIG = f"{CASE}/rig.yaml"
 # the virtual rig makes its sheet in one piece with the recordings
-SHEET = {} if RECORDED_HERE else read_rig(Path(RIG))
+RIG, SHEET = (
+    (f"{RESULTS}/case/rig.yaml", {}) if RECORDED_HERE else read_rig(config["case"])
+)
+CASE = os.path.dirname(RIG)
 
 
 def recordings():

@@ -9,7 +9,7 @@ from rippletwin import store
 from rippletwin.learning.architectures import CLASSES
 from rippletwin.learning.attention_summary import fault_attention, recording_attention
 from rippletwin.learning.grad_cam import attention_density, attention_map, fault_region
-from rippletwin.learning.networks import restored
+from rippletwin.learning.networks import restore_networks
 from rippletwin.learning.windows import spread_windows
 
 WINDOWS = 16  # of each recorded state, for the mean heat
@@ -24,7 +24,7 @@ first_turn = np.stack([x[name][0] for name in CLASSES])
 spread = spread_windows(recorded.state.values, WINDOWS)
 windows = [recorded.signal.values[at] for at in spread.values()]
 name, trained = snakemake.wildcards.architecture, torch.load(snakemake.input.weights)
-first, *others = restored(name, first_turn.shape[1], trained)
+first, *others = restore_networks(name, first_turn.shape[1], trained)
 shares = [fault_attention(net, x, dict(zip(faults, regions))) for net in (first, *others)]
 attended, blind = (np.array(share) for share in zip(*shares))
 heat = attention_density(attention_map(first, first_turn, np.arange(len(CLASSES))))

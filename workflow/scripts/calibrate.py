@@ -33,7 +33,7 @@ report_progress(
 )
 
 names = ("measured", "nominal", "calibrated")
-ripples = report.ripples(calibration, observations)
+ripples = report.compute_ripples(calibration, observations)
 store.save(
     xr.Dataset(
         {

@@ -8,7 +8,7 @@ from job import open_log
 from rippletwin import store
 from rippletwin.learning.architectures import CLASSES
 from rippletwin.learning.dataset import split_by_time
-from rippletwin.learning.networks import restored
+from rippletwin.learning.networks import restore_networks
 from rippletwin.learning.training import predict
 
 report_progress = open_log(snakemake)
@@ -19,7 +19,9 @@ x, truth = recorded.signal.values[kept], recorded.state.values[kept]
 
 tables = []
 trained = torch.load(snakemake.input.weights)
-for seed, network in enumerate(restored(snakemake.wildcards.architecture, x.shape[1], trained)):
+for seed, network in enumerate(
+    restore_networks(snakemake.wildcards.architecture, x.shape[1], trained)
+):
     predicted, probability = predict(network, x)
     table = pd.DataFrame(probability, columns=[f"p_{name}" for name in CLASSES]).round(5)
     table.insert(0, "predicted", np.array(CLASSES)[predicted])

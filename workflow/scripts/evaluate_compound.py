@@ -7,7 +7,7 @@ import torch
 from job import open_log
 from rippletwin import store
 from rippletwin.learning.architectures import CLASSES
-from rippletwin.learning.networks import restored
+from rippletwin.learning.networks import restore_networks
 from rippletwin.learning.training import predict
 
 report_progress = open_log(snakemake)
@@ -17,7 +17,9 @@ x, faults = samples.signal.values, np.array(samples.label.attrs["classes"])[samp
 
 tables = []
 trained = torch.load(snakemake.input.weights)
-for seed, network in enumerate(restored(snakemake.wildcards.architecture, x.shape[1], trained)):
+for seed, network in enumerate(
+    restore_networks(snakemake.wildcards.architecture, x.shape[1], trained)
+):
     predicted, _ = predict(network, x)
     tables.append(
         pd.DataFrame({"seed": seed, "recording": faults, "predicted": np.array(CLASSES)[predicted]})

@@ -4,7 +4,7 @@ import xarray as xr
 
 from job import open_log
 from rippletwin import store
-from rippletwin.flow_sensor.line_response import network_of
+from rippletwin.flow_sensor.line_response import line_factory
 from rippletwin.flow_sensor.methods import estimate_flow_by, noise_of_flow
 from rippletwin.twin.twin_file import load_twin
 
@@ -15,7 +15,7 @@ estimate = estimate_flow_by(
     params.method,
     recorded.signal.values,
     recorded.speed_hz,
-    network_of(load_twin(snakemake.input.twin), recorded.load_pressure),
+    line_factory(load_twin(snakemake.input.twin), recorded.load_pressure),
     recorded.noise_std.values,
     params.bandwidth_hz,
     width=params.width,

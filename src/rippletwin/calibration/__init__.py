@@ -1,1 +1,1 @@
-"""Calibration: posterior, optimiser and continuation that fit a twin to observations."""
+"""Calibration: two error models, and one engine that fits a twin under either."""

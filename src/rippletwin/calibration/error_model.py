@@ -35,6 +35,7 @@ class ErrorModel(Protocol):
     forward              `DifferentiableForward` of both; it can freeze the nonlinear compliance
     prior                (P,) mask of the parameters that have a prior N(0, 1)
     source_free          whether the source is projected out of all observations
+    needs_full_jacobian  whether fast derivatives may end a descent too far from the mode
     model_error          relative error of the twin, set by `estimate_errors`
     max_model_error      the largest that `estimate_errors` sets
     """
@@ -44,6 +45,7 @@ class ErrorModel(Protocol):
     forward: Any
     prior: np.ndarray
     source_free: bool
+    needs_full_jacobian: bool
     model_error: float
     max_model_error: float
 
@@ -70,10 +72,6 @@ class ErrorModel(Protocol):
 
         The gradient of the sum of squares is J^T r.
         """
-
-    @property
-    def needs_full_jacobian(self) -> bool:
-        """Whether the approximate derivatives end a descent too far from the mode."""
 
     def use_full_jacobian(self, theta: np.ndarray) -> None:
         """From here on derivatives near theta are exact there, at a cost."""

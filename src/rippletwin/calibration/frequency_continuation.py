@@ -22,15 +22,20 @@ import numpy as np
 
 from rippletwin.calibration.error_model import ErrorModel
 from rippletwin.calibration.fit import Fit, Hypothesis, laplace_fit
-from rippletwin.calibration.levenberg_marquardt import CONVERGED, descend
+from rippletwin.calibration.levenberg_marquardt import (
+    CONVERGED,
+    FIRST_DAMPING,
+    MIN_DAMPING,
+    descend,
+)
 from rippletwin.calibration.likelihood import EVENNESS, Likelihood
 from rippletwin.calibration.multistart import (
     FEW_STARTS,
     MAX_MODEL_ERROR_BELOW_LIMIT,
     State,
+    choose_starts,
     distinct_modes,
     draw_around_modes,
-    first_starts,
     select_by_score_test,
 )
 from rippletwin.calibration.posterior import Posterior
@@ -76,7 +81,7 @@ def fit_by_continuation(
     """
     limits = continuation_limits(model.observations, limits_hz)
     many = len(starts) > FEW_STARTS or not model.twin.effects
-    states = first_starts(_with_frozen_compliance(model, limits[0]), starts, STARTS_FITTED[many])
+    states = choose_starts(_with_frozen_compliance(model, limits[0]), starts, STARTS_FITTED[many])
     for stage, limit in enumerate(limits):
         last = stage == len(limits) - 1
         part = _with_frozen_compliance(model, limit)
@@ -232,16 +237,18 @@ def _unfreeze_and_refit(model: ErrorModel, theta: np.ndarray, rounds: int = 0) -
     rounds   most descents that follow with the full Jacobian, where the error model needs it
     """
     model.forward.freeze_compliance = False
+    damping = FIRST_DAMPING
     if model.forward.has_nonlinear_compliance:
         theta, value = descend(model, theta, MAX_LAST_STEPS)
     elif rounds and model.needs_full_jacobian:
         value = model.objective(theta, model.predict(theta))
+        damping = MIN_DAMPING  # damped steps gain nothing in ill-conditioned directions
     else:
         return theta
     for _ in range(rounds if np.isfinite(value) else 0):
         model.use_full_jacobian(theta)
         last = value
-        theta, value = descend(model, theta, MAX_LAST_STEPS)
+        theta, value = descend(model, theta, MAX_LAST_STEPS, damping=damping)
         if last - value < ROUND_CONVERGED:
             break
     return theta

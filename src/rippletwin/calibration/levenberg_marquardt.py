@@ -22,12 +22,14 @@ def descend(
     fixed: Sequence[int] = (),
     errors: bool = True,
     converged: float = CONVERGED,
+    damping: float = FIRST_DAMPING,
 ) -> tuple[np.ndarray, float]:
     """Mode near theta (P,) and minus the log posterior there; infinite where theta is not valid.
 
     fixed      indices of the parameters that stay
     errors     whether the errors of `model` are estimated again after each step
     converged  gain of a step below which it is the last
+    damping    of the first step, relative to the diagonal of the Hessian
 
     Method: Marquardt 1963, J. Soc. Ind. Appl. Math. 11:431.
     """
@@ -38,7 +40,6 @@ def descend(
     if errors:
         model.estimate_errors(prediction, theta)
     value = model.objective(theta, prediction)
-    damping = FIRST_DAMPING
     for _ in range(max_steps):
         r, jacobian = model.linearise(theta, prediction)
         jacobian = jacobian[:, free]

@@ -37,7 +37,7 @@ wholly wrong. With an error relative to each harmonic they would weigh as much a
 ones."""
 
 MODEL_ERRORS = np.geomspace(1e-4, 2.0, 13)  # of the first search, which two finer ones follow
-FINER_MODEL_ERRORS = 7
+FINER_MODEL_ERRORS = 9
 SOURCE_SHARES = np.array([0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0])
 """Of the largest source error, `twin.source_sd`: the values tried for sigma."""
 
@@ -59,6 +59,9 @@ class Likelihood:
     """
 
     source_free, smooth_sd = False, 0.0
+    needs_full_jacobian = True
+    """Derivatives that freeze the nonlinear load are wrong by up to 2 %. The model error may be far
+    less, and then a descent by them ends too far from the mode."""
 
     def __init__(
         self,
@@ -77,7 +80,7 @@ class Likelihood:
         self.model_error, self.source_sd = model_error, 0.0
         self.max_model_error = np.inf
         self.prior = np.array([not p.flat for p in twin.parameters])
-        data = [comparable(o, twin.rig) for o in self.observations]
+        data = [to_predicted_quantity(o, twin.rig) for o in self.observations]
         impedance = [o.kind == "input_impedance" for o in data]
         self._members = [np.flatnonzero(np.equal(impedance, which)) for which in (False, True)]
         self._members = [members for members in self._members if len(members)]
@@ -170,14 +173,6 @@ class Likelihood:
             sigmas = sigmas[source : source + 1]
         self.model_error = min(self.model_error, self.max_model_error)
 
-    @property
-    def needs_full_jacobian(self) -> bool:
-        """Whether derivatives with a frozen nonlinear load end a descent too far from the mode.
-
-        They are wrong by up to 2 %, and the model error may be far less.
-        """
-        return not self._use_quotients
-
     def use_full_jacobian(self, theta: np.ndarray) -> None:
         """From here on derivatives near theta include those of nonlinear load and compliance."""
         if self._pressures and self.forward.has_nonlinear_compliance:
@@ -258,7 +253,7 @@ class _Group:
         return cost - np.sum(np.log(weight), axis=(1, 2))[:, None]
 
 
-def comparable(observation, rig):
+def to_predicted_quantity(observation, rig):
     """The observation in the quantity that `ForwardModel` predicts.
 
     An input impedance becomes a reflection coefficient (see `reflection`), its

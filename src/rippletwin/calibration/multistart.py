@@ -33,7 +33,7 @@ State = tuple[float, np.ndarray]
 """Misfit, or minus the log posterior, and theta (P,)."""
 
 
-def first_starts(
+def choose_starts(
     model: ErrorModel, starts: Sequence[Mapping[str, float]], count: int
 ) -> list[State]:
     """The `count` starts with the least misfits; each of `starts` is represented.

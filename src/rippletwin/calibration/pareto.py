@@ -1,12 +1,12 @@
-"""Calibration in the paper's form: one objective a sensor, by NSGA-II (Deb et al. 2002).
+"""Calibration in the paper's form: one objective for each sensor, by NSGA-II (Deb et al. 2002).
 
-The objective of sensor s is the squared norm of measured minus predicted ripple there, over that
-of the measured ripple; by Parseval the harmonics give what the time signals would. Parameters are
-confined to a box about the data sheet instead of having priors. The shaft angles are not searched
-but aligned for each candidate, which leaves the box a third smaller at no loss.
+The objective of a sensor is the squared norm of measured minus predicted ripple over that of the
+measured ripple. By Parseval's theorem the harmonics give what the time signals would. Parameters
+lie in a box around the data sheet and have no priors. The shaft angles are not searched: they are
+aligned for each candidate, which makes the box smaller at no loss.
 
-The population passes through the same limits of frequency as the default fit, for the same reason.
-Of the Pareto set the compromise is the member with the least sum of objectives.
+The population passes through the frequency limits of the default fit, for the same reason. The
+compromise is the member of the Pareto set with the least sum of objectives.
 """
 
 from __future__ import annotations
@@ -27,14 +27,16 @@ from rippletwin.calibration.likelihood import EVENNESS, Likelihood
 from rippletwin.calibration.shaft_angles import align_shaft_angles
 from rippletwin.twin.twin import Twin
 
-BOX = 3.0  # prior standard deviations
+BOX = 3.0  # half the width of the box, prior standard deviations
 
 
 @dataclass(frozen=True)
 class ParetoSet:
-    """Members not dominated by any other: theta (K, P), objectives (K, S), best compromise first.
+    """Members that no other dominates, the compromise first.
 
-    calibration : of the compromise, comparable with that of the default fit.
+    theta         (K, P)
+    objectives    (K, S)
+    calibration   that of the compromise, comparable with that of the default fit
     """
 
     theta: np.ndarray
@@ -51,9 +53,13 @@ def calibrate_pareto(
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
 ) -> ParetoSet:
-    """The Pareto set of the observations' sensors; deterministic for a seed.
+    """The Pareto set of the sensors' misfits; deterministic for a seed.
 
-    `generations` is of each frequency limit. Raises ValueError without observations.
+    population    members
+    generations   for each frequency limit
+    progress      is called with a sentence after each limit
+
+    Raises ValueError without observations.
     """
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.problem import ElementwiseProblem
@@ -68,16 +74,16 @@ def calibrate_pareto(
     class Ripple(ElementwiseProblem):
         def __init__(self, likelihood):
             self.likelihood = likelihood
-            sensors = len(objectives(likelihood, twin.theta))
+            sensors = len(sensor_misfits(likelihood, twin.theta))
             super().__init__(n_var=int(searched.sum()), n_obj=sensors, xl=-BOX, xu=BOX)
 
         def whole(self, x):
             theta = twin.theta.copy()
             theta[searched] = x
-            return align_shaft_angles(self.likelihood, theta)[1]
+            return align_shaft_angles(self.likelihood, theta, between=True)[1]
 
         def _evaluate(self, x, out, *args, **kwargs):
-            out["F"] = objectives(self.likelihood, self.whole(x))
+            out["F"] = sensor_misfits(self.likelihood, self.whole(x))
 
     rng = np.random.default_rng(seed)
     members = np.clip(rng.standard_normal((population, searched.sum())), -BOX, BOX)
@@ -98,8 +104,8 @@ def calibrate_pareto(
     return ParetoSet(theta, result.F[order], conclude(problem.likelihood, theta[0], settings))
 
 
-def objectives(likelihood: Likelihood, theta: np.ndarray) -> np.ndarray:
-    """Squared relative misfit of each sensor, (S,), all observations together."""
+def sensor_misfits(likelihood: Likelihood, theta: np.ndarray) -> np.ndarray:
+    """Squared relative misfit (S,) of each sensor at theta (P,), all observations together."""
     left, total = 0.0, 0.0
     for measured, h, _ in likelihood.by_observation(likelihood.predict(theta)):
         left = left + np.sum(np.abs(measured - h) ** 2, axis=1)

@@ -23,9 +23,9 @@ named where only the ripple is wrong.
 The residual determines tau, with one exception. An error of the ripple's size that is common to all
 operating points is absorbed by the impedance of the line, all segments alike: displacement fixes
 the mean flow, but not the backflow, which makes most of a ripple and goes with the bulk modulus. So
-a size common to all is uncertain by s = 3 % whatever tau is. Without s the impedances of concealed
-cases were off by 1 to 4 % and stated to 0.8 % (docs/explain.md). Where the bulk modulus is a
-parameter of its own, s = 1 % is left for dead volumes, ports and leakage.
+a size common to all is uncertain by s = 3 % whatever tau is. Without s the stated standard
+deviations of the impedances would be several times too small. Where the bulk modulus is a parameter
+of its own, s = 1 % is left for dead volumes, ports and leakage.
 
 g >= 1 is the size of the nominal ripple around a harmonic over that of the harmonic itself. Where
 two parts of the ripple cancel, or 40 dB below the strongest harmonic, a few per cent of the parts
@@ -49,7 +49,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rippletwin.calibration.error_model import ObservedRipple
-from rippletwin.calibration.likelihood import comparable
+from rippletwin.calibration.likelihood import to_predicted_quantity
 from rippletwin.calibration.smooth_source import SmoothSourceError, source_scale
 from rippletwin.calibration.whitening import NoiseBasis, Whitening, as_real
 from rippletwin.spectra.frequency_selection import select_below
@@ -95,7 +95,7 @@ class Posterior:
         self.max_model_error, self._products = np.inf, 0.0
         self._known_for, self._known_determinant = None, 0.0
         self.prior = np.array([not p.flat for p in twin.parameters])
-        data = [comparable(o, twin.rig) for o in self.observations]
+        data = [to_predicted_quantity(o, twin.rig) for o in self.observations]
         self._noise = NoiseBasis(np.concatenate([o.covariance for o in data]))
         self.values = np.concatenate([o.values for o in data], axis=1)  # (S, F)
         self._rotated = self._rotate(self.values)

@@ -15,10 +15,10 @@ from rippletwin.twin import twin_file
 
 
 def segment_table(calibration: Calibration) -> list[dict]:
-    """Delay L/a (s) and characteristic impedance rho a/A (Pa s/m3) of each segment, with sds.
+    """Delay L/a (s) and characteristic impedance rho a/A (Pa s/m3) of each segment.
 
-    These are what waves see; the data determine them better than a, D and L one by one. Standard
-    deviations are first order in the logarithms, with their covariance.
+    Waves depend on these two, so the data determine them better than a, D and L alone. Standard
+    deviations are of first order in the logarithms, with their covariance.
     """
     twin, covariance = calibration.twin, calibration.covariance
     v = twin.arrays(twin.theta)
@@ -43,7 +43,11 @@ def segment_table(calibration: Calibration) -> list[dict]:
 
 
 def parameter_table(calibration: Calibration) -> list[dict]:
-    """Name, unit, nominal, value, sd and pull (prior standard deviations; None without prior)."""
+    """Name, place, unit, nominal, value and standard deviation of each parameter.
+
+    `pull` is the distance from the data sheet and `known` the posterior standard deviation, both in
+    prior standard deviations; None without a prior.
+    """
     twin = calibration.twin
     return [
         {
@@ -61,7 +65,7 @@ def parameter_table(calibration: Calibration) -> list[dict]:
 
 
 def to_dict(calibration: Calibration) -> dict:
-    """Everything of a calibration as plain data; `twin_of` makes a twin of it again."""
+    """A calibration as plain data; `twin_file.twin_of` makes a twin of it again."""
     return {
         "twin": twin_file.to_dict(calibration.twin),
         "covariance": calibration.covariance.tolist(),
@@ -75,8 +79,8 @@ def to_dict(calibration: Calibration) -> dict:
     }
 
 
-def markdown(calibration: Calibration) -> str:
-    """The report: misfits, warnings, segments and parameters."""
+def to_markdown(calibration: Calibration) -> str:
+    """The report.md of a calibration: misfits, warnings, segments and parameters."""
     before, after = calibration.before, calibration.after
     lines = [
         "# Calibration",
@@ -125,19 +129,21 @@ def markdown(calibration: Calibration) -> str:
         )
     lines += [
         "",
-        f"Relative error floor of the model: {calibration.model_error:.2%}; "
+        f"Relative error of the model: {calibration.model_error:.2%}; "
         f"relative error of the source: {calibration.source_sd:.2%}.",
     ]
     return "\n".join(lines) + "\n"
 
 
-def ripples(
+def compute_ripples(
     calibration: Calibration, observations: Sequence, samples: int = 1024
 ) -> list[dict[str, np.ndarray]]:
-    """Pressure ripples to draw, one dict a periodic observation.
+    """Pressure ripples to draw, one dictionary for each periodic observation.
 
-    label; sensors (S,); angle_deg (samples,) over one revolution; measured, nominal and calibrated
-    (S, samples) in Pa without mean, all from the same harmonics.
+    label       of the observation
+    sensors     (S,) names
+    angle_deg   (samples,) over one revolution
+    measured, nominal, calibrated   (S, samples) Pa without mean, from the same harmonics
     """
     out = []
     angle = 2 * np.pi * np.arange(samples) / samples
@@ -167,7 +173,7 @@ def save(calibration: Calibration, folder: str | Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in (
         ("twin.json", json.dumps(to_dict(calibration), indent=1) + "\n"),
-        ("report.md", markdown(calibration)),
+        ("report.md", to_markdown(calibration)),
     ):
         scratch = folder / f".{name}.new"
         scratch.write_text(text)

@@ -11,8 +11,12 @@ ANGLES_PER_TURN = 16  # points of the grid in a turn of the highest order
 REFINING_STEPS, REFINED = 6, 1e-9  # most steps after the grid, and gain of the last
 
 
-def align_shaft_angles(model: ErrorModel, theta: np.ndarray) -> tuple[float, np.ndarray]:
+def align_shaft_angles(
+    model: ErrorModel, theta: np.ndarray, between: bool = False
+) -> tuple[float, np.ndarray]:
     """Relative misfit, and theta (P,) with each recording's shaft angle aligned on a grid.
+
+    between   whether the angle is then moved between the points of the grid
 
     An angle turns order k by k times itself. The grid covers one turn of the orders' greatest
     common divisor. Each frequency weighs as the relative model error has it. The misfit is the
@@ -36,6 +40,8 @@ def align_shaft_angles(model: ErrorModel, theta: np.ndarray) -> tuple[float, np.
             matches = np.fft.fft(lines).real
             turn = 2 * np.pi * np.argmax(matches) / (len(lines) * order)
             match = np.max(matches)
+            if between:
+                turn, match = _maximise_match(weighted, orders, turn)
             parameter = twin.parameters[index]
             angle = parameter.value(theta[index]) + turn
             angle = (angle + np.pi / order) % (2 * np.pi / order) - np.pi / order
@@ -43,6 +49,20 @@ def align_shaft_angles(model: ErrorModel, theta: np.ndarray) -> tuple[float, np.
         misfit += float(np.sum(square / power) - 2 * match)
         count += measured.size
     return misfit / count, theta
+
+
+def _maximise_match(weighted: np.ndarray, orders: np.ndarray, turn: float) -> tuple[float, float]:
+    """Angle near `turn` where Re sum_k weighted_k exp(-j k angle) is greatest, and the maximum.
+
+    Three steps of Newton's method suffice from the best point of the grid.
+    """
+    for _ in range(3):
+        turned = weighted * np.exp(-1j * orders * turn)
+        curvature = np.sum(orders**2 * turned.real)
+        if curvature <= 0.0:
+            break
+        turn += np.sum(orders * turned.imag) / curvature
+    return turn, float(np.sum((weighted * np.exp(-1j * orders * turn)).real))
 
 
 def fit_shaft_angles(model: ErrorModel, theta: np.ndarray) -> np.ndarray:

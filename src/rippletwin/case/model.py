@@ -111,13 +111,13 @@ class FlowRipple:
     """Flow into the line over one revolution: flow (M,), m3/s, at angle_deg (M,), ascending.
 
     `pressure_mean` is the mean outlet pressure (Pa) at which it was computed, where that is known.
-    `swing` b, rad: the shaft that delivers it is ahead of even turning by Re(b exp(j t)) rad.
+    `modulation` b, rad: the shaft that delivers it leads uniform rotation by Re(b exp(j t)) rad.
     """
 
     angle_deg: np.ndarray
     flow: np.ndarray
     pressure_mean: float | None = None
-    swing: complex = 0.0
+    modulation: complex = 0.0
 
     @cached_property
     def known_harmonics(self) -> dict[bytes, np.ndarray]:

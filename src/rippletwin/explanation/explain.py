@@ -47,7 +47,7 @@ from rippletwin.explanation.checks.data_contradictions import find_contradiction
 from rippletwin.explanation.checks.prior_sensitivity import compare_without_each_effect
 from rippletwin.explanation.checks.profile_intervals import add_profile_intervals
 from rippletwin.explanation.checks.sensor_wiring import find_swapped_sensors
-from rippletwin.explanation.fit_jobs import FitJob, open_workers
+from rippletwin.explanation.fit_jobs import FitJob, PlainCalibration, open_workers
 from rippletwin.explanation.localise.free_corrections import locate_mismatch
 from rippletwin.explanation.localise.phase_modulation import (
     estimate_phase_modulation,
@@ -142,7 +142,10 @@ def explain_observations(
         alarms = read_alarms(search.base, point_fits, early, late, rig.delay)
         source_free_fits = refit_source_free(workers, search.leading_fits)
         explanation = best_explanation(search)
-        validation = cross_validate(workers, search.base, explanation, held_out)
+        calibrated = None
+        if explanation.hypothesis:
+            calibrated = workers.fit([FitJob((), PlainCalibration())])[0]
+        validation = cross_validate(workers, search.base, explanation, held_out, calibrated)
         null_distribution = None
         if draws and search.best.hypothesis:
             null_distribution = bootstrap_null(search.base, data, draws, processes, progress)
@@ -170,6 +173,7 @@ def explain_observations(
         search=search,
         alarms=alarms,
         validation=validation,
+        calibrated=calibrated,
         decision=decision,
         point_fits=tuple(point_fits),
         source_free_fits=tuple(source_free_fits),

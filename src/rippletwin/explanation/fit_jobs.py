@@ -95,6 +95,23 @@ class NearFit:
 
 
 @dataclass(frozen=True, eq=False)
+class PlainCalibration:
+    """Fit with the error model of `calibrate`, by continuation or from `theta` (P,) if given."""
+
+    theta: np.ndarray | None = None
+
+    def count_starts(self, rig, hypothesis: Hypothesis) -> int:
+        """Number of starts: one."""
+        return 1
+
+    def fit(self, base: Twin, hypothesis: Hypothesis, observations, source_free: bool) -> Fit:
+        """Fit `hypothesis`; a source that is known stays known."""
+        if self.theta is None:
+            return fit_hypothesis(base, hypothesis, observations, plain=True)
+        return refine(base, hypothesis, observations, [self.theta], exact=False, plain=True)
+
+
+@dataclass(frozen=True, eq=False)
 class FitJob:
     """One fit.
 
@@ -107,7 +124,7 @@ class FitJob:
     """
 
     hypothesis: Hypothesis
-    start: Continuation | FromTheta | NearFit = Continuation()
+    start: Continuation | FromTheta | NearFit | PlainCalibration = Continuation()
     observations: tuple[int, ...] | None = None
     base: Twin | None = None
     source_free: bool = False
@@ -123,7 +140,8 @@ def run_fit_job(base: Twin, observations: Sequence, job: FitJob) -> Fit:
 
 def job_from(fit: Fit, **options) -> FitJob:
     """The job that repeats a fit from its mode; `options` are fields of `FitJob`."""
-    return FitJob(fit.hypothesis, FromTheta(fit.twin.theta), **options)
+    start = PlainCalibration if fit.plain else FromTheta
+    return FitJob(fit.hypothesis, start(fit.twin.theta), **options)
 
 
 def job_without_effect(fit: Fit, k: int, base: Twin) -> FitJob:

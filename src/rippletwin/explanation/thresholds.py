@@ -14,7 +14,7 @@ from rippletwin.twin.effects.base import Effect
 
 MIN_LOG_BAYES_FACTOR = 8.0
 """An effect is accepted if it adds at least this. It is above the largest value in parametric
-bootstraps of cases without an effect, with refitting (docs/explain.md)."""
+bootstraps of cases without an effect, with refitting (docs/explanation/explain.md)."""
 
 DECISIVE_LOG_BAYES_FACTOR = 2.0 * MIN_LOG_BAYES_FACTOR
 """From this value on something is missing even where the explanation fails cross-validation."""
@@ -32,7 +32,7 @@ FALSE_ALARM_RATE = 0.02  # of cases without an effect, for the threshold of a bo
 GOOD_MODEL_ERROR = 1.25 * MIN_MODEL_ERROR  # up to here no effect can improve the fit noticeably
 MAX_MODEL_ERROR_TO_NAME = 2.0 * MIN_MODEL_ERROR
 """Above this no effect is named. With the true effect the model error falls to its minimum; with a
-similar effect it stays above (docs/explain.md)."""
+similar effect it stays above (docs/explanation/explain.md)."""
 MISFIT_ALARM = 3.0 * MIN_MODEL_ERROR  # of the base fit
 
 # Parameters and data of several recordings

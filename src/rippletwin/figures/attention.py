@@ -1,7 +1,8 @@
-"""Where networks look: Grad-CAM behind ripples and images; what alignment says of accuracy.
+"""Grad-CAM behind ripples and images, and alignment against accuracy.
 
-Heat is attention over its mean, one where it is spread evenly, so that networks compare. A figure
-has a column a network and a row a state; what the fault changes is marked by a bar at the edge.
+Heat is attention over its mean, 1 where it is spread evenly, so that networks can be compared. A
+figure has a column for each network and a row for each state; a bar at the edge marks the region of
+the fault.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from matplotlib.figure import Figure
 from rippletwin.figures import style
 from rippletwin.figures.diagnosis import ORDERS, order_ticks
 
-TOP = 3.0  # the same in every figure, so that figures compare; few peaks lie beyond
+MAX_HEAT = 3.0  # of the colour scale in every figure, for comparison; few peaks exceed it
 _BAR = dict(color=style.ALARM, lw=0)
-_SEEN = [patheffects.withStroke(linewidth=1.5, foreground="black")]  # a line seen on any heat
+_OUTLINED = [patheffects.withStroke(linewidth=1.5, foreground="black")]  # visible on any heat
 
 
 def windows(
@@ -41,9 +42,9 @@ def windows(
     for ax, network, row in _each(axes):
         mesh = ax.imshow(
             heat[network, row][None], extent=(0, 360, -reach, reach), aspect="auto",
-            cmap=_colours(), vmin=0, vmax=TOP,
+            cmap=_colours(), vmin=0, vmax=MAX_HEAT,
         )  # fmt: skip
-        ax.plot(angle, ripple[row], color="white", lw=0.6, path_effects=_SEEN)
+        ax.plot(angle, ripple[row], color="white", lw=0.6, path_effects=_OUTLINED)
         if region is not None:
             stretches = _stretches(region[row], 0, 360 / len(angle))
             ax.broken_barh(stretches, (-reach, 0.13 * reach), **_BAR)
@@ -81,7 +82,7 @@ def images(
     for ax, network, row in _each(axes):
         mesh = ax.imshow(
             heat[network, row], origin="lower", extent=(0, 2, bottom, top), aspect="auto",
-            cmap=_colours(), vmin=0, vmax=TOP,
+            cmap=_colours(), vmin=0, vmax=MAX_HEAT,
         )  # fmt: skip
         levels = low + (high - low) * np.array([0.08, 0.25, 0.6])
         ax.contour(times, rows, pictures[row], levels, colors="white", linewidths=(0.4, 0.7, 1.0))

@@ -60,7 +60,7 @@ def plot_ripple(e: Explanation) -> Figure:
     For observations that are not periodic, the amplitude against frequency.
     """
     shown = range(min(len(e.observations), MAX_COLUMNS))
-    fits = {"calibrated": e.search.base, "corrected": e.decision.accepted}
+    fits = {"calibrated": e.without_effects, "corrected": e.decision.accepted}
     curves = {"measured": []}
     for name, fit in fits.items():
         posterior = posterior_at_fit(fit, e.observations)

@@ -1,4 +1,4 @@
-"""Ripples over one revolution, and what calibration made of them."""
+"""Ripples over one revolution: measured, nominal, calibrated and corrected."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from rippletwin.figures import style
 
-# In the order of drawing: what is compared lies over what it is compared with.
+# In the order of drawing: a later curve lies over the earlier ones.
 _LOOK = {
     "nominal": dict(color=style.NOMINAL, ls="--", lw=0.8),
     "measured": dict(color=style.MEASURED, lw=1.8),

@@ -1,8 +1,8 @@
 """One look for every picture: sizes, fonts, colours that survive colour blindness.
 
-Colours are the qualitative set of Okabe and Ito (2008, Color Universal Design), told apart under
-all common forms of colour blindness; maps are viridis (sequential) and cividis-like diverging
-`RdBu_r` centred on zero. Where lines are told apart by colour, they also differ in dash or marker.
+Colours are the qualitative set of Okabe and Ito (2008, Color Universal Design), which differ under
+all common forms of colour blindness; maps are viridis (sequential) and `RdBu_r` (diverging, centred
+on zero). Lines that differ in colour also differ in dash or marker.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""From pressure windows to flow ripples, whatever inverts the line."""
+"""Flow ripples from pressure windows, by any inversion of the line."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from rippletwin.harmonics import one_period, peak_amplitudes
 
-SPEED_STEP = 2e-4  # relative: windows closer than that share one inversion
+RELATIVE_SPEED_STEP = 2e-4  # windows of speeds closer than that share one inversion
 
 
 @dataclass(frozen=True)
@@ -17,8 +17,8 @@ class FlowEstimate:
     """Flow ripple at the pump outlet of n windows, zero mean, nothing above the bandwidth.
 
     flow (n, M) m3/s; orders (F,); harmonics (n, F) complex peak amplitudes; standard_deviation
-    (F,) of the complex harmonics' error as the model of errors has it, and `prior` (F,) what it
-    would be without any sensor: where the first is not far below, an order is not measured.
+    (F,) of the complex harmonics' errors by the error model; prior (F,) the same without any
+    sensor. Where the two are close, an order is not measured.
     """
 
     flow: np.ndarray
@@ -43,19 +43,19 @@ def estimate(
     noise: float | np.ndarray,
     bandwidth_hz: float,
 ) -> FlowEstimate:
-    """Invert (n, S, M) windows, those of one speed together; see `spectral.estimate_flow`."""
+    """Invert windows (n, S, M), those of one speed together, as `spectral_inversion` describes."""
     windows = np.asarray(windows, dtype=float)
     count, sensors, samples = windows.shape
     speeds = np.broadcast_to(np.asarray(speed_hz, dtype=float), (count,))
     orders = orders_within(bandwidth_hz, speeds.mean(), samples)
     measured = peak_amplitudes(windows)[..., orders]  # (n, S, F)
     noise_power = 4 / samples * np.broadcast_to(np.asarray(noise, float) ** 2, (sensors,))
-    # The largest reading stands for the waves: a node at one sensor is rarely one at the others.
+    # The largest reading is taken: a node at one sensor is rarely one at the others.
     power = np.max(np.mean(np.abs(measured) ** 2, axis=0), axis=0)  # (F,)
 
     harmonics = np.empty((count, len(orders)), complex)
     variance = np.zeros(len(orders))
-    bins = np.rint((speeds / speeds.mean() - 1) / SPEED_STEP)
+    bins = np.rint((speeds / speeds.mean() - 1) / RELATIVE_SPEED_STEP)
     for step in np.unique(bins):
         members = np.flatnonzero(bins == step)
         matrix, error, prior = inversion(speeds[members].mean(), orders, noise_power, power)
@@ -84,7 +84,7 @@ def orders_within(bandwidth_hz: float, speed_hz: float, samples: int) -> np.ndar
 def band_limit(flow: np.ndarray, speed_hz: float, bandwidth_hz: float) -> np.ndarray:
     """`flow` (..., M) over one revolution with only the orders that a sensor estimates.
 
-    Whatever is compared with an estimate, or learnt from to judge one, should pass this first.
+    Apply it to whatever is compared with an estimate, and to training data for such estimates.
     """
     samples = flow.shape[-1]
     orders = orders_within(bandwidth_hz, speed_hz, samples)

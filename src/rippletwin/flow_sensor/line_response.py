@@ -1,4 +1,4 @@
-"""The line as the flow sensors need it: what p and q at the pump mean at the sensors."""
+"""Response of the line to waves at the pump: sensors' readings, flow and load mismatch."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from rippletwin.case.model import FlowRipple
 from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.twin.forward_model import ForwardModel
 from rippletwin.twin.operating_point import OperatingCondition
+from rippletwin.twin.twin import Twin
 
-NetworkFactory = Callable[[float, np.ndarray], FrequencyDomainLine]
+LineFactory = Callable[[float, np.ndarray], FrequencyDomainLine]
 """(speed_hz, orders (F,)) -> FrequencyDomainLine at s = 2 pi j orders speed_hz, its load linear."""
 
 
 @dataclass(frozen=True)
 class LineResponse:
-    """The waves w = (f, b) at the pump, in Pa, and what is linear in them, at F frequencies.
+    """Quantities linear in the waves w = (f, b) at the pump, Pa, at F frequencies.
 
     p(0) = f + b and q(0) = (f - b)/Zc, Zc the first segment's characteristic impedance (modulus).
     to_sensors (F, S, 2)  sensors' readings, Pa
@@ -32,23 +33,23 @@ class LineResponse:
     to_load: np.ndarray
 
 
-def line_response(network: FrequencyDomainLine, of: str = "source") -> LineResponse:
-    """What `network`'s line does with a state at the pump, whatever source and load are.
+def line_response(line: FrequencyDomainLine, of: str = "source") -> LineResponse:
+    """Response of `line`, independent of its source.
 
-    `of` is the flow wanted: the ideal "source"'s, or the "outlet"'s Q(0), which lacks what the
-    source's own admittance takes; ValueError for another.
+    `of` is the flow wanted: that of the ideal "source", or Q(0) at the "outlet", which is less by
+    the flow into the source's admittance; ValueError for another.
     Upstream of a sensor [p, q](0) = T [p, q](x) with det T = 1, so p(x) = T22 p(0) - T12 q(0).
     """
-    zc = np.abs(np.sqrt(network.series[0] / network.shunt[0]))
-    size = len(network.s)
-    factor = np.broadcast_to(network.sensor_factor, (len(network.sensor_positions), size))
+    zc = np.abs(np.sqrt(line.series[0] / line.shunt[0]))
+    size = len(line.s)
+    factor = np.broadcast_to(line.sensor_factor, (len(line.sensor_positions), size))
     rows = []
-    for x, k in zip(network.sensor_positions, factor):
-        matrix = network.transfer(0.0, x)
+    for x, k in zip(line.sensor_positions, factor):
+        matrix = line.transfer(0.0, x)
         from_p, from_q = k * matrix[:, 1, 1], -k * matrix[:, 0, 1] / zc
         rows.append(np.stack([from_p + from_q, from_p - from_q], axis=-1))
-    own = own_admittance(network, of)
-    z = network.input_impedance()
+    own = own_admittance(line, of)
+    z = line.input_impedance()
     mismatch = np.stack([zc - z, zc + z], axis=-1)  # times w: (z + zc)(b - r f)
     return LineResponse(
         to_sensors=np.stack(rows, axis=1),
@@ -57,22 +58,22 @@ def line_response(network: FrequencyDomainLine, of: str = "source") -> LineRespo
     )
 
 
-def own_admittance(network: FrequencyDomainLine, of: str) -> np.ndarray:
+def own_admittance(line: FrequencyDomainLine, of: str) -> np.ndarray:
     """Admittance (F,) between Q(0) and the flow wanted, see `line_response`."""
     if of not in ("source", "outlet"):
         raise ValueError(f"of must be 'source' or 'outlet', not {of!r}")
-    own = network.source_admittance if of == "source" else 0.0
-    return np.broadcast_to(own, network.s.shape)
+    own = line.source_admittance if of == "source" else 0.0
+    return np.broadcast_to(own, line.s.shape)
 
 
-def network_of(twin, load_pressure: float, ripple: FlowRipple | None = None) -> NetworkFactory:
+def line_factory(twin: Twin, load_pressure: float, ripple: FlowRipple | None = None) -> LineFactory:
     """Networks of a calibrated twin at one operating point, the load linearised there.
 
-    `load_pressure` in Pa; the mean of `ripple` (m3/s) sets an orifice whose coefficient the rig
-    does not give, and what admittance the ripple has is the source's. None takes the lumped pump.
+    `load_pressure` in Pa. The mean of `ripple` (m3/s) determines an orifice whose coefficient the
+    rig does not give, and the ripple's admittance is the source's. None is the lumped pump's.
     """
 
-    def network(speed_hz: float, orders: np.ndarray) -> FrequencyDomainLine:
+    def line_at(speed_hz: float, orders: np.ndarray) -> FrequencyDomainLine:
         nonlocal ripple
         if ripple is None:
             from rippletwin.pump.outlets import ConstantPressure
@@ -88,4 +89,4 @@ def network_of(twin, load_pressure: float, ripple: FlowRipple | None = None) -> 
         line.source_admittance = line.source_admittance + ripple.source_admittance(line.s)
         return line
 
-    return network
+    return line_at

@@ -8,7 +8,7 @@ import numpy as np
 
 from rippletwin.flow_sensor import spectral_inversion
 from rippletwin.flow_sensor.estimate import FlowEstimate
-from rippletwin.flow_sensor.line_response import NetworkFactory
+from rippletwin.flow_sensor.line_response import LineFactory
 from rippletwin.spectra.noise import noise_cycle_scatter
 
 METHODS = ("spectral", "pinn")
@@ -19,7 +19,7 @@ def estimate_flow_by(
     method: str,
     windows: np.ndarray,
     speed_hz: float,
-    network: NetworkFactory,
+    line_at: LineFactory,
     noise: np.ndarray,
     bandwidth_hz: float,
     *,
@@ -36,7 +36,7 @@ def estimate_flow_by(
     on the way. Raises ValueError for another method.
     """
     if method == "spectral":
-        return spectral_inversion.estimate_flow(windows, speed_hz, network, noise, bandwidth_hz)
+        return spectral_inversion.estimate_flow(windows, speed_hz, line_at, noise, bandwidth_hz)
     if method != "pinn":
         raise ValueError(f"method {method!r}: known are {', '.join(METHODS)}")
 
@@ -51,9 +51,9 @@ def estimate_flow_by(
             progress(f"step {step}: loss {loss:.2g}")
 
     settings = pinn.Settings(width=width, steps=steps)
-    trunk, _ = pinn.train(network, speed_hz, bandwidth_hz, settings, report)
+    trunk, _ = pinn.train(line_at, speed_hz, bandwidth_hz, settings, report)
     progress(f"equations hold to {float(trunk.residual):.2g} of the waves")
-    return pinn.estimate_flow(windows, speed_hz, network, trunk, noise, bandwidth_hz)
+    return pinn.estimate_flow(windows, speed_hz, line_at, trunk, noise, bandwidth_hz)
 
 
 def noise_of_flow(flow: np.ndarray, recording: np.ndarray, healthy: np.ndarray) -> np.ndarray:

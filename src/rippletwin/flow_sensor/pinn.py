@@ -15,11 +15,11 @@ Desai et al. 2021, One-shot transfer learning of physics-informed neural network
     load      p and q at the end are in the load's ratio
 
 The trunk is trained once, at the calibrated parameters, on the sum of these losses for known states
-at the pump (whose sensor readings the twin tells). In each training step the heads are solved
+at the pump, whose sensor readings the twin predicts. In each training step the heads are solved
 exactly and only the trunk moves (variable projection; Golub & Pereyra 1973, SIAM J. Numer. Anal.
 10, 413). Each uniform piece of line has shape functions of its own (Jagtap & Karniadakis 2020,
 Commun. Comput. Phys. 28, 2002): slow envelopes on carriers of the calibrated wave length, so that
-the network learns what losses do to a wave rather than the wave itself. Lengths are in units of the
+the network learns the effect of losses on a wave, not the wave itself. Lengths are in units of the
 piece, flows in units of pressure over its characteristic impedance.
 """
 
@@ -32,12 +32,12 @@ import numpy as np
 import torch
 
 from rippletwin.flow_sensor.estimate import FlowEstimate, estimate
-from rippletwin.flow_sensor.line_response import LineResponse, NetworkFactory, line_response
+from rippletwin.flow_sensor.line_response import LineFactory, LineResponse, line_response
 from rippletwin.flow_sensor.spectral_inversion import LOAD_ERROR, MODEL_ERROR
 from rippletwin.flow_sensor.trunk import Equations, Trunk, equations, pieces_of
 
-COLLOCATION = 48  # points a piece when a window is solved
-MARGIN = 0.02  # relative, of trained frequencies beyond the orders': the speed wanders
+COLLOCATION_POINTS = 48  # of a piece when a window is solved
+FREQUENCY_MARGIN = 0.02  # relative, of trained frequencies beyond the orders': speeds vary
 
 
 @dataclass(frozen=True)
@@ -52,13 +52,13 @@ class Settings:
 
 
 def train(
-    network: NetworkFactory,
+    line_at: LineFactory,
     speed_hz: float,
     bandwidth_hz: float,
     settings: Settings | None = None,
     progress: Callable[[int, float], None] | None = None,
 ) -> tuple[Trunk, np.ndarray]:
-    """A trunk for the line that `network` describes, at orders of `speed_hz` up to `bandwidth_hz`.
+    """A trunk for the line of `line_at`, at orders of `speed_hz` up to `bandwidth_hz`.
 
     Returns it with the loss of each step: the mean square of all residuals for unit waves at the
     pump. `progress` is called with step and loss.
@@ -66,8 +66,8 @@ def train(
     settings = settings or Settings()
     highest = bandwidth_hz / speed_hz
     orders = 1 + (highest - 1) * np.linspace(0, 1, settings.frequencies) ** 2  # denser where low
-    orders[0], orders[-1] = 1 - MARGIN, highest * (1 + MARGIN)
-    line = network(speed_hz, orders)
+    orders[0], orders[-1] = 1 - FREQUENCY_MARGIN, highest * (1 + FREQUENCY_MARGIN)
+    line = line_at(speed_hz, orders)
     to_sensors = line_response(line).to_sensors
     places = 0.5 + 0.5 * np.polynomial.legendre.leggauss(settings.points)[0]
     omega = line.s.imag
@@ -85,7 +85,7 @@ def train(
 
     def loss():
         matrix, target = _known_states(equations(trunk, line, places), to_sensors)
-        with torch.no_grad():  # at the best head the loss does not move with it
+        with torch.no_grad():  # at the best head the loss does not depend on it
             head = _solve(matrix, target)
         value = (matrix @ head - target).abs().square().sum(1).mean()
         optimiser.zero_grad()
@@ -103,7 +103,7 @@ def train(
 def estimate_flow(
     windows: np.ndarray,
     speed_hz: float | np.ndarray,
-    network: NetworkFactory,
+    line_at: LineFactory,
     trunk: Trunk,
     noise: float | np.ndarray,
     bandwidth_hz: float,
@@ -114,14 +114,14 @@ def estimate_flow(
 ) -> FlowEstimate:
     """Outlet flow of each one-revolution window, by heads on a trained `trunk`.
 
-    Everything else as for `spectral.estimate_flow`; `equation_error` is how far the equations may
-    be missed (relative, over a piece of line); None is as far as the trunk does.
+    Other parameters as for `spectral_inversion.estimate_flow`. `equation_error` is the error of the
+    equations (relative, over a piece of line); None is the trunk's own.
     """
     missed = float(trunk.residual) if equation_error is None else equation_error
 
     def inversion(speed, orders, noise_power, power):
-        line = network(speed, orders)
-        places = (np.arange(COLLOCATION) + 0.5) / COLLOCATION
+        line = line_at(speed, orders)
+        places = (np.arange(COLLOCATION_POINTS) + 0.5) / COLLOCATION_POINTS
         with torch.no_grad():
             rows = equations(trunk, line, places)
         response = line_response(line, of)

@@ -1,16 +1,17 @@
 """The spectral virtual flow sensor: the line inverted harmonic by harmonic.
 
-At each shaft order the state at the pump is two waves w = (f, b); every sensor is one linear
-equation m = A w for them, the load one more that is trusted less. The linear estimate of least
-mean square error (Kay 1993, Fundamentals of Statistical Signal Processing, vol. 1, theorem 11.1),
+At each shaft order the state at the pump is two waves w = (f, b). Every sensor is one linear
+equation m = A w for them, and the load is one more with a larger error. The linear estimate of
+least mean square error is (Kay 1993, Fundamentals of Statistical Signal Processing, vol. 1,
+theorem 11.1)
 
-    w = (A^H R^-1 A + P^-1)^-1 A^H R^-1 m,
+    w = (A^H R^-1 A + P^-1)^-1 A^H R^-1 m
 
-has the errors R of the equations (sensor noise, and a part of the reading for what the model gets
-wrong) and P, the waves' variance. It is Tikhonov regularisation with weights that mean something:
-where two sensors stand half a wave apart and see the same, the load's equation takes over; without
-it the estimate goes to zero instead of to infinity. (Two-sensor inversion and its blind
-frequencies: Johnston & Drew 1996, Proc. IMechE I 210, 125.)
+with the covariance R of the equations' errors (sensor noise and model error) and the waves'
+variance P. It is Tikhonov regularisation with physical weights: where two sensors are half a wave
+apart and read the same, the load's equation determines the rest; without it the estimate goes to
+zero instead of to infinity. (Two-sensor inversion and its blind frequencies: Johnston & Drew 1996,
+Proc. IMechE I 210, 125.)
 """
 
 from __future__ import annotations
@@ -18,18 +19,18 @@ from __future__ import annotations
 import numpy as np
 
 from rippletwin.flow_sensor.estimate import FlowEstimate, band_limit, estimate
-from rippletwin.flow_sensor.line_response import LineResponse, NetworkFactory, line_response
+from rippletwin.flow_sensor.line_response import LineFactory, LineResponse, line_response
 
 __all__ = ["band_limit", "estimate_flow", "flow_operator"]
 
-MODEL_ERROR = 0.01
-LOAD_ERROR = 0.1
+MODEL_ERROR = 0.01  # of a predicted pressure, over the wave amplitude
+LOAD_ERROR = 0.1  # of the load's reflection coefficient
 
 
 def estimate_flow(
     windows: np.ndarray,
     speed_hz: float | np.ndarray,
-    network: NetworkFactory,
+    line_at: LineFactory,
     noise: float | np.ndarray,
     bandwidth_hz: float,
     model_error: float = MODEL_ERROR,
@@ -42,19 +43,19 @@ def estimate_flow(
     ----------
     windows : (n, S, M) pressure in Pa at M equal steps of the shaft's angle.
     speed_hz : revolutions per second, one for all or (n,).
-    network : the calibrated line, see `line.NetworkFactory` and `line.network_of`.
+    line_at : the calibrated line, see `line_response.LineFactory` and `line_factory`.
     noise : standard deviation of a sample, Pa, one for all sensors or (S,).
     bandwidth_hz : shaft orders up to this frequency are estimated, the others are zero.
     model_error : error of a predicted pressure relative to the wave amplitude.
     load_error : error of the load's reflection coefficient; None leaves the load out.
-    of : "source", the ideal flow source in the network, or "outlet", Q(0): they differ by what
+    of : "source", the ideal flow source of the line, or "outlet", Q(0): they differ by what
         the source's own admittance takes.
 
     Raises ValueError for a bandwidth below the speed or above half the sampling rate.
     """
 
     def inversion(speed, orders, noise_power, power):
-        response = line_response(network(speed, orders), of)
+        response = line_response(line_at(speed, orders), of)
         return flow_operator(response, noise_power, power, model_error, load_error)
 
     return estimate(windows, speed_hz, inversion, noise, bandwidth_hz)

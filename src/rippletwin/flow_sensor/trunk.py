@@ -100,13 +100,13 @@ class Equations:
     waves: torch.Tensor
 
 
-def equations(trunk: Trunk, network: FrequencyDomainLine, places: np.ndarray) -> Equations:
-    """The rows of `Equations` at the frequencies of `network`, `places` (C,) of 0..1 a piece."""
-    starts, segments = pieces_of(network)
-    lengths, count = np.diff([*starts, network.length]), len(starts)
-    series, shunt = network.series[segments], network.shunt[segments]  # (D, F)
+def equations(trunk: Trunk, line: FrequencyDomainLine, places: np.ndarray) -> Equations:
+    """The rows of `Equations` at the frequencies of `line`, `places` (C,) of 0..1 a piece."""
+    starts, segments = pieces_of(line)
+    lengths, count = np.diff([*starts, line.length]), len(starts)
+    series, shunt = line.series[segments], line.shunt[segments]  # (D, F)
     zc = np.abs(np.sqrt(series / shunt))
-    omega = torch.as_tensor(network.s.imag)
+    omega = torch.as_tensor(line.s.imag)
     phase = torch.as_tensor((np.sqrt(series * shunt).imag * lengths[:, None]).T)
 
     def shapes(piece, place):
@@ -124,40 +124,40 @@ def equations(trunk: Trunk, network: FrequencyDomainLine, places: np.ndarray) ->
     first, last = (_pressure_and_flow(shapes(piece, np.full(count, end)), zc) for end in (0.0, 1.0))
     joints = [torch.zeros(len(omega), 0, 2 * count, dtype=p.dtype)]
     for k in range(count - 1):
-        gap = last[k] - _joint(network, starts[k + 1]) @ first[k + 1]
+        gap = last[k] - _joint(line, starts[k + 1]) @ first[k + 1]
         joints.append(torch.stack([gap[:, 0], _row(zc[k]) * gap[:, 1]], dim=1))
 
-    at_load = _joint(network, network.length) @ _state(network.load_state(), len(omega))
+    at_load = _joint(line, line.length) @ _state(line.load_state(), len(omega))
     p_load, r_load = at_load[:, 0], _row(zc[-1]) * at_load[:, 1]  # (F, 1)
     scale = (p_load.abs().square() + r_load.abs().square()).sqrt()
     p, r = last[-1][:, 0], _row(zc[-1]) * last[-1][:, 1]
     load = ((r_load * p - p_load * r) / scale)[:, None]
 
-    # waves on the source's side of what stands at x = 0, as in LineResponse
-    source = _joint(network, 0.0) @ first[0]
+    # waves on the source's side of the elements at x = 0, as in LineResponse
+    source = _joint(line, 0.0) @ first[0]
     p, r = source[:, 0], _row(zc[0]) * source[:, 1]
     waves = torch.stack([p + r, p - r], dim=1) / 2
 
-    positions = np.asarray(network.sensor_positions)
+    positions = np.asarray(line.sensor_positions)
     piece = np.maximum(np.searchsorted(starts, positions, side="left") - 1, 0)  # pump's side
     (p, _), _ = shapes(piece, (positions - starts[piece]) / lengths[piece])
-    factor = np.broadcast_to(network.sensor_factor, (len(positions), len(omega)))
+    factor = np.broadcast_to(line.sensor_factor, (len(positions), len(omega)))
     return Equations(inside, torch.cat(joints, dim=1), load, p * _column(factor), waves)
 
 
-def pieces_of(network: FrequencyDomainLine) -> tuple[np.ndarray, np.ndarray]:
+def pieces_of(line: FrequencyDomainLine) -> tuple[np.ndarray, np.ndarray]:
     """Start (D,) in m and segment (D,) of the uniform pieces between segments and inserts."""
-    edges = np.concatenate([[0.0], np.cumsum(network.lengths)])
-    inside = [x for x, _, _ in network.inserts if 0.0 < x < network.length]
+    edges = np.concatenate([[0.0], np.cumsum(line.lengths)])
+    inside = [x for x, _, _ in line.inserts if 0.0 < x < line.length]
     starts = np.unique(np.concatenate([edges[:-1], inside]))
     return starts, np.searchsorted(edges, starts, side="right") - 1
 
 
-def _joint(network: FrequencyDomainLine, x: float) -> torch.Tensor:
+def _joint(line: FrequencyDomainLine, x: float) -> torch.Tensor:
     """Matrix J (F, 2, 2) with [p, q] before = J [p, q] behind the lumped elements at `x`."""
-    matrix = np.zeros((len(network.s), 2, 2), complex)
+    matrix = np.zeros((len(line.s), 2, 2), complex)
     matrix[:] = np.eye(2)
-    for position, kind, value in network.inserts:
+    for position, kind, value in line.inserts:
         if position == x:
             element = np.zeros_like(matrix)
             element[:] = np.eye(2)
@@ -174,7 +174,7 @@ def _state(state, size: int) -> torch.Tensor:
 
 
 def _pressure_and_flow(shapes, impedance: np.ndarray) -> list[torch.Tensor]:
-    """[p, q] (F, 2, 2 D) at one point a piece, from the trunk's answer and |Zc| (D, F)."""
+    """[p, q] (F, 2, 2 D) at one point a piece, from the trunk's shapes and |Zc| (D, F)."""
     (p, r), _ = shapes
     q = r / torch.as_tensor(impedance.T)[..., None]
     return list(torch.stack([p, q], dim=2).unbind(1))

@@ -1,4 +1,4 @@
-"""How often a classifier is right on recordings, and the paper's accuracy table.
+"""Accuracy of classifiers on recordings.
 
 Recordings are healthy (H), slipper (S) or cylinder (C) of unknown severity, while the classifiers
 know two severities, C1 and C2. The paper counts a cylinder recording as right when a pressure
@@ -14,8 +14,8 @@ import pandas as pd
 from rippletwin.learning.architectures import ARCHITECTURES, CLASSES
 
 TRUE_STATES = ("H", "S", "C")
-UNKNOWN = "?"  # state of a recording that is there to be diagnosed
-SEVERITY = {"pressure": "C1", "flow": "C2"}  # what the paper calls right for C
+UNKNOWN = "?"  # state of a recording to be diagnosed
+SEVERITY = {"pressure": "C1", "flow": "C2"}  # the class that the paper counts as right for C
 
 
 def score(

@@ -1,8 +1,8 @@
-"""Does attention choose the network? Alignment with the fault against accuracy on recordings.
+"""Rank correlation of networks' alignment with the fault and their accuracy on recordings.
 
 Alignment is known before any fault has been recorded. If it ranks networks as their accuracy on
-recorded faults does, it may choose one; Spearman's rank correlation says how well it ranks, and the
-accuracy of the network that it puts first says what the choice would have been worth.
+recorded faults does, it can choose one. Spearman's rank correlation measures how well it ranks; the
+accuracy of the network that it ranks first measures what the choice would have gained.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from scipy.stats import rankdata
 
 from rippletwin.learning.architectures import ARCHITECTURES
 
-EXACT = 8  # networks up to which all orders are tried for the p-value
-PERMUTATIONS = 20_000  # random orders beyond
+MAX_EXACT_COUNT = 8  # of values, up to which the p-value is over all orders
+PERMUTATIONS = 20_000  # random orders for more values
 DOMAIN_NAMES = {"time": ["time"], "image": ["image"], "both": ["time", "image"]}
 SCORES = {"accuracy": "strict", "accuracy_either": "either severity"}
 
 
 def alignment_table(shares: pd.DataFrame, results: pd.DataFrame) -> pd.DataFrame:
-    """One row a trained cell: how far its attention seeks the fault, and how often it is right.
+    """One row for each trained network and dataset: alignment with the fault, and accuracy.
 
     shares : a row for each dataset, architecture, domain, seed and fault with ``attended`` (share
         of attention in the fault's region, NaN where there was none), ``region`` (the region's own
@@ -46,10 +46,10 @@ def alignment_table(shares: pd.DataFrame, results: pd.DataFrame) -> pd.DataFrame
 
 
 def rank_table(table: pd.DataFrame) -> pd.DataFrame:
-    """How ``alignment`` ranks the networks of each dataset, of one kind of input and of both.
+    """Rank correlation of ``alignment`` with accuracy for each dataset and kind of input.
 
     Columns rho, p, low, high (``rank_correlation``), the network with the highest alignment and
-    its accuracy, the best accuracy and the mean accuracy (what a blind choice has). Groups of fewer
+    its accuracy, the best accuracy and the mean accuracy (that of a random choice). Groups of fewer
     than three networks are left out.
     """
     rows = []
@@ -75,9 +75,9 @@ def rank_correlation(first: np.ndarray, second: np.ndarray) -> tuple[float, floa
     """Spearman's rho of two rankings (n,), its p-value and its 95 % interval.
 
     p : share of all orders whose rho is at least as far from zero (drawn with a fixed generator
-    beyond ``EXACT`` values). Interval: Fisher's z with variance 1.06 / (n - 3) (Fieller, Hartley,
-    Pearson 1957), the whole of [-1, 1] below four values. NaN where either has no order (all are
-    equal). Raises ValueError below three values.
+    beyond ``MAX_EXACT_COUNT`` values). Interval: Fisher's z with variance 1.06 / (n - 3) (Fieller,
+    Hartley, Pearson 1957), the whole of [-1, 1] below four values. NaN where either has no order
+    (all are equal). Raises ValueError below three values.
     """
     a, b = rankdata(first), rankdata(second)
     n = len(a)
@@ -88,7 +88,7 @@ def rank_correlation(first: np.ndarray, second: np.ndarray) -> tuple[float, floa
     if norm == 0:
         return (float("nan"),) * 4
     rho = float(a @ b / norm)
-    if n <= EXACT:
+    if n <= MAX_EXACT_COUNT:
         orders = np.array(list(itertools.permutations(b)))
         extra = 0
     else:
@@ -149,7 +149,7 @@ def ranking_markdown(table: pd.DataFrame, ranks: pd.DataFrame) -> str:
 
 
 def ranking_sentence(ranks: pd.DataFrame) -> str:
-    """One sentence: of the rank correlations (strict score, one kind of input), how many say so."""
+    """How many rank correlations (strict score, one kind of input) are positive, in a sentence."""
     judged = ranks[(ranks.score == "accuracy") & (ranks.input != "both")].dropna(subset=["rho"])
     if judged.empty:
         return "Too few networks, or no order among their accuracies: no rank correlation to judge."

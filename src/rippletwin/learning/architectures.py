@@ -1,10 +1,10 @@
-"""The ten classifiers of the paper, in numbers: what they are called, see and begin with.
+"""The ten classifiers of the paper in numbers: title, domain, first layer, residual blocks.
 
 Source: Dong, Tao, Liu, "Digital Twin-Driven Zero-Shot Fault Diagnosis of Axial Piston Pumps Using
 Fluid-Borne Noise Signals", tables of CNN1D (341@100) and CNN2D (3x3@1) with their notes. ``k@s``
 names the kernel and stride of the first convolution; the architectures of one domain differ in
-nothing else, or in what follows it (residual blocks). Tables and pictures need these and not the
-networks, whose library takes seconds to import.
+nothing else but the residual blocks that follow it. Tables and pictures need these numbers and not
+the networks, whose library takes seconds to import.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Architecture:
 
     @property
     def silence(self) -> float:
-        """What an input without any ripple reads: 0 in time, exp(0) in an image."""
+        """Value of an input without any ripple: 0 in time, exp(0) in an image."""
         return 1.0 if self.domain == "image" else 0.0
 
     @property

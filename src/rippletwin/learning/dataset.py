@@ -52,7 +52,7 @@ def augment(
 
 
 def remove_mean(x: np.ndarray) -> np.ndarray:
-    """x (..., M) less its mean along the last axis: what recordings and samples both get."""
+    """x (..., M) less its mean along the last axis, for recordings and samples alike."""
     return x - x.mean(axis=-1, keepdims=True)
 
 
@@ -62,8 +62,8 @@ def split_by_time(
     """Early windows of each recording for training, late ones for testing: indices (a,), (b,).
 
     n_per_recording : windows of each recording, in the order in which they are stacked.
-    gap : windows dropped between the two parts. Neighbouring windows are never on both sides, as
-        shuffling would have them.
+    gap : windows dropped between the two parts. Neighbouring windows are on one side, unlike after
+        shuffling.
     """
     train, test, start = [], [], 0
     for n in n_per_recording:

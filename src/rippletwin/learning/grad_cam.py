@@ -1,9 +1,10 @@
-"""What a classifier looks at: Grad-CAM, and how much of it falls on the fault.
+"""Grad-CAM of a classifier, and its alignment with the fault.
 
 Grad-CAM (Selvaraju et al. 2017, eq. 1 and 2): the last feature maps A_k, weighted by the mean
-gradient of the class's logit, summed, negative parts cut. All networks here end in global average
-pooling and one linear layer, for which the mean gradient is that layer's weight over the number of
-positions: no backward pass is needed (their section 3.1). Agrees with captum's LayerGradCam.
+gradient of the class's logit and summed; negative parts are set to zero. All networks here end in
+global average pooling and one linear layer, for which the mean gradient is that layer's weight over
+the number of positions: no backward pass is needed (their section 3.1). Agrees with captum's
+LayerGradCam.
 """
 
 from __future__ import annotations
@@ -64,12 +65,12 @@ def attention_density(heat: np.ndarray) -> np.ndarray:
 
 
 def fault_region(healthy: np.ndarray, faulty: np.ndarray, energy: float = 0.5) -> np.ndarray:
-    """Where a fault shows: the fewest places that hold ``energy`` of the squared difference.
+    """Region of a fault: the fewest places with the share ``energy`` of the squared difference.
 
     healthy, faulty : noise-free inputs at the same crank angle. Windows (n, channels, M) give crank
-    angles, booleans (n, M); images (n, channels, rows, columns) give frequencies, (n, rows): when
-    in the revolution a frequency lights up is of no meaning for a fault that every revolution
-    repeats. Raises ValueError for equal inputs.
+    angles, booleans (n, M); images (n, channels, rows, columns) give frequencies, (n, rows), since
+    the instant within a revolution means nothing for a fault that every revolution repeats. Raises
+    ValueError for equal inputs.
     """
     difference = np.square(np.asarray(faulty, dtype=float) - healthy).sum(1)
     if difference.ndim == 3:
@@ -78,10 +79,10 @@ def fault_region(healthy: np.ndarray, faulty: np.ndarray, energy: float = 0.5) -
     if not total.all():
         raise ValueError("a faulty input equals the healthy one: there is no region to attend to")
     order = np.argsort(-difference, axis=1)
-    held = np.cumsum(np.take_along_axis(difference, order, 1), 1) / total
+    share = np.cumsum(np.take_along_axis(difference, order, 1), 1) / total
     inside = np.zeros_like(difference, dtype=bool)
-    # a place belongs as long as those stronger than it do not hold the share yet
-    np.put_along_axis(inside, order, np.pad(held[:, :-1], ((0, 0), (1, 0))) < energy, 1)
+    # A place is inside while the stronger ones together have less than the share.
+    np.put_along_axis(inside, order, np.pad(share[:, :-1], ((0, 0), (1, 0))) < energy, 1)
     return inside
 
 
@@ -122,7 +123,7 @@ def _spread(network: Classifier, count: int, points: int, axis: int, cyclic: boo
     jump = positions[1] - positions[0] if count > 1 else 1.0
     images = np.arange(points) + (points * np.array([[-1], [0], [1]]) if cyclic else [[0]])
     seen = (images >= positions[0]) & (images <= positions[-1])
-    seen[len(images) // 2] |= ~seen.any(0)  # beyond the outermost feature its value holds
+    seen[len(images) // 2] |= ~seen.any(0)  # beyond the outermost feature take its value
     weights = np.zeros((points, count))
     for at, counts in zip(images, seen):
         place = np.clip((at - positions[0]) / jump, 0, count - 1)

@@ -1,8 +1,8 @@
 """The ten classifiers of the paper: plain and residual networks on time windows and on images.
 
-Numbers are those of `architectures`; docs/explanation/learning.md tells how the paper's tables are
-read where they leave a choice. A time window is convolved as an image of one row: the same
-arithmetic as a 1D convolution, for which the CPU kernels of torch are up to twice as fast in
+Their numbers are those of `architectures`; docs/explanation/learning.md explains how the paper's
+tables are read where they leave a choice. A time window is convolved as an image of one row: the
+same arithmetic as a 1D convolution, for which the CPU kernels of torch are up to twice as fast in
 channels-last order.
 """
 
@@ -15,7 +15,7 @@ from torch import nn
 
 from rippletwin.learning.architectures import ARCHITECTURES, CLASSES, Architecture
 
-WIDTH = 64  # feature maps of every plain layer and of the first residual stage
+MAPS = 64  # feature maps of every plain layer and of the first residual stage
 
 
 def build(name: str, channels: int, classes: int = len(CLASSES)) -> Classifier:
@@ -28,7 +28,7 @@ def build(name: str, channels: int, classes: int = len(CLASSES)) -> Classifier:
     return Classifier(architecture, channels, classes).to(memory_format=torch.channels_last)
 
 
-def restored(name: str, channels: int, weights: Iterable[dict]) -> Iterator[Classifier]:
+def restore_networks(name: str, channels: int, weights: Iterable[dict]) -> Iterator[Classifier]:
     """Trained networks of an architecture, one for each of `weights` (their state dictionaries).
 
     name, channels : as for ``build``. Raises KeyError for an unknown name, RuntimeError for weights
@@ -43,9 +43,9 @@ def restored(name: str, channels: int, weights: Iterable[dict]) -> Iterator[Clas
 class Classifier(nn.Module):
     """Feature maps, global average pooling, one linear layer: logits (n, classes).
 
-    ``scale`` is the only standardisation there is: one number for all samples, channels and times
-    (amplitude is the diagnosis). Training sets it to the root mean square of its inputs' distance
-    from silence, which is taken off first: then zero padding is silence, in images too.
+    ``scale`` is the only standardisation: one number for all samples, channels and times, since the
+    amplitude carries the diagnosis. Training sets it to the root mean square of its inputs less
+    silence. Silence is subtracted first, so that zero padding is silence in images too.
     """
 
     def __init__(self, architecture: Architecture, channels: int, classes: int):
@@ -77,18 +77,23 @@ def _plain(a: Architecture, channels: int) -> tuple[nn.Sequential, int]:
         else (nn.MaxPool2d(2), nn.MaxPool2d(2))
     )
     layers = []
-    for convolution, pool in zip((_first(a, channels), _same(a.domain, WIDTH, WIDTH)), pools):
+    for convolution, pool in zip((_first(a, channels), _same(a.domain, MAPS, MAPS)), pools):
         layers += [convolution, nn.ReLU(inplace=True), pool]
-    return nn.Sequential(*layers), WIDTH
+    return nn.Sequential(*layers), MAPS
 
 
 def _residual(a: Architecture, channels: int) -> tuple[nn.Sequential, int]:
     """He et al. 2016, table 1, basic blocks; the first convolution is the architecture's."""
     pool = nn.MaxPool2d((1, 3), (1, 2), (0, 1)) if a.domain == "time" else nn.MaxPool2d(3, 2, 1)
-    layers = [_first(a, channels, bias=False), nn.BatchNorm2d(WIDTH), nn.ReLU(inplace=True), pool]
-    width = WIDTH
+    layers = [
+        _first(a, channels, bias=False),
+        nn.BatchNorm2d(MAPS),
+        nn.ReLU(inplace=True),
+        pool,
+    ]
+    width = MAPS
     for stage, blocks in enumerate(a.blocks):
-        stage_width = WIDTH * 2**stage
+        stage_width = MAPS * 2**stage
         for block in range(blocks):
             stride = 2 if stage and not block else 1
             layers.append(BasicBlock(a.domain, width, stage_width, stride))
@@ -123,8 +128,8 @@ class BasicBlock(nn.Module):
 def _first(a: Architecture, channels: int, bias: bool = True) -> nn.Conv2d:
     if a.domain == "time":
         shape = ((1, a.kernel), (1, a.stride), (0, a.padding))
-        return nn.Conv2d(channels, WIDTH, *shape, bias=bias, padding_mode="circular")
-    return nn.Conv2d(channels, WIDTH, a.kernel, a.stride, a.padding, bias=bias)
+        return nn.Conv2d(channels, MAPS, *shape, bias=bias, padding_mode="circular")
+    return nn.Conv2d(channels, MAPS, a.kernel, a.stride, a.padding, bias=bias)
 
 
 def _same(domain: str, width_in: int, width: int, stride: int = 1, bias: bool = True) -> nn.Conv2d:

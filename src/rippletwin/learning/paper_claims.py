@@ -10,7 +10,7 @@ A claim is
 * **not** reproduced where none supports it,
 * **untested** where no comparison could be made.
 
-The same rule is laid on the paper's own table, which says what it would take.
+The same rule is applied to the paper's own table, which shows how demanding it is.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from scipy.stats import t as student
 from rippletwin.learning.accuracy import summarise
 from rippletwin.learning.architectures import ARCHITECTURES
 
-RECORDINGS = "experimental"  # the dataset that learns from recordings: no zero-shot claim is of it
+EXPERIMENTAL = "experimental"  # the dataset of recordings, which no zero-shot claim concerns
 STRICT, EITHER, PAPER = "strict", "either severity", "the paper's table"
 PAPER_SEEDS = 10
 
 
 @dataclass(frozen=True)
 class Claim:
-    """What the paper says, and pairs of (better, worse) networks that would show it."""
+    """A statement of the paper, and pairs of (better, worse) networks that would show it."""
 
     text: str
     pairs: tuple[tuple[str, str], ...]
@@ -117,7 +117,7 @@ def comparisons(cells: pd.DataFrame) -> pd.DataFrame:
     rows = []
     for score, table in cells.groupby("score", sort=False):
         runs = {(c.architecture, c.dataset): (c.mean, c.std, c.count) for c in table.itertuples()}
-        datasets = [name for name in dict.fromkeys(table.dataset) if name != RECORDINGS]
+        datasets = [name for name in dict.fromkeys(table.dataset) if name != EXPERIMENTAL]
         wanted = [
             (claim.text, (better, dataset), (worse, dataset))
             for claim in (KERNELS_IN_TIME, KERNELS_IN_IMAGES, DEPTH)
@@ -157,7 +157,7 @@ def judge_claims(compared: pd.DataFrame, cells: pd.DataFrame, period: float) -> 
                 )
             rows.append((claim, score, judge_claim(list(found.verdict)), evidence))
     for score in scores:
-        learnt = cells[(cells.score == score) & (cells.dataset == RECORDINGS)]["mean"]
+        learnt = cells[(cells.score == score) & (cells.dataset == EXPERIMENTAL)]["mean"]
         full = int((learnt >= 100).sum())
         word = "not" if not full else "reproduced" if full == len(learnt) else "partly"
         evidence = f"{full} of {len(learnt)} networks; lowest mean {learnt.min():.1f} %"

@@ -4,11 +4,11 @@ The chain is the paper's: synchrosqueezed wavelet transform (Daubechies, Lu, Wu 
 wavelet, the band below ten times the pumping frequency, magnitudes scaled, ``exp(k S)``,
 logarithmic frequency axis, linear interpolation to ``size x size``.
 
-Why not a library's transform: a window of whole revolutions is periodic and only a narrow band of
-it is wanted, so its spectrum has a few hundred lines. Folding them onto ``COLUMNS`` bins before the
-inverse transform gives the wavelet coefficients at ``COLUMNS`` equidistant times *exactly*
-(sampling in time is folding in frequency), at a twentieth of the work. Energy whose instantaneous
-frequency lies outside the band is dropped, not clamped to the edge rows.
+The transform is our own because a window of whole revolutions is periodic and only a narrow band is
+needed: its spectrum has a few hundred lines. Folding them onto ``COLUMNS`` bins before the inverse
+transform gives the wavelet coefficients at ``COLUMNS`` equidistant times exactly (sampling in time
+is folding in frequency), with a twentieth of the work. Energy whose instantaneous frequency lies
+outside the band is dropped, not clamped to the edge rows.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from scipy.special import gamma as gamma_function
 
 GAMMA, BETA = 3.0, 60.0  # Morse wavelet exp(-w^GAMMA) w^BETA, the convention of ssqueezepy and jLab
 COLUMNS = 256  # instants at which the transform is taken
-MARGIN_OCTAVES = 0.6  # wavelets beyond the band's edges whose energy can still belong in it
-NEGLIGIBLE = 1e-8  # of a wavelet's peak: spectrum lines below it are left out
-SILENT = 1e-6  # of a window's largest coefficient: its instantaneous frequency means nothing
+MARGIN_OCTAVES = 0.6  # beyond the band's edges: wavelets there can have energy inside the band
+MIN_RESPONSE = 1e-8  # of a wavelet over its peak; spectrum lines below it are omitted
+MIN_COEFFICIENT = 1e-6  # over a window's largest; smaller ones have no meaningful frequency
 
 
 @dataclass(frozen=True)
 class SstSettings:
-    """What a spectrogram shows and how it becomes an image."""
+    """Band, resolution and scaling of an image."""
 
     size: int = 256  # pixels a side
     max_frequency_hz: float = 1500.0  # ten times the pumping frequency
@@ -53,7 +53,7 @@ def sst_images(windows: np.ndarray, sampling_rate_hz: float, settings: SstSettin
     images = np.empty((*windows.shape[:-1], settings.size, settings.size), dtype=np.float32)
     flat = images.reshape(-1, settings.size, settings.size)
     signals = windows.reshape(-1, windows.shape[-1])
-    step = 64  # signals at a time: keeps the spectrograms in the cache's reach
+    step = 64  # signals at a time, whose spectrograms fit into the cache
     for start in range(0, len(signals), step):
         part = synchrosqueeze(signals[start : start + step], sampling_rate_hz, settings)
         picture = np.exp(np.float32(settings.k * settings.scale) * np.abs(part))
@@ -62,9 +62,9 @@ def sst_images(windows: np.ndarray, sampling_rate_hz: float, settings: SstSettin
 
 
 def amplitude_scale(windows: np.ndarray, sampling_rate_hz: float, settings: SstSettings) -> float:
-    """The ``scale`` that takes the largest amplitude in ``windows`` (n, channels, M) to one.
+    """The ``scale`` that maps the largest amplitude in ``windows`` (n, channels, M) to one.
 
-    To be found once, on simulated healthy windows, and used for every class and every recording.
+    Determine it once, on simulated healthy windows, and use it for every class and recording.
     """
     signals = np.asarray(windows).reshape(-1, np.shape(windows)[-1])
     return 1.0 / float(np.abs(synchrosqueeze(signals, sampling_rate_hz, settings)).max())
@@ -79,7 +79,7 @@ def synchrosqueeze(
     window. A tone of amplitude A gives magnitude A in its row; the real part summed over rows is
     the signal, within the band, at those times.
     """
-    import torch  # takes seconds, and those who want an image's axes need not wait
+    import torch  # takes seconds, which the axes of an image do not need
 
     signals = np.asarray(signals)
     points = signals.shape[-1]
@@ -94,7 +94,7 @@ def synchrosqueeze(
     ratio = (lines[1:] / centre[:, None]).astype(float)
     response = np.exp(BETA * np.log(ratio) + BETA / GAMMA * (1 - ratio**GAMMA))
     response = np.pad(response, ((0, 0), (1, 0)))  # no wavelet sees the mean
-    seen = response > NEGLIGIBLE
+    seen = response > MIN_RESPONSE
     first, last = seen.argmax(1), seen.shape[1] - seen[:, ::-1].argmax(1)
     used = last.max()
 
@@ -174,9 +174,9 @@ def _reassign(coefficient, derivative, edges, out):
         for t in range(coefficient.shape[1]):
             w = coefficient[a, t]
             largest = max(largest, w.real * w.real + w.imag * w.imag)
-    silent = largest * SILENT**2
+    silent = largest * MIN_COEFFICIENT**2
     for a in range(coefficient.shape[0]):
-        row = rows // 2  # walk from the last instant's row: cheaper than a logarithm
+        row = rows // 2  # search from the last instant's row, which is cheaper than a logarithm
         for t in range(coefficient.shape[1]):
             w, d = coefficient[a, t], derivative[a, t]
             power = w.real * w.real + w.imag * w.imag
@@ -205,7 +205,7 @@ def image_similarity(first: np.ndarray, second: np.ndarray) -> tuple[float, floa
     first, second = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
     energies = np.square(first).sum(), np.square(second).sum()
     if not all(energies):
-        raise ValueError("an image without energy is like nothing")
+        raise ValueError("an image without energy has no likeness")
     # correlation over all shifts at once: a product of spectra along time
     product = np.fft.rfft(first).conj() * np.fft.rfft(second)
     correlation = np.fft.irfft(product.sum((0, 1)), first.shape[-1])

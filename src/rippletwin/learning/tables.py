@@ -23,7 +23,7 @@ def accuracy_table(
 
     rows : tidy results (``result_row``); paper : columns architecture, dataset, mean, std;
     datasets : names of the columns from left to right, of which those are shown that either has.
-    A cell nobody ran, or nobody can score, is a dash.
+    A cell that was not run, or cannot be scored, is a dash.
     """
     ours, theirs = _cells(summarise(rows, column)), _cells(paper)
     known = {*paper["dataset"], *rows["dataset"]}
@@ -50,12 +50,12 @@ def accuracy_table(
 def cost_table(
     rows: pd.DataFrame, pairs: Sequence[tuple[str, str]], column: str = "accuracy"
 ) -> str:
-    """Markdown of what the left-out physics cost: each dataset beside the corrected twin's.
+    """Markdown of the cost of missing physics: each dataset beside the corrected twin's.
 
     rows : tidy results (``result_row``); pairs : (dataset of the calibrated twin, the same of the
     corrected one). A line a network, and one for the mean of those networks that ran on both; the
     cost is accuracy with the corrected twin less that with the calibrated, in per cent of all
-    windows. A cell nobody ran is a dash.
+    windows. A cell that was not run is a dash.
     """
     table = summarise(rows, column)
     cells, means = _cells(table), table.set_index(["architecture", "dataset"])["mean"]
@@ -80,7 +80,7 @@ def cost_table(
 
 
 def answer_table(answers: pd.DataFrame) -> str:
-    """Markdown of what networks say of recordings that cannot be scored: a class's share, per cent.
+    """Markdown of the predicted classes of recordings of unknown state: shares in per cent.
 
     answers : columns recording, dataset, architecture and predicted (of ``CLASSES``), a row a
     window and seed.

@@ -3,8 +3,8 @@
 A training stops when the loss on its validation split (samples of the same simulation, never a
 recording) has either stayed below ``target_loss`` for ``patience`` epochs in a row ("target"), or
 not fallen by ``min_improvement`` (relative) for ``plateau`` epochs ("plateau"), or after
-``max_epochs``. It has **converged** in the first case, and in the second where it has learned
-something: its lowest loss is below half of what guessing costs. The weights of the epoch with the
+``max_epochs``. It has **converged** in the first case, and in the second if its lowest loss is
+below half of that of guessing. The weights of the epoch with the
 lowest validation loss are kept.
 """
 
@@ -67,7 +67,7 @@ def train(
     """
     torch.set_num_threads(settings.threads)
     rng = np.random.default_rng(seed)
-    fit, held = stratified_split(y, settings.validation_fraction, rng)
+    fit, validation = stratified_split(y, settings.validation_fraction, rng)
     images, labels = torch.as_tensor(x, dtype=torch.float32), torch.as_tensor(y)
     initialise(network, seed)
     ripple = images[fit] - network.architecture.silence
@@ -86,11 +86,12 @@ def train(
             loss.backward()
             optimiser.step()
             total += float(loss.detach()) * len(batch)
-        logits = _logits(network, images[held])
+        logits = _logits(network, images[validation])
         history.training_loss.append(total / len(fit))
-        history.validation_loss.append(float(nn.functional.cross_entropy(logits, labels[held])))
+        loss = nn.functional.cross_entropy(logits, labels[validation])
+        history.validation_loss.append(float(loss))
         history.validation_accuracy.append(
-            float((logits.argmax(1) == labels[held]).double().mean())
+            float((logits.argmax(1) == labels[validation]).double().mean())
         )
         if (
             best is None
@@ -126,15 +127,15 @@ def stratified_split(
     y: np.ndarray, fraction: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
     """Indices to fit (most) and to hold out (``fraction`` of every class)."""
-    fit, held = [], []
+    fit, validation = [], []
     for label in np.unique(y):
         index = rng.permutation(np.flatnonzero(y == label))
         cut = round(fraction * len(index))
         if not 0 < cut < len(index):
             raise ValueError(f"class {label} has {len(index)} samples: too few to split")
-        held.append(index[:cut])
+        validation.append(index[:cut])
         fit.append(index[cut:])
-    return np.concatenate(fit), np.concatenate(held)
+    return np.concatenate(fit), np.concatenate(validation)
 
 
 def initialise(network: nn.Module, seed: int) -> None:

@@ -23,10 +23,10 @@ from numba import njit
 
 from rippletwin.case.model import ATMOSPHERE
 
-SMOOTHING = 1e3  # Pa
-GAMMA = 1.0 - np.sqrt(0.5)
-TOLERANCE = 1e-11  # of a Newton step, relative to the largest pressure
-TANGENT_STEPS = 10  # with the true slopes; then steeper ones, see `orifice`
+SMOOTHING = 1e3  # Pa, the drop below which an orifice is linear
+GAMMA = 1.0 - np.sqrt(0.5)  # share of a step at its first stage
+NEWTON_TOLERANCE = 1e-11  # of a Newton step, relative to the largest pressure
+TANGENT_STEPS = 10  # Newton steps with the true slopes; then steeper ones, see `orifice`
 MAX_NEWTON = 80
 
 
@@ -42,7 +42,7 @@ def orifice(conductance, drop, tangency):
     """Flow through a smoothed orifice, m3/s, and a slope; `conductance` = Cd A sqrt(2/rho).
 
     The slope is the tangent's for `tangency` 1 and the chord's from the origin for 0. On a square
-    root Newton's tangent jumps between +drop and -drop for ever, a slope in between contracts.
+    root Newton's method alternates between +drop and -drop; a slope in between converges.
     """
     square = drop * drop + SMOOTHING * SMOOTHING
     root = 1.0 / np.sqrt(np.sqrt(square))
@@ -134,7 +134,7 @@ def solve_stage(p, rate, target, step, tables, pump, case_leak, cross_leak, c_pl
                 new = 0.2 * p[k]  # c(p) is defined for positive p only
             largest = max(largest, abs(new - p[k]))
             p[k] = new
-        if largest <= TOLERANCE * np.max(np.abs(p)):
+        if largest <= NEWTON_TOLERANCE * np.max(np.abs(p)):
             return delivered
     return np.nan
 

@@ -34,4 +34,5 @@ def leak_conductances(geometry, fluid, fault):
 
 
 def orifice_conductance(geometry, fluid, area):
+    """Cd A sqrt(2/rho), m3/s/sqrt(Pa)."""
     return geometry.discharge_coefficient * area * np.sqrt(2 / fluid.density)

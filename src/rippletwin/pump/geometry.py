@@ -1,4 +1,4 @@
-"""What the pump is: dimensions, chamber volumes, port timing.
+"""Dimensions of the pump, its chambers' volumes and its ports' areas.
 
 A chamber's angle phi is 0 at its outer dead centre (largest volume, start of delivery) and pi at
 its inner dead centre. Piston k lags piston 0 by k/pistons of a revolution.
@@ -15,10 +15,8 @@ from rippletwin.case.model import absolute
 
 @dataclass(frozen=True)
 class Geometry:
-    """The keys of rig.yaml's `pump`, SI units; defaults describe a pump of 42 cm3/rev.
-
-    Where the defaults come from is told in docs/pump.md.
-    """
+    """The keys of rig.yaml's `pump`, SI units; defaults describe a pump of 42 cm3/rev, see
+    docs/explanation/pump.md for their origin."""
 
     pistons: int = 9
     piston_diameter: float = 0.017
@@ -30,7 +28,7 @@ class Geometry:
     port_area: float = 1.2e-4  # of a fully open port, m2
     port_opening_deg: float = 30.0  # from closed to fully open
     port_overlap_deg: float = 5.0  # both ports closed for so long, half before each dead centre
-    port_timing_deg: float = 0.0  # by so much the port plate is turned, later being positive
+    port_timing_deg: float = 0.0  # angle by which the port plate is turned, later being positive
     discharge_coefficient: float = 0.65
     case_leakage: float = 3e-13  # laminar, of a chamber, m3/s/Pa
     suction_pressure: float = 0.0  # gauge, also that of the case, Pa: an open tank

@@ -57,9 +57,9 @@ class Pipe:
 def choose_steps(pistons, period, outlet, least):
     """Steps a revolution and cells of the pipe.
 
-    A multiple of the pistons, so that all of them see the same angles, and such that a wave needs
-    a whole number of steps for the pipe: the method of characteristics then needs neither
-    interpolation nor an altered wave speed.
+    The steps are a multiple of the pistons, so that all of these have the same angles, and such
+    that a wave takes a whole number of steps through the pipe: the method of characteristics then
+    needs neither interpolation nor an altered wave speed.
     """
     first = -(-least // pistons) * pistons
     if not isinstance(outlet, Pipe):
@@ -116,7 +116,7 @@ def pressure_at_steps(pressure, steps):
 
 
 def resample_periodic(values, samples):
-    """Values (K, ...) over a period to `samples` <= K, keeping the harmonics both can hold."""
+    """Values (K, ...) over a period at `samples` <= K, with the harmonics that both can have."""
     spectrum = np.fft.rfft(values, axis=0)[: samples // 2 + 1]
     if samples % 2 == 0 and samples < len(values):
         spectrum[-1] = 0.0

@@ -1,11 +1,10 @@
-"""What changes in the flow ripple where two numbers are not those of the data sheet.
+"""Second-order sensitivity of the flow ripple to the pump's bulk modulus and port timing.
 
-A chamber that opens to delivery takes in a backflow until it is compressed. How much of it there is
-goes with the bulk modulus of what the chamber holds, which air and heat lower by some per cent, and
-when and how suddenly with the angle at which the port plate stands to the swash plate, which play
-and the mount decide (Edge & Darling 1989, J. Dyn. Sys. Meas. Control 111, 307; Ivantysyn &
-Ivantysynova 2001, Hydrostatic Pumps and Motors, ch. 2). No drawing has either to a per cent, and
-both are the same at all operating points.
+A chamber that opens to delivery takes in a backflow until it is compressed. Its amount depends on
+the bulk modulus of the liquid in the chamber, which air and heat lower by some per cent. Its onset
+depends on the angle between port plate and swash plate, hence on play and mounting (Edge & Darling
+1989, J. Dyn. Sys. Meas. Control 111, 307; Ivantysyn & Ivantysynova 2001, Hydrostatic Pumps and
+Motors, ch. 2). No drawing gives either to a per cent; both are the same at all operating points.
 """
 
 from __future__ import annotations
@@ -22,29 +21,29 @@ from rippletwin.pump.outlets import ConstantPressure
 from rippletwin.pump.simulation import PumpRipple, simulate
 
 KEYS = {"bulk_modulus": "bulk_modulus", "port_timing": "port_timing_deg"}
-"""Names of the uncertain numbers, and the keys of `Geometry` that hold them."""
+"""Names of the uncertain parameters -> keys of `Geometry`."""
 
-STEPS = 6144  # a revolution: runs are compared, and their errors are alike
+STEPS_PER_REVOLUTION = 6144  # enough for differences between runs, whose errors are alike
 
 
 @dataclass(frozen=True)
 class RippleChange:
-    """The parabola through three ripples: a number as the sheet has it, and one standard deviation
-    above and below.
+    """The parabola through three ripples: a parameter at its nominal value, and one standard
+    deviation above and below.
 
-    turn   angle, rad, by which the shaft is turned ahead above and back below: the shaft angle is
-           unknown anyway, and without its part the parabola holds further
+    turn   rad, by which the shaft angle of the ripple above is advanced and that below retarded:
+           the shaft angle is unknown anyway, and without its change the parabola fits further
     """
 
     above: PumpRipple
-    sheet: PumpRipple
+    nominal: PumpRipple
     below: PumpRipple
     turn: float
 
     def harmonics(self, orders: np.ndarray, mean_flow: float) -> np.ndarray:
-        """Slope and curvature (2, F), m3/s peak, at positive shaft `orders` (F,): u standard
-        deviations add u and u^2 of them to the ripple of a pump of the mean flow `mean_flow`, m3/s,
-        wherever that ripple comes from."""
+        """Slope and curvature (2, F), m3/s peak, at positive shaft `orders` (F,): a parameter at
+        coordinate u adds u times the slope and u^2 times the curvature to a ripple of mean flow
+        `mean_flow`, m3/s, whatever its origin."""
         orders = np.asarray(orders, int)
 
         def at(ripple, turn):
@@ -52,26 +51,28 @@ class RippleChange:
             spectrum = np.append(peak_amplitudes(ripple.flow), 0.0)
             return spectrum[np.minimum(orders, count // 2 + 1)] * np.exp(1j * orders * turn)
 
-        above, sheet, below = (
-            at(self.above, self.turn), at(self.sheet, 0.0), at(self.below, -self.turn)
+        above, nominal, below = (
+            at(self.above, self.turn), at(self.nominal, 0.0), at(self.below, -self.turn)
         )  # fmt: skip
-        scale = 0.5 * mean_flow / np.mean(self.sheet.flow)
-        return scale * np.array([above - below, above + below - 2.0 * sheet])
+        scale = 0.5 * mean_flow / np.mean(self.nominal.flow)
+        return scale * np.array([above - below, above + below - 2.0 * nominal])
 
     def source_admittance(self, s: np.ndarray) -> np.ndarray:
-        """What one standard deviation adds to the admittance (F,), m3/s/Pa, beside the flow."""
+        """Change of the source admittance (F,), m3/(Pa s), by one standard deviation."""
         return 0.5 * (self.above.source_admittance(s) - self.below.source_admittance(s))
 
 
 def ripple_change(
     pump: Mapping, fluid: Fluid, speed_rpm: float, pressure: float, name: str, ends: tuple
 ) -> RippleChange:
-    """`RippleChange` of the pump delivering into `pressure` (Pa), its number `name` of KEYS being
-    the first and the second of `ends`. Simulations are kept."""
+    """`RippleChange` of a pump that delivers into `pressure` (Pa), with the values `ends` of its
+    parameter `name` of KEYS above and below. Simulations are cached."""
 
     def run(**changed) -> PumpRipple:
         numbers = {k: v for k, v in {**pump, **changed}.items() if v is not None}
-        return _simulated(tuple(sorted(numbers.items())), fluid, float(speed_rpm), float(pressure))
+        return _simulate_cached(
+            tuple(sorted(numbers.items())), fluid, float(speed_rpm), float(pressure)
+        )
 
     above, below = (run(**{KEYS[name]: float(end)}) for end in ends)
     turn = 0.5 * np.radians(ends[0] - ends[1]) if name == "port_timing" else 0.0
@@ -79,5 +80,7 @@ def ripple_change(
 
 
 @cache
-def _simulated(pump: tuple, fluid: Fluid, speed_rpm: float, pressure: float) -> PumpRipple:
-    return simulate(dict(pump), fluid, speed_rpm, ConstantPressure(pressure), min_steps=STEPS)
+def _simulate_cached(pump: tuple, fluid: Fluid, speed_rpm: float, pressure: float) -> PumpRipple:
+    return simulate(
+        dict(pump), fluid, speed_rpm, ConstantPressure(pressure), min_steps=STEPS_PER_REVOLUTION
+    )

@@ -27,14 +27,14 @@ from rippletwin.pump.outlets import (
 )
 from rippletwin.pump.source_admittance import source_admittance
 
-MIN_STEPS = 12288  # a revolution: the ripple moves by far less than 1 % when they are doubled
+MIN_STEPS = 12288  # a revolution: doubled, the ripple changes by far less than 1 %
 MAX_REVOLUTIONS = 80
-PERIODIC = 1e-6  # largest change from one revolution to the next, relative to the ripple's rms
+PERIODIC_CHANGE = 1e-6  # between revolutions, relative to the ripple's rms
 
 
 @dataclass(frozen=True)
 class PumpRipple(FlowRipple):
-    """A FlowRipple with what else the simulation knows, over one revolution of M samples.
+    """A FlowRipple with the other results of the simulation, over one revolution of M samples.
 
     outlet_pressure (M,), chamber_pressure (pistons, M), sensor_pressure (S, M), all Pa gauge.
     `converged` tells whether the solution is periodic: `change`, from the last revolution but
@@ -53,9 +53,9 @@ class PumpRipple(FlowRipple):
     density: float | None = None
 
     def source_admittance(self, s: np.ndarray) -> np.ndarray:
-        """Admittance (F,), m3/s/Pa, that the chambers add beside the flow into a constant pressure.
+        """Admittance (F,), m3/(Pa s), of the chambers, beside the flow into a constant pressure.
 
-        Zero for a ripple coupled to a pipe, whose flow has already answered a line.
+        Zero for a ripple coupled to a pipe, whose flow contains the response to a line.
         """
         if self.orifice is not None:
             return super().source_admittance(s)
@@ -64,10 +64,8 @@ class PumpRipple(FlowRipple):
         )
 
     def source_capacitance(self, frequency_hz: float) -> float:
-        """The same as a capacitance in m3/Pa, at the pumping frequency, say: Im Y/w.
-
-        Its real part, the ports' loss, is some per cent of it up to ten times that frequency.
-        """
+        """The source admittance as a capacitance, Im Y/w, m3/Pa; its real part, the ports' loss, is
+        some per cent of it up to ten times the pumping frequency."""
         s = np.array([2j * np.pi * frequency_hz])
         return float(self.source_admittance(s)[0].imag / s[0].imag)
 
@@ -124,7 +122,7 @@ def simulate(
             raise ArithmeticError(f"the chamber equations did not converge at {speed_rpm} r/min")
         if previous is not None:
             change = np.max(np.abs(flow - previous)) / np.std(flow)
-        if change < PERIODIC:
+        if change < PERIODIC_CHANGE:
             break
         previous = flow
         if cells and outlet.orifice is None:
@@ -141,7 +139,7 @@ def simulate(
         outlet_pressure=sample(pressures[:, -1]),
         chamber_pressure=sample(pressures[:, :-1]),
         sensor_pressure=sample(readings),
-        converged=bool(change < PERIODIC),
+        converged=bool(change < PERIODIC_CHANGE),
         change=float(change),
         revolutions=revolutions,
         orifice=float(k_v) if cells else None,
@@ -151,7 +149,7 @@ def simulate(
 
 
 def _tables(geometry, fluid, period, steps):
-    """Volumes, their rates and port conductances at steps' ends and at first stages (K, 4, n)."""
+    """Volumes, their rates and port conductances (K, 4, n) at the steps' ends and first stages."""
     lag = 2 * np.pi * np.arange(geometry.pistons) / geometry.pistons
     tables = []
     for fraction in (1.0, chambers.GAMMA):

@@ -1,12 +1,12 @@
-"""Cut a recording into whole revolutions at equal shaft angles, without a tachometer.
+"""Tacholess angular resampling: whole revolutions of a recording at equal shaft angles.
 
-The ripple itself is the tachometer. Time is a smooth function t(theta) of the shaft angle theta
-(in revolutions), a cubic spline through knots every quarter of a revolution. In a window of one
-revolution around each knot the orders of the ripple, X_k, turn by exp(2 pi j k e) where the shaft
-is ahead of the estimate by e; e is solved by least squares over orders and sensors, first from the
-increments of the strong low piston harmonics, which tolerate a wrong nominal speed, then against
-the mean orders, up to ever higher ones. A window of exactly one revolution does not see what
-repeats every revolution: real speed fluctuation within a revolution stays in the ripple.
+The shaft angle is estimated from the ripple itself. Time is a cubic spline t(theta) of the shaft
+angle theta (in revolutions), with a knot every quarter of a revolution. In a window of one
+revolution around each knot the orders X_k of the ripple are multiplied by exp(2 pi j k e) where the
+shaft is ahead of the estimate by e. e is solved by least squares over orders and sensors: first
+from the increments of the strong low piston harmonics, which tolerate a wrong nominal speed, then
+against the mean orders, up to higher and higher ones. A window of exactly one revolution is blind
+to what repeats every revolution: speed fluctuation within a revolution stays in the ripple.
 """
 
 from __future__ import annotations
@@ -20,11 +20,13 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import map_coordinates, spline_filter1d
 
 KNOTS_PER_REVOLUTION = 4
-FIRST_HARMONICS = 6
-HIGHEST_TRACKED_HZ = 5000.0
-ENOUGH = 20
-HALF_WIDTH, SHAPE = 24, 14.0  # of the interpolation kernel: 1e-6 up to 0.4 times the sampling rate
-FRACTIONS = 4096
+FIRST_PISTON_HARMONICS = 6  # for the first estimate of the angle
+MAX_TRACKED_HZ = 5000.0
+MIN_TRIMMED_REVOLUTIONS = 20  # more than these lose one at either end, where the angle is uncertain
+KERNEL_HALF_WIDTH = 24  # samples; with KERNEL_SHAPE right to 1e-6 up to 0.4 times the sampling rate
+KERNEL_SHAPE = 14.0
+KERNEL_FRACTIONS = 4096  # of a sample, at which the kernel is tabulated
+SIGNIFICANT_POWER = 10.0  # of a mean order over its scatter's, to be tracked
 WINDOWS_AT_ONCE = 256  # transformed together, so that memory does not grow with the recording
 
 
@@ -60,7 +62,7 @@ def cut_revolutions(
     step = samples_per_revolution or own
     time = _time_of_angle(pressure, sampling_rate_hz, pistons, speed_hz, own)
     first, last = time.x[0], time.x[-1]
-    if last - first > ENOUGH:  # the angle is least sure at the ends
+    if last - first > MIN_TRIMMED_REVOLUTIONS:
         first, last = first + 1, last - 1
     count = int(np.floor(last - first))
     if count < 2:
@@ -82,7 +84,7 @@ def interpolate(signal: np.ndarray, position: np.ndarray, cutoff: float = 1.0) -
     """
     table, before = _kernel(cutoff)
     base = np.floor(position).astype(int)
-    entry, share = np.divmod((position - base) * FRACTIONS, 1)
+    entry, share = np.divmod((position - base) * KERNEL_FRACTIONS, 1)
     entry, share = entry.astype(int), share[:, None]
     weight = table[entry] * (1 - share) + table[entry + 1] * share
     first, last = base.min() - before, base.max() - before + table.shape[1]
@@ -93,17 +95,19 @@ def interpolate(signal: np.ndarray, position: np.ndarray, cutoff: float = 1.0) -
 
 @lru_cache(maxsize=4)
 def _kernel(cutoff: float) -> tuple[np.ndarray, int]:
-    """Weights (FRACTIONS + 1, taps) of the samples around a position at each fraction of a sample,
-    and the number of taps before it.
+    """Weights (KERNEL_FRACTIONS + 1, taps) of the samples around a position at each fraction of a
+    sample, and the number of taps before it.
 
     A sinc windowed by exp(b (sqrt(1 - u^2) - 1)) (Barnett, Magland, af Klinteberg 2019, SIAM J.
     Sci. Comput. 41, C479, eq. 1.8). Linear interpolation between 4096 entries errs by 1e-7.
     """
-    half = HALF_WIDTH / cutoff
+    half = KERNEL_HALF_WIDTH / cutoff
     before = int(np.ceil(half)) - 1
-    distance = np.linspace(0, 1, FRACTIONS + 1)[:, None] - np.arange(-before, before + 2)
+    distance = np.linspace(0, 1, KERNEL_FRACTIONS + 1)[:, None] - np.arange(-before, before + 2)
     shape = np.sqrt(np.maximum(1 - (distance / half) ** 2, 0.0))
-    weight = np.sinc(cutoff * distance) * np.exp(SHAPE * (shape - 1)) * (np.abs(distance) < half)
+    weight = (
+        np.sinc(cutoff * distance) * np.exp(KERNEL_SHAPE * (shape - 1)) * (np.abs(distance) < half)
+    )
     return weight / weight.sum(axis=1, keepdims=True), before  # a constant stays constant
 
 
@@ -116,7 +120,7 @@ def _time_of_angle(
     angle = np.array([0.0, duration * speed_hz])
     time = CubicSpline(angle, angle / speed_hz)
     step = KNOTS_PER_REVOLUTION * next_fast_len(-(-step // KNOTS_PER_REVOLUTION), real=True)
-    highest = min(step // 3, int(HIGHEST_TRACKED_HZ / speed_hz))
+    highest = min(step // 3, int(MAX_TRACKED_HZ / speed_hz))
     limits = [None] + [min(highest, pistons * 4**n) for n in range(1, 5)]
     for limit in limits:
         orders, centre = _sliding_orders(smooth, sampling_rate_hz, time, step, highest)
@@ -131,8 +135,8 @@ def _time_of_angle(
 def _smooth(ahead: np.ndarray) -> np.ndarray:
     """Average over one revolution.
 
-    A window of one revolution answers speed changes faster than one a revolution with the wrong
-    sign; averaged once more it never does, so that the iteration converges.
+    To speed changes faster than one a revolution a window of one revolution responds with the wrong
+    sign; averaged once more it does not, so that the iteration converges.
     """
     weight = np.array([0.5, 1, 1, 1, 0.5]) / KNOTS_PER_REVOLUTION
     return np.convolve(np.pad(ahead, 2, mode="reflect", reflect_type="odd"), weight, mode="valid")
@@ -154,7 +158,7 @@ def _sliding_orders(smooth, sampling_rate_hz, time, step, highest):
         for first in range(0, starts.size, WINDOWS_AT_ONCE):
             some = slice(first, first + WINDOWS_AT_ONCE)
             orders[some, s] = np.fft.rfft(windows[some] - mean, axis=1)[:, : highest + 1]
-    # refer every window to one origin of the angle
+    # Refer every window to one origin of the angle.
     turn = np.exp(-2j * np.pi * np.outer(angle[starts], np.arange(highest + 1)))
     return orders * turn[:, None, :] * (2 / step), angle[starts] + 0.5
 
@@ -166,8 +170,8 @@ def _angles_at_ends(time: CubicSpline, last: float) -> tuple[float, float]:
 
 
 def _from_increments(orders: np.ndarray, pistons: int) -> np.ndarray:
-    """How far the shaft is ahead (windows,), revolutions, from window to window turns."""
-    k = pistons * np.arange(1, FIRST_HARMONICS + 1)
+    """Lead of the shaft (windows,), revolutions, from the phase increments between windows."""
+    k = pistons * np.arange(1, FIRST_PISTON_HARMONICS + 1)
     k = k[k < orders.shape[2]]
     turn = np.einsum("rsk,rsk->rk", orders[1:, :, k], orders[:-1, :, k].conj())
     weight = k**2 * np.abs(turn)
@@ -177,14 +181,16 @@ def _from_increments(orders: np.ndarray, pistons: int) -> np.ndarray:
 
 
 def _from_mean_orders(orders: np.ndarray, limit: int) -> np.ndarray:
-    """The same against the mean orders 1..limit that stand out of their scatter."""
+    """Lead of the shaft against the mean orders 1 to `limit` that exceed their scatter."""
     some = orders[:, :, 1 : limit + 1]
     k = np.arange(1, some.shape[2] + 1)
     mean = some.mean(0)
     scatter = np.mean(np.abs(some - mean) ** 2, axis=0)
     floor = np.median(scatter, axis=1, keepdims=True)
-    weight = np.where(np.abs(mean) ** 2 > 10 * floor / len(some) * KNOTS_PER_REVOLUTION, 1.0, 0.0)
-    # An order that a resonance turns as the speed wanders is no measure of the angle.
+    weight = np.where(
+        np.abs(mean) ** 2 > SIGNIFICANT_POWER * floor / len(some) * KNOTS_PER_REVOLUTION, 1.0, 0.0
+    )
+    # An order whose phase a resonance changes with the speed is no measure of the angle.
     weight = weight / np.maximum(scatter, floor)
     turn = np.einsum("rsk,sk,k->r", some, weight * mean.conj(), k).imag
     return turn / np.sum(weight * np.abs(mean) ** 2 * k**2) / (2 * np.pi)

@@ -1,4 +1,4 @@
-"""What `rippletwin check` says of a case."""
+"""The summary of a case that `rippletwin check` prints."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rippletwin.spectra.angular_resampling import Revolutions
 from rippletwin.spectra.noise import noise_cycle_scatter, noise_mad
 from rippletwin.spectra.observation import Observation, observe, revolutions_of
 
-STANDS_OUT = 20.0  # |X|^2 over its variance; pure noise exceeds it once in 5e8
+SIGNIFICANT_POWER = 20.0  # |X|^2 over its variance; pure noise exceeds it once in 5e8
 
 
 def summarise_case(
@@ -48,7 +48,7 @@ def _periodic(
     )
     mad, scatter = noise_mad(recording.pressure), noise_cycle_scatter(revolutions.windows)
     variance = np.einsum("fss->sf", observation.covariance).real
-    above = np.abs(observation.values) ** 2 > STANDS_OUT * variance
+    above = np.abs(observation.values) ** 2 > SIGNIFICANT_POWER * variance
     piston = observation.orders % rig.pump["pistons"] == 0
     for s, sensor in enumerate(rig.sensors):
         yield (

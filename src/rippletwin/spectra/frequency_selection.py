@@ -7,15 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
+FREQUENCIES_PER_RESONANCE = 12  # of the line, whose resonances are 1/(2 delay) apart
+
 
 def select_fitted_frequencies(observations: Sequence, rig, highest_hz: float | None = None) -> list:
-    """The observations as they are fitted.
+    """The observations at the frequencies that are fitted.
 
-    Of a periodic recording the piston orders, the only ones a healthy nominal pump makes; of a
-    dense spectrum twelve frequencies a resonance of the line: a model's error has the bandwidth of
-    the line's own resonances, so that closer points are no further evidence.
+    Of a periodic recording the piston orders, the only ones of a healthy nominal pump. Of a dense
+    spectrum FREQUENCIES_PER_RESONANCE: the error of a model has the bandwidth of the line's
+    resonances, so that closer points are no further evidence.
     """
-    spacing = 1.0 / (24.0 * rig.delay)
+    spacing = 1.0 / (2.0 * FREQUENCIES_PER_RESONANCE * rig.delay)
     prepared = []
     for o in observations:
         o = select_below(o, highest_hz)

@@ -25,21 +25,22 @@ __all__ = [
     "revolutions_of",
 ]
 
-HIGHEST_HZ = 5000.0
-DEFAULT_RELATIVE_ERROR = 0.02
-SMOOTHED = 51
+MAX_FREQUENCY_HZ = 5000.0  # kept by default
+MAX_SAMPLING_SHARE = 0.4  # of the sampling rate, up to which frequencies are kept
+DEFAULT_RELATIVE_ERROR = 0.02  # of a spectrum or impedance without repeats or a stated error
+SMOOTHED_FREQUENCIES = 51  # over which the scatter of repeats is averaged
 
 
 @dataclass(frozen=True)
 class Observation:
-    """What every later stage sees of a recording.
+    """A recording as every later stage uses it.
 
     values (S, F) complex: peak amplitudes in Pa (periodic, random, spectrum), or the impedance
     (S = 1; Pa s/m3, or in units of the first segment's characteristic impedance if `normalised`).
     covariance (F, S, S) = E[e e^H] of the complex errors e of values, taken as circular: the real
     and the imaginary part each have half the variance. orders (F,) are shaft orders, None where the
-    source is not the shaft. mean (S,) is the mean pressure. `source` says what is known of it:
-    "known" (impedance), "nominal" (a flow ripple or a pump model exists) or "free".
+    source is not the shaft. mean (S,) is the mean pressure, Pa. `source` is what is known of the
+    flow source: "known" (impedance), "nominal" (a flow ripple or a pump model) or "free".
     """
 
     kind: str
@@ -65,12 +66,12 @@ def observe(
     revolutions: Revolutions | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Observation:
-    """The observation in a recording.
+    """The observation of a recording.
 
     max_frequency_hz : highest frequency kept; None is 5 kHz, or 0.4 times the sampling rate where
         that is lower, or all of a spectrum.
     piston_harmonics_only : keep only the orders that are multiples of the number of pistons.
-    revolutions : of a periodic recording, where they have been cut already (`revolutions_of`).
+    revolutions : of a periodic recording, where they are known already (`revolutions_of`).
     progress : called with how many steps of a periodic recording's analysis are done, and of all.
     """
     if recording.kind == "periodic":
@@ -155,7 +156,7 @@ def _observe_spectra(recording, rig, max_frequency_hz) -> Observation:
     if impedance:
         first = rig.line[0]
         unit = 1.0 if recording.normalised else rig.fluid.density * first.wave_speed / first.area
-        # errors are even in the reflection coefficient (Z - Zc)/(Z + Zc); dZ = (Z + Zc)^2/(2 Zc) dR
+        # Errors of R = (Z - Zc)/(Z + Zc) are even over frequency; dZ = (Z + Zc)^2/(2 Zc) dR.
         size = np.abs(values + unit) ** 2 / (2 * unit)
     else:
         size = np.sqrt(np.mean(np.abs(values) ** 2, axis=0, keepdims=True)) * np.ones_like(values)
@@ -183,14 +184,14 @@ def _observe_spectra(recording, rig, max_frequency_hz) -> Observation:
 def _relative_scatter(residual: np.ndarray, size: np.ndarray) -> np.ndarray:
     """Relative standard deviation (S, F) of the mean of repeats from `residual` (R, S, F).
 
-    Two or three repeats say little at one frequency, so the scatter is smoothed over SMOOTHED of
-    them.
+    Two or three repeats determine little at one frequency: the scatter is averaged over
+    SMOOTHED_FREQUENCIES of them.
     """
     count = len(residual)
     variance = np.sum(np.abs(residual / size) ** 2, axis=0) / (count - 1) / count
-    return np.sqrt(uniform_filter1d(variance, SMOOTHED, axis=-1, mode="nearest"))
+    return np.sqrt(uniform_filter1d(variance, SMOOTHED_FREQUENCIES, axis=-1, mode="nearest"))
 
 
 def _highest(max_frequency_hz: float | None, sampling_rate_hz: float) -> float:
-    limit = HIGHEST_HZ if max_frequency_hz is None else max_frequency_hz
-    return min(limit, 0.4 * sampling_rate_hz)
+    limit = MAX_FREQUENCY_HZ if max_frequency_hz is None else max_frequency_hz
+    return min(limit, MAX_SAMPLING_SHARE * sampling_rate_hz)

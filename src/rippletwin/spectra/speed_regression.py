@@ -1,22 +1,22 @@
-"""Harmonics at the mean speed from revolutions whose speed wanders.
+"""Harmonics at the mean speed from revolutions of varying speed, by Gaussian process regression.
 
-A line answers differently at another speed: a path of 5 m of oil turns the phase at 5 kHz by half a
-radian for 0.3 %, and a resonance can be narrower than the speed wanders, so that the mean over the
-revolutions is that of no speed at all. Each order of each sensor is therefore taken for a smooth
-function of the speed, and its value at the mean speed is what the revolutions say of it by Gaussian
-process regression (Rasmussen & Williams 2006, Gaussian Processes for Machine Learning, sec. 2.2
-and 2.7), with the width and the size of what the speed does chosen for each by the restricted
-likelihood (Patterson & Thompson 1971, Biometrika 58, 545).
+A line responds differently at another speed: over a path of 5 m of oil 0.3 % of speed changes the
+phase at 5 kHz by half a radian. A resonance can be narrower than the range of speeds, so that the
+mean over the revolutions is the response at no speed at all. Each order of each sensor is therefore
+modelled as a smooth function of the speed, and its value at the mean speed is estimated by Gaussian
+process regression (Rasmussen & Williams 2006, Gaussian Processes for Machine Learning, sec. 2.2 and
+2.7). Width and variance of the function are chosen for each by the restricted likelihood (Patterson
+& Thompson 1971, Biometrika 58, 545).
 
-A resonance remembers the speed it had: on the way up it answers otherwise than on the way down.
-Where the angular frequency w rises at the rate r, a system of response H answers
-exp(-j r/2 d^2/dw^2) H(w) (expand H about w under the integral over a linear chirp; its first term
-is in Carson & Fry 1937, Bell Syst. Tech. J. 16, 513). That operator turns a Gaussian covariance of
-H into another Gaussian of complex width, in closed form, and so the memory is part of the model.
+A resonance also depends on the speed's rate of change. Where the angular frequency w rises at the
+rate r, a system with response H responds as exp(-j r/2 d^2/dw^2) H(w) (expand H about w under the
+integral over a linear chirp; its first term is in Carson & Fry 1937, Bell Syst. Tech. J. 16, 513).
+This operator transforms a Gaussian covariance of H into another Gaussian of complex width, in
+closed form, so that the covariance below includes it.
 
 A regression over R revolutions costs R^3. A long recording is therefore regressed in blocks: every
-n-th revolution belongs to one block, so that each block sees all of the speeds. The blocks share
-the width and the size, which their likelihoods choose together, and their values are averaged.
+n-th revolution belongs to one block, so that each block has all of the speeds. The blocks share one
+width and one variance, which maximise the sum of their likelihoods. Their values are averaged.
 """
 
 from __future__ import annotations
@@ -27,13 +27,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-ENOUGH = 8  # revolutions: below it the mean is taken
-WIDTHS = 1e-4 * 2.0 ** np.arange(9)  # relative speed over which an order may change
-RATIOS = 10.0 ** np.arange(-1, 8)  # variance of what the speed does over that of the noise
-BANDS = 3  # an octave, in which the memory is one
-GAIN = 5.0  # log likelihood that an order's dependence on the speed must be worth
-MAX_IN_ONE = 256  # revolutions that are regressed together; more are regressed in blocks
-BLOCK = 128  # revolutions of a block, at most
+MIN_REVOLUTIONS = 8  # for the regression; of fewer the mean is taken
+WIDTHS = 1e-4 * 2.0 ** np.arange(9)  # candidates: relative speed over which an order changes
+VARIANCE_RATIOS = 10.0 ** np.arange(-1, 8)  # candidates: variance of the function over the noise's
+BANDS_PER_OCTAVE = 3  # in each of which one rate of change of the frequency is used
+MIN_GAIN = 5.0  # of log likelihood, for an order to depend on the speed
+MIN_CORRELATION = 3.0  # of neighbouring residuals, in standard errors, to be believed
+MAX_CORRELATION = 0.98  # beyond which the noise of a mean is not increased
+MAX_REVOLUTIONS_TOGETHER = 256  # in one regression; more are regressed in blocks
+MAX_BLOCK_REVOLUTIONS = 128
 
 
 def harmonics_at_mean_speed(
@@ -45,10 +47,10 @@ def harmonics_at_mean_speed(
     """Values (S, F) at the mean speed of spectra (R, S, F), and their covariance (F, S, S).
 
     speed_hz (R,) of the revolutions, which follow each other; orders (F,) from 1. The covariance is
-    that of the scatter about the function of speed and of what is not known of the function;
-    `S + 2` revolutions' worth of the sensor's typical noise is mixed into the scatter, which keeps
-    it positive definite where there are few revolutions. `progress` is called with the number of
-    frequency bands that are regressed, and of all of them.
+    that of the scatter about the function of speed plus that of the function itself. The scatter is
+    averaged with the sensors' typical noise, weighted as S + 2 revolutions, which keeps it positive
+    definite where there are few revolutions. `progress` is called with the number of frequency
+    bands that are regressed, and of all of them.
     """
     count, sensors, _ = spectra.shape
     data = spectra.reshape(count, -1)
@@ -56,16 +58,19 @@ def harmonics_at_mean_speed(
     unknown = np.zeros(data.shape[1])
     residual = data - data.mean(axis=0)
     freedom = max(count - 1, 1)
-    if count >= ENOUGH:
+    if count >= MIN_REVOLUTIONS:
         mean = mean_speed(speed_hz)
         deviation = speed_hz / mean - 1
         rate = np.gradient(deviation, np.cumsum(1 / speed_hz))
-        band = np.tile(np.round(BANDS * np.log2(orders * mean)).astype(int), sensors)
+        band = np.tile(np.round(BANDS_PER_OCTAVE * np.log2(orders * mean)).astype(int), sensors)
         bands = np.unique(band)
         for done, each in enumerate(bands, 1):
-            own, chirp = np.flatnonzero(band == each), rate / (4 * np.pi * 2.0 ** (each / BANDS))
-            for which, *found in _regress(data[:, own], deviation, chirp):
-                weights[own[which]], unknown[own[which]], residual[:, own[which]] = found
+            own, chirp = (
+                np.flatnonzero(band == each),
+                rate / (4 * np.pi * 2.0 ** (each / BANDS_PER_OCTAVE)),
+            )
+            for which, *result in _regress(data[:, own], deviation, chirp):
+                weights[own[which]], unknown[own[which]], residual[:, own[which]] = result
             if progress is not None:
                 progress(done, len(bands))
     weights = weights.reshape(*spectra.shape[1:], count)
@@ -125,7 +130,7 @@ def _regress(data, deviation, chirp) -> Iterator[tuple]:
             error = 1 + np.vdot(solved, kernel.covariance @ solved - 2 * kernel.to_mean).real
             missed += size / count * max(error, 0.0)
             row[own] = size / count * solved
-        noise = noise / (count - len(blocks)) * _dependence(rest)
+        noise = noise / (count - len(blocks)) * _variance_inflation(rest)
         # as large as the noise is, for some of it went into the function
         rest *= np.sqrt(noise * (count - 1) / (np.sum(np.abs(rest) ** 2, axis=0) + 1e-300))
         yield which, row.conj(), noise * ratio * missed, rest
@@ -133,33 +138,33 @@ def _regress(data, deviation, chirp) -> Iterator[tuple]:
 
 def _blocks(count: int) -> list[np.ndarray]:
     """Indices of the revolutions that are regressed together: all, or every n-th of them."""
-    number = 1 if count <= MAX_IN_ONE else -(-count // BLOCK)
+    number = 1 if count <= MAX_REVOLUTIONS_TOGETHER else -(-count // MAX_BLOCK_REVOLUTIONS)
     return [np.arange(first, count, number) for first in range(number)]
 
 
 def _choose_covariances(data, deviation, chirp, blocks) -> tuple[np.ndarray, list]:
     """For each column of data (R, N) the most likely covariance: its index, -1 where none is worth
-    GAIN, and for each index (ratio, a function that gives the kernels of the blocks)."""
+    MIN_GAIN, and for each index (ratio, a function that gives the kernels of the blocks)."""
     plain = 0.0
     for own in blocks:
         contrast = _off_mean(data[own])
         plain = plain + (len(own) - 1) * np.log(np.sum(np.abs(contrast) ** 2, axis=0) + 1e-300)
-    best = -plain + GAIN
+    best = -plain + MIN_GAIN
     chosen = np.full(data.shape[1], -1)
     tried = []
     for width in WIDTHS:
-        likelihood = np.zeros((len(RATIOS), data.shape[1]))
+        likelihood = np.zeros((len(VARIANCE_RATIOS), data.shape[1]))
         kernels = (_kernel(deviation[own], chirp[own], width) for own in blocks)
         if len(blocks) == 1:  # kept; of many blocks they are calculated again where they are chosen
             kernels = list(kernels)
         for own, kernel in zip(blocks, kernels, strict=True):
             power = np.abs(kernel.basis.conj().T @ data[own]) ** 2
-            for k, ratio in enumerate(RATIOS):
+            for k, ratio in enumerate(VARIANCE_RATIOS):
                 shrink = 1 / (1 + ratio * kernel.sizes)
                 likelihood[k] += np.sum(np.log(shrink))
                 likelihood[k] -= (len(own) - 1) * np.log(shrink @ power + 1e-300)
         again = partial(_kernels, kernels, blocks, deviation, chirp, width)
-        for k, ratio in enumerate(RATIOS):
+        for k, ratio in enumerate(VARIANCE_RATIOS):
             chosen[likelihood[k] > best] = len(tried)
             best = np.maximum(best, likelihood[k])
             tried.append((ratio, again))
@@ -200,19 +205,21 @@ def _reflect(data):
     return data if square == 0.0 else data - np.outer(normal, 2 / square * (normal @ data))
 
 
-def _dependence(rest):
-    """How many times the variance of a mean is what independent rests (R, N) would give, (N,).
+def _variance_inflation(rest):
+    """Factor (N,) on the variance of a mean of residuals (R, N) that are not independent.
 
-    Where neighbours are alike the function has missed something, and many revolutions say it again:
-    (1 + r)/(1 - r) for the correlation r of neighbours, where that is more than chance.
+    (1 + r)/(1 - r) for a significant correlation r of neighbours: they are alike where the function
+    has missed something, and then more revolutions add less information.
     """
     r = np.sum(rest[1:] * rest[:-1].conj(), axis=0).real
     r = r / (np.sum(np.abs(rest) ** 2, axis=0) + 1e-300)
-    r = np.where(r > 3 / np.sqrt(2 * len(rest)), np.minimum(r, 0.98), 0.0)
+    least = MIN_CORRELATION / np.sqrt(2 * len(rest))
+    r = np.where(r > least, np.minimum(r, MAX_CORRELATION), 0.0)
     return (1 + r) / (1 - r)
 
 
 def _covariance(deviation, chirp, width):
-    """Of what is answered at two speeds `deviation` apart while they change by `chirp` more."""
+    """Covariance of the responses at two speeds that differ by `deviation`, and their rates of
+    change by `chirp`."""
     square = width**2 - 2j * chirp
     return width / np.sqrt(square) * np.exp(-0.5 * deviation**2 / square)

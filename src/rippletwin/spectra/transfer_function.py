@@ -7,9 +7,9 @@ import numpy as np
 from rippletwin.case.model import Rig
 
 ROUND_TRIPS_PER_SEGMENT = 20  # length of a segment of a random recording, in round trips of a wave
-
-
-REFERENCE_ERROR = 1e-4
+REFERENCE_ERROR = 1e-4  # relative, of the reference sensor: nominal
+MIN_COHERENT_SHARE = 1e-3  # of the reference's power, to stay positive
+OVERLAP_CORRELATION = 1 / 6  # of neighbouring Hann segments that overlap by half
 
 
 def reference_spectra(
@@ -19,12 +19,12 @@ def reference_spectra(
 
     Returns values (S, F), covariance (F, S, S), frequency_hz (F,). values[s] = sqrt(G) H_s, where
     G is the power of the coherent signal at the first sensor in a bin and H_s = G_1s / G the
-    response from there to sensor s: the H1 estimator (Bendat & Piersol 2010, Random Data, ch. 6)
-    with the noise, the smallest eigenvalue of the cross-spectral matrix, taken off G, for else
-    noise of the first sensor makes every H_s too small. The first sensor is the reference: the
-    scatter of sensor s about H_s times the first, segment by segment, is the error of the others,
-    and the reference's own error is nominal (1e-4). Hann segments overlap by half; every second bin
-    is kept, so that neighbours are almost independent.
+    response from there to sensor s: the H1 estimator (Bendat & Piersol 2010, Random Data, ch. 6).
+    The noise, the smallest eigenvalue of the cross-spectral matrix, is subtracted from G; otherwise
+    noise of the first sensor would make every H_s too small. The error of sensor s is its scatter
+    about H_s times the first sensor, segment by segment; the first sensor's own error is nominal.
+    Hann segments overlap by half. Every second bin is kept, so that neighbours are almost
+    independent.
     """
     samples = pressure.shape[1]
     round_trip = 2 * rig.delay
@@ -41,12 +41,11 @@ def reference_spectra(
     )
     power = np.einsum("rsf,rtf->fst", spectra, spectra.conj()) / len(starts)
     noise = np.linalg.eigvalsh(power)[:, 0]
-    coherent = np.maximum(power[:, 0, 0].real - noise, 1e-3 * power[:, 0, 0].real)
+    coherent = np.maximum(power[:, 0, 0].real - noise, MIN_COHERENT_SHARE * power[:, 0, 0].real)
     values = power[:, :, 0].T / np.sqrt(coherent)
     values[0] = np.sqrt(coherent)
     error = spectra - values / values[0] * spectra[:, :1]
-    # neighbouring Hann segments correlate by 1/6 when they overlap by half
-    averages = len(starts) / (1 + 2 / 36)
+    averages = len(starts) / (1 + 2 * OVERLAP_CORRELATION**2)
     covariance = np.einsum("rsf,rtf->fst", error, error.conj()) / len(starts) / averages
     covariance[:, 0, :] = covariance[:, :, 0] = 0
     covariance[:, 0, 0] = (REFERENCE_ERROR * np.abs(values[0])) ** 2

@@ -1,26 +1,37 @@
-"""The pump as a source of flow: harmonics, what its parameters change, the shaft's angle."""
+"""The pump as a flow source: harmonics, their dependence on the pump's parameters, shaft angle."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rippletwin.case.model import FlowRipple
 from rippletwin.harmonics import flow_harmonics, peak_amplitudes, phase_modulate
+from rippletwin.twin.operating_point import OperatingPoint
+
+if TYPE_CHECKING:
+    from rippletwin.twin.twin import Twin
 
 
 class FlowSource:
-    """The sources of recordings whose harmonics stand side by side in `slices`.
+    """The sources of observations whose frequencies are side by side in `slices`.
 
-    flow        (F,) as given, m3/s; 1 where there is no ripple: a free source
-    admittance  (F,) of the pump's chambers beside it, m3/(Pa s)
-    changes     (index, slope and curvature (2, F) of the flow, slope (F,) of the admittance) of
+    flow        (F,) of the nominal ripple, m3/s; 1 where there is none: a free source
+    admittance  (F,) of the pump's chambers parallel to it, m3/(Pa s)
+    changes     (index, slope and curvature (2, F) of the flow, slope (F,) of the admittance) for
                 each of the pump's parameters, by its coordinate
-    angles      indices of the recordings' shaft angles in theta, None for those without
+    angles      index in theta of each observation's shaft angle, None for those without
     """
 
-    def __init__(self, twin, observations: Sequence, points: Sequence, slices: Sequence[slice]):
+    def __init__(
+        self,
+        twin: Twin,
+        observations: Sequence,
+        points: Sequence[OperatingPoint],
+        slices: Sequence[slice],
+    ):
         self._parameters, self._slices = twin.parameters, slices
         self._orders = [o.orders for o in observations]
         count = slices[-1].stop if slices else 0
@@ -38,13 +49,13 @@ class FlowSource:
                 flow, own = changes.setdefault(
                     k, (np.zeros((2, count), complex), np.zeros(count, complex))
                 )
-                flow[:, part] = _delivered(change, point.ripple, o.orders, mean)
+                flow[:, part] = _modulate_change(change, point.ripple, o.orders, mean)
                 if np.any(self.admittance[part]):  # a ripple given is an ideal source
                     own[part] = change.source_admittance(s)
         self.changes = [(k, *each) for k, each in changes.items()]
 
     def at(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Flow and admittance (F,) at `theta`, shaft angles being 0."""
+        """Flow and admittance (F,) at `theta`, with shaft angles of 0."""
         flow, admittance = self.flow.copy(), self.admittance.copy()
         for k, (slope, curvature), own in self.changes:
             flow += theta[k] * (slope + theta[k] * curvature)
@@ -52,7 +63,7 @@ class FlowSource:
         return flow, admittance
 
     def turn(self, theta: np.ndarray) -> np.ndarray:
-        """What the shaft angles at the first samples make of the harmonics, (F,)."""
+        """Phase factor (F,) of the shaft angles at the first samples: exp(j k angle) at order k."""
         turn = np.ones(len(self.flow), complex)
         for part, orders, index in zip(self._slices, self._orders, self.angles):
             if index is not None:
@@ -60,14 +71,16 @@ class FlowSource:
         return turn
 
 
-def _delivered(change, ripple: FlowRipple, orders: np.ndarray, mean_flow: float) -> np.ndarray:
-    """Slope and curvature (2, F) of a `RippleChange` by the shaft that delivers `ripple`."""
-    if not ripple.swing:
+def _modulate_change(
+    change, ripple: FlowRipple, orders: np.ndarray, mean_flow: float
+) -> np.ndarray:
+    """Slope and curvature (2, F) of a `RippleChange`, phase modulated as `ripple` is."""
+    if not ripple.modulation:
         return change.harmonics(orders, mean_flow)
     orders = np.asarray(orders, int)
     even = np.zeros((2, 2 * np.max(orders)), complex)
     even[:, 1:] = change.harmonics(np.arange(1, even.shape[1]), mean_flow)
-    even[np.abs(even) < 1e-9 * np.max(np.abs(even))] = 0.0  # orders that equal pistons do not make
+    even[np.abs(even) < 1e-9 * np.max(np.abs(even))] = 0.0  # rounding
     return np.array(
-        [peak_amplitudes(phase_modulate(x, ripple.swing, 4 * len(x)))[orders] for x in even]
+        [peak_amplitudes(phase_modulate(x, ripple.modulation, 4 * len(x)))[orders] for x in even]
     )

@@ -1,22 +1,25 @@
 """Derivatives of the forward model, all columns of the Jacobian in one sweep.
 
-The perturbed copies of the line stand side by side as more frequencies of one network. What cannot
-be told that way, because the sweep's steps are common to all copies, has exact relations:
+The perturbed copies of the line are solved side by side, as more frequencies of one line. The steps
+of the sweep are common to all copies; parameters that change these steps have exact relations:
 
     moving a sensor        dp/dx = -Z' q
     turning the shaft      dp/dangle = j k p at shaft order k, nonlinear load or not
     longer segment         Z' and Y' of it in proportion, then everything behind moved back
 
-Positions of inserts are moved one by one. The orifice's nonlinear remainder is held meanwhile, two
-orders below the linear part, and so is what segments store beyond proportion to the pressure. That
-is no small part next to a sharp resonance: columns are wrong by some per cent, and where wave
-speeds, air and a branch can stand in for each other a fit stops units of log likelihood too soon.
-`follow` makes up for it by difference quotients at one place. With `freeze_compliance` it is
-held in predictions too, which is all that makes them slow; else each begins where the last ended.
+Positions of inserts are moved one by one. Two nonlinear parts are frozen meanwhile: the orifice's
+remainder, two orders below its linear part, and the outflows of nonlinear compliance. The latter
+are no small part near a sharp resonance: columns are wrong by some per cent, and where wave speeds,
+air and a branch can replace each other a fit stops units of log likelihood too soon.
+`use_full_jacobian` adds what is missing, by difference quotients at one theta.
+
+`freeze_compliance` freezes the outflows in predictions too, since solving them is what takes the
+time. Otherwise each solution starts from the last one.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -24,16 +27,21 @@ import numpy as np
 from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
 from rippletwin.twin.forward_model import ForwardModel
-from rippletwin.twin.twin import Arrays
+from rippletwin.twin.twin import Arrays, Twin
 
 STEP = 1e-5  # of the difference quotients, in prior standard deviations
-FOLLOWED, FINELY = 3e-4, 1e-6  # the same where the storage is solved anew, and to what tolerance
+SOLVED_STEP = 3e-4  # the same where the nonlinear compliance is solved at each point
+SOLVED_TOLERANCE = 1e-6  # of that solution
 
 
 class DifferentiableForward(ForwardModel):
-    """`Forward` of pressures with `derivatives`."""
+    """Forward model of pressures with `derivatives`.
 
-    def __init__(self, twin, observations):
+    freeze_compliance    whether predictions use the outflows of the last one
+    jacobian_correction  (P, S, F) that `derivatives` adds, or None
+    """
+
+    def __init__(self, twin: Twin, observations: Sequence):
         super().__init__(twin, observations)
         names = [p.name for p in twin.parameters]
         segments, sensors = len(twin.rig.line), len(twin.rig.sensors)
@@ -45,48 +53,49 @@ class DifferentiableForward(ForwardModel):
         self._positions = [k for k, name in enumerate(names) if name.endswith(".position")]
         apart = {*self._sensors, *self._angles, *self._positions}
         self._together = [k for k in range(len(names)) if k not in apart]
-        self._remainder = self._drains = self._held_at = None
-        self._hold = False
+        self._remainder = self._outflows = self._frozen_at = None
+        self._freeze = False
         self.freeze_compliance = False
         self.jacobian_correction: np.ndarray | None = None
 
     def hold_as(self, other: DifferentiableForward) -> None:
-        """Hold in predictions what `other`, of the same recordings, has found to be stored."""
-        self.freeze_compliance, self._drains = True, other._drains
+        """Freeze the outflows at those of `other`, a model of the same recordings."""
+        self.freeze_compliance, self._outflows = True, other._outflows
 
     def omit_compliance(self) -> None:
-        """Hold nothing in predictions: as if the line stored in proportion to the pressure."""
-        self.freeze_compliance, self._drains = True, None
+        """Freeze the outflows at zero, as if the compliance were linear."""
+        self.freeze_compliance, self._outflows = True, None
 
     def use_full_jacobian(self, theta: np.ndarray) -> None:
-        """Find `missed` (P, S, F), what `derivatives` at theta lack because they hold what segments
-        store; from here on they have it, there and, as long as it changes little, about there."""
-        self.jacobian_correction, full = None, self._extended_for_compliance[0]._full
-        usual, full.tolerance = full.tolerance, FINELY
+        """Set `jacobian_correction` to what `derivatives` lack at theta because the outflows are
+        frozen. It serves at theta and about it, as long as it changes little."""
+        self.jacobian_correction = None
+        solver = self._extended_for_compliance[0].compliance_solver
+        usual, solver.tolerance = solver.tolerance, SOLVED_TOLERANCE
         readings = np.concatenate(self(theta), axis=1)
-        held = self.derivatives(theta)
-        missed = np.zeros_like(held)
+        frozen = self.derivatives(theta)
+        correction = np.zeros_like(frozen)
         for k in (*self._together, *self._positions):
             moved = theta.copy()
-            moved[k] += FOLLOWED
-            slope = (np.concatenate(self(moved), axis=1) - readings) / FOLLOWED
-            missed[k] = slope - held[k]
-        self.jacobian_correction, full.tolerance = missed, usual
+            moved[k] += SOLVED_STEP
+            slope = (np.concatenate(self(moved), axis=1) - readings) / SOLVED_STEP
+            correction[k] = slope - frozen[k]
+        self.jacobian_correction, solver.tolerance = correction, usual
 
     def linear_load(self, theta: np.ndarray) -> np.ndarray | None:
-        """Readings (S, F) with the orifice linear and what segments store beyond proportion as it
-        is; None where there is no orifice or it is so already."""
+        """Readings (S, F) with a linear orifice and the outflows of theta; None without an orifice,
+        where they are those of the prediction."""
         if self._orifice is None:
             return None
-        self._predicted(theta)
+        self._solve_at(theta)
         network = self._linear(theta)
-        self._drain_as_held(network)
+        self._set_frozen_outflows(network)
         return network.readings()
 
     def derivatives(self, theta: np.ndarray) -> np.ndarray:
         """d readings/d theta, (P, S, F); rows S are the rig's sensors, F all frequencies."""
-        self._predicted(theta)
-        self._hold = True
+        self._solve_at(theta)
+        self._freeze = True
         base = self.network(theta)
         pressure, flow = base.respond(base.sensor_positions)
         factor = np.broadcast_to(base.sensor_factor, pressure.shape)
@@ -123,35 +132,35 @@ class DifferentiableForward(ForwardModel):
                 per_metre = self._rate(n, theta)
                 if share > 0.0 and per_metre > 1e-9:
                     out[k] -= rate * share / per_metre * out[n]
-        self._hold = False
+        self._freeze = False
         return (
             out
             if self.jacobian_correction is None or self.freeze_compliance
             else out + self.jacobian_correction
         )
 
-    def _predicted(self, theta):
-        """What is held is that of theta from here on."""
-        if not np.array_equal(self._held_at, theta):
+    def _solve_at(self, theta):
+        """Solve the nonlinear parts at theta, unless that is where they were solved last."""
+        if not np.array_equal(self._frozen_at, theta):
             self(theta)
 
     def _balance(self, network, theta):
         factor = self.twin.load_factor(theta)
-        if self._hold:
-            self._drain_as_held(network)
+        if self._freeze:
+            self._set_frozen_outflows(network)
             if self._orifice is not None:
-                self._balance_held(network, factor, self._remainder)
+                self._balance_frozen(network, factor, self._remainder)
             return
         linear = network.load_state()
         if self.freeze_compliance:
             self.solved = True
-            self._drain_as_held(network)
+            self._set_frozen_outflows(network)
             self._balance_load(network, theta)
         else:
             super()._balance(network, theta)
         if network.outflows is not None:
-            positions, leaving = network.outflows
-            self._drains = positions / network.length, leaving
+            positions, outflow = network.outflows
+            self._outflows = positions / network.length, outflow
         if self._orifice is not None:
             p, q = network.load[1]
             self._remainder = (q - linear[1] / linear[0] * p) / factor
@@ -159,23 +168,23 @@ class DifferentiableForward(ForwardModel):
     @cached_property
     def _extended_for_compliance(self):
         wide, seen = super()._extended_for_compliance
-        wide._full.resumed = True
+        wide.compliance_solver.warm_start = True
         return wide, seen
 
     def __call__(self, theta):
         prediction = super().__call__(theta)
-        self._held_at = np.array(theta)
+        self._frozen_at = np.array(theta)
         return prediction
 
-    def _drain_as_held(self, network):
-        """The flows held leave `network`, where they did in shares of its length."""
-        if self._drains is not None:
-            shares, leaving = self._drains
-            network.outflows = shares * network.length, leaving
+    def _set_frozen_outflows(self, network):
+        """Set the frozen outflows of `network`, at the same shares of its length."""
+        if self._outflows is not None:
+            shares, outflow = self._outflows
+            network.outflows = shares * network.length, outflow
 
     @staticmethod
-    def _balance_held(network, factor, remainder):
-        """The load's state with the orifice's nonlinear remainder given."""
+    def _balance_frozen(network, factor, remainder):
+        """Set the state at the load of `network` with the orifice's `remainder` given."""
         p, q = network.load_state()
         value, remainder = q / p, factor * remainder
         a, b, c = network.load_relation()
@@ -188,7 +197,8 @@ class DifferentiableForward(ForwardModel):
         return float(p.value(theta[k] + h) - p.value(theta[k] - h)) / (2 * h)
 
     def _copies(self, theta: np.ndarray, base: FrequencyDomainLine) -> np.ndarray:
-        """Readings (S, 1 + N, F) at theta and with each parameter moved that goes together."""
+        """Readings (S, 1 + N, F) at theta and with each of the N parameters moved that are solved
+        side by side."""
         twin, rig, count = self.twin, self.twin.rig, len(self._together) + 1
         coordinates = np.repeat(theta[:, None], count, axis=1)
         coordinates[self._together, np.arange(1, count)] += STEP
@@ -247,16 +257,16 @@ class DifferentiableForward(ForwardModel):
         p, q = network.load_state()
         side_by_side.load = "state", (flat(p), flat(q))
         if base.outflows is not None:
-            at, leaving = base.outflows
-            side_by_side.outflows = at, np.tile(leaving, count)
+            at, outflow = base.outflows
+            side_by_side.outflows = at, np.tile(outflow, count)
         if self._orifice is not None:
-            self._balance_held(side_by_side, flat(v.load), flat(self._remainder))
+            self._balance_frozen(side_by_side, flat(v.load), flat(self._remainder))
         readings = side_by_side.readings().reshape(-1, *shape)
         return readings * np.broadcast_to(network.sensor_factor, readings.shape)
 
     def _sources(self, theta: np.ndarray, base: FrequencyDomainLine, shape: tuple) -> tuple:
-        """Flow and, effects left out, admittance of the source at theta and with each parameter
-        moved that goes together, both (1 + N, F)."""
+        """Flow and admittance of the source without effects, both (1 + N, F), at theta and with
+        each of the N parameters moved."""
         flow = np.array(np.broadcast_to(base.source_flow, shape))
         admittance = np.array(np.broadcast_to(self.source.at(theta)[1], shape))
         for k, (slope, curvature), own in self.source.changes:

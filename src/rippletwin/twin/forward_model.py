@@ -1,8 +1,8 @@
-"""The twin's forward model: all recordings' frequencies side by side in one network.
+"""The twin's forward model: the frequencies of all observations side by side in one line.
 
-Made once for a set of observations and called very often, so everything that does not depend on
-the parameters is worked out beforehand, and the costly friction functions are kept while their
-own parameters stand still (as they do in most columns of a finite-difference Jacobian).
+It is made once for a set of observations and called very often. What does not depend on the
+parameters is calculated once, and the costly friction functions are cached while their own
+parameters do not change (as in most columns of a finite-difference Jacobian).
 """
 
 from __future__ import annotations
@@ -25,17 +25,20 @@ from rippletwin.twin.flow_source import FlowSource
 if TYPE_CHECKING:
     from rippletwin.twin.twin import Arrays, Twin
 
-ROUGH = 1e-4  # of the pressure at an orifice, while the line's storage is known to less
-ABOVE = 3.0  # times the highest harmonic observed: those that reach it by way of the line
-NEXT = 3  # harmonics above the highest observed: those that reach it by way of the orifice
+COUPLED_ORIFICE_TOLERANCE = 1e-4  # of its pressure, while outflows are known to no better
+COMPLIANCE_BAND = 3.0  # simulated band over the observed one: nonlinear compliance couples down
+ORIFICE_HARMONICS = 3  # simulated above the highest observed: an orifice couples neighbours
 
 
 class ForwardModel:
     """Predictions for fixed observations: `forward(theta) -> list of (S, F) complex`.
 
-    theta is in the coordinates of `twin.parameters`. Pressures are in Pa (peak); a free source
-    has unit flow, its amplitude being the likelihood's business; an observation of the input
-    impedance is predicted as the reflection coefficient (1, F), see `reflection`.
+    theta is in the coordinates of `twin.parameters`. Pressures are in Pa (peak). A free source has
+    unit flow; the likelihood estimates its amplitude. An input impedance is predicted as the
+    reflection coefficient (1, F), see `reflection`.
+
+    observations may be `OperatingCondition`s. `slices` has each one's columns among all F; `solved`
+    says whether the nonlinear compliance of the last prediction is a steady state.
     """
 
     def __init__(self, twin: Twin, observations: Sequence):
@@ -69,15 +72,16 @@ class ForwardModel:
             self.load_impedance = _interpolate(
                 self.frequency_hz, rig.load.frequency_hz, rig.load.impedance
             )
-        self._friction = {}
+        self._series_cache = {}
         self._orifice = None
         self._ripples = [point.ripple for point in points]
         self._periodic = [r for r, ripple in enumerate(self._ripples) if ripple is not None]
         self.solved = True
-        self._full = NonlinearComplianceSolver([self.slices[r] for r in self._periodic], self.order)
+        periodic = [self.slices[r] for r in self._periodic]
+        self.compliance_solver = NonlinearComplianceSolver(periodic, self.order)
         if rig.load.kind == "orifice" and self._periodic:
             self._orifice = OrificeLoad(
-                [self.slices[r] for r in self._periodic],
+                periodic,
                 self.order,
                 np.array([points[r].load_pressure for r in self._periodic]) - self.back_pressure,
                 np.array([points[r].coefficient for r in self._periodic]),
@@ -85,16 +89,16 @@ class ForwardModel:
             )
 
     def __call__(self, theta: np.ndarray) -> list[np.ndarray]:
-        return self._observed(self.network(theta), theta)
+        return self._read(self.network(theta), theta)
 
     def unit_response(self, theta: np.ndarray) -> list[np.ndarray]:
         """Predictions for a unit flow at every frequency, in the shaft's frame, and a ripple so
         small that load and line are linear."""
         network = self._linear(theta)
         network.source_flow = self.source.turn(theta)
-        return self._observed(network, theta)
+        return self._read(network, theta)
 
-    def _observed(self, network: FrequencyDomainLine, theta: np.ndarray) -> list[np.ndarray]:
+    def _read(self, network: FrequencyDomainLine, theta: np.ndarray) -> list[np.ndarray]:
         """What each observation reads of `network`, (S, F)."""
         pressure = network.readings() if len(network.sensor_positions) else None
         impedance = None
@@ -110,18 +114,19 @@ class ForwardModel:
 
     @cached_property
     def has_nonlinear_compliance(self) -> bool:
-        """Whether the line stores something beyond proportion to the pressure."""
+        """Whether the line has a pressure-dependent compliance that a ripple excites."""
         return bool(self._periodic and self._linear(self.twin.theta).nonlinear_compliances)
 
     def network(self, theta: np.ndarray) -> FrequencyDomainLine:
-        """The line with source, effects and load at `theta`; an orifice's ripple is solved."""
+        """The line with source, effects and load at `theta`; nonlinear load and compliance are
+        solved at full amplitude."""
         network = self._linear(theta)
         if self._orifice is not None or (network.nonlinear_compliances and self._periodic):
             self._balance(network, theta)
         return network
 
     def _linear(self, theta: np.ndarray) -> FrequencyDomainLine:
-        """The same with a load for small ripple."""
+        """The same line for a small ripple."""
         twin, rig = self.twin, self.twin.rig
         v = twin.arrays(theta)
         series = np.array(
@@ -178,7 +183,7 @@ class ForwardModel:
         return factor * self.coefficient / (2 * np.sqrt(self.load_pressure - self.back_pressure))
 
     def _series(self, segment: int, diameter: float, viscosity: float) -> np.ndarray:
-        last, value = self._friction.get(segment, (None, None))
+        last, value = self._series_cache.get(segment, (None, None))
         if last != (diameter, viscosity):
             value = series_impedance(
                 self.s,
@@ -187,7 +192,7 @@ class ForwardModel:
                 diameter=diameter,
                 friction=self.twin.friction,
             )
-            self._friction[segment] = (diameter, viscosity), value
+            self._series_cache[segment] = (diameter, viscosity), value
         return value
 
     def _load(self, factor: float) -> tuple:
@@ -199,63 +204,67 @@ class ForwardModel:
         return kind, None
 
     def _balance(self, network: FrequencyDomainLine, theta: np.ndarray) -> None:
-        """Give `network` the full-amplitude state at its load, and what its line stores beyond."""
+        """Set the full-amplitude state at the load of `network`, and its outflows.
+
+        Both are solved in a model with harmonics above those observed.
+        """
         if network.nonlinear_compliances:
-            wide, seen, whole = self._widened(network, theta, self._extended_for_compliance)
-            law = wide._law(whole, theta, tolerance=min(ROUGH, wide._full.tolerance))
-            state = [x[seen] for x in wide._full.drain(whole, law)]
-            self.solved = wide._full.solved
-            positions, leaving = whole.outflows
-            network.outflows = positions, leaving[:, seen]
+            wide, seen, whole = self._extend_line(network, theta, self._extended_for_compliance)
+            solver = wide.compliance_solver
+            tolerance = min(COUPLED_ORIFICE_TOLERANCE, solver.tolerance)
+            solve_load = wide._load_solver(whole, theta, tolerance=tolerance)
+            state = [x[seen] for x in solver.solve(whole, solve_load)]
+            self.solved = solver.solved
+            positions, outflow = whole.outflows
+            network.outflows = positions, outflow[:, seen]
             if self._orifice is not None:
                 network.load = "state", tuple(state)
         elif self._orifice is not None:
-            wide, seen, whole = self._widened(network, theta, self._extended_for_orifice)
-            state = wide._law(whole, theta)(*whole.load_relation())
+            wide, seen, whole = self._extend_line(network, theta, self._extended_for_orifice)
+            state = wide._load_solver(whole, theta)(*whole.load_relation())
             network.load = "state", tuple(x[seen] for x in state)
 
     def _balance_load(self, network: FrequencyDomainLine, theta: np.ndarray) -> None:
-        """Give `network` the full-amplitude state at its load, its drains as they are."""
+        """Set the full-amplitude state at the load of `network`, whose outflows are given."""
         if self._orifice is not None:
-            state = self._law(network, theta)(*network.load_relation())
+            state = self._load_solver(network, theta)(*network.load_relation())
             network.load = "state", tuple(state)
 
-    def _law(self, network: FrequencyDomainLine, theta: np.ndarray, **accuracy: float):
-        """The load of `network`, (a, b, c) -> (p, q) where a p + b q = c; an orifice is not linear.
+    def _load_solver(self, network: FrequencyDomainLine, theta: np.ndarray, **accuracy: float):
+        """The function (a, b, c) -> (p, q) at the load of `network`, where a p + b q = c.
 
-        Where an effect changed the load, its linear part is the changed one.
+        An orifice's linear part is the load of `network`, with what effects made of it.
         """
         p, q = network.load_state()
         factor = self.twin.load_factor(theta)
 
-        def law(a, b, c):
+        def solve_load(a, b, c):
             if self._orifice is not None:
                 return self._orifice.solve(a, b, c, q / p, factor, network.opening, **accuracy)
             scale = c / (a * p + b * q)
             return scale * p, scale * q
 
-        return law
+        return solve_load
 
     @staticmethod
-    def _widened(network: FrequencyDomainLine, theta: np.ndarray, with_above: tuple) -> tuple:
-        """The forward model with harmonics above, where those of `network` are among its columns,
-        and its network at `theta`."""
-        wide, seen = with_above
+    def _extend_line(network: FrequencyDomainLine, theta: np.ndarray, extended: tuple) -> tuple:
+        """The extended model, the columns of `network` in it, and its line at `theta`."""
+        wide, seen = extended
         whole = wide._linear(theta)
         whole.source_flow[seen] = network.source_flow
         return wide, seen, whole
 
     @cached_property
     def _extended_for_compliance(self) -> tuple[ForwardModel, np.ndarray]:
-        return self._with_above(lambda top, step: ABOVE * top)
+        return self._extend(lambda top, step: COMPLIANCE_BAND * top)
 
     @cached_property
     def _extended_for_orifice(self) -> tuple[ForwardModel, np.ndarray]:
-        return self._with_above(lambda top, step: top + (NEXT + 0.5) * step)
+        return self._extend(lambda top, step: top + (ORIFICE_HARMONICS + 0.5) * step)
 
-    def _with_above(self, highest) -> tuple[ForwardModel, np.ndarray]:
-        """The same with the harmonics up to `highest` (top order, step) of every recording besides,
-        and where those observed are among its columns."""
+    def _extend(self, highest) -> tuple[ForwardModel, np.ndarray]:
+        """The model with more harmonics of every recording, up to the order `highest` (top order
+        observed, step), and the columns of those observed in it."""
         wide = list(self.observations)
         for r in self._periodic:
             o = wide[r]
@@ -276,15 +285,15 @@ def characteristic_impedance(fluid, segment) -> float:
 def reflection(impedance: np.ndarray) -> np.ndarray:
     """R = (z - 1)/(z + 1) of an impedance z over its reference, same shape.
 
-    |R| <= 1 for anything passive. An impedance runs over orders of magnitude between resonance
-    and antiresonance, and its error with it; that of R is about the same at all frequencies,
-    because R is what a wave brings back: the quantity the line itself is linear in.
+    |R| <= 1 for anything passive. An impedance varies by orders of magnitude between resonance
+    and antiresonance, and its error with it. The error of R, the wave that returns over the one
+    sent, is about the same at all frequencies.
     """
     return (impedance - 1.0) / (impedance + 1.0)
 
 
 def _rows(observation, names: list[str]) -> list[int]:
-    """Which of the rig's sensors an observation has."""
+    """Indices of an observation's sensors among the rig's."""
     if observation.kind == "input_impedance" or observation.sensors is None:
         return list(range(len(names)))
     return [names.index(getattr(s, "name", s)) for s in observation.sensors]

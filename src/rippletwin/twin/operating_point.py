@@ -1,4 +1,4 @@
-"""The steady state about which the ripple goes: mean pressure, mean flow, orifice coefficient."""
+"""The steady state of a recording: mean pressure, mean flow and orifice coefficient."""
 
 from __future__ import annotations
 
@@ -12,19 +12,18 @@ from rippletwin.errors import InputError
 from rippletwin.harmonics import flow_harmonics
 
 GUESSED_VELOCITY = 2.0
-"""Mean flow velocity (m/s) in the last segment where neither a flow ripple nor an orifice
-coefficient is known: oil lines run at half to six metres a second."""
+"""Mean flow velocity, m/s, in the last segment where neither a flow ripple nor an orifice
+coefficient is known; oil lines are designed for 0.5 to 6 m/s."""
 
-SET_SD = 0.005
-"""Relative standard deviation of a load pressure that an operator set and wrote down."""
+STATED_PRESSURE_SD = 0.005  # relative, of a load pressure that an operator set and wrote down
+SENSOR_MEAN_SD = 0.002  # relative, of a sensor's mean pressure
+STUDENT_DEGREES = 3.0
+"""Degrees of freedom of the errors of sensors' means: a sensor may be AC-coupled or have a gain
+error, which gives the distribution long tails."""
 
-MEAN_SD = 0.002
-"""The same of a sensor's mean pressure. Its errors have long tails: a sensor may be coupled without
-its mean, or have a gain of its own."""
-
-COUPLED = 0.3  # relative: a mean further off than this is no pressure
-DEGREES = 3.0  # of freedom of Student's distribution, which has such tails
-ROUNDS, SETTLED = 30, 1e-12
+MAX_MEAN_DEVIATION = 0.3  # relative: the mean of a sensor further off is no pressure
+MIN_FALL_SD = 0.01  # relative, of the pressure fall along the line
+MAX_ITERATIONS, CONVERGED = 30, 1e-12  # of reweighting; relative change of the pressure
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,7 @@ class OperatingCondition:
 
 
 class OperatingPoint(NamedTuple):
-    """Pressures in Pa, flow in m3/s, orifice coefficient in m3/s/sqrt(Pa); NaN where unknown.
+    """Load pressure in Pa, flow in m3/s, orifice coefficient in m3/s/sqrt(Pa); NaN where unknown.
 
     `ripple` is None where the source is free or known by definition (input impedance).
     """
@@ -81,9 +80,9 @@ class OperatingPoint(NamedTuple):
 
 
 def operating_point(rig: Rig, observation, ripple: FlowRipple | None) -> OperatingPoint:
-    """That of an observation whose source is `ripple`, with the data sheet's line.
+    """Operating point of an observation with the flow ripple `ripple` in the data sheet's line.
 
-    The coefficient is that of the data sheet, or what mean flow and load pressure give.
+    An orifice's coefficient is the data sheet's, else it follows from mean flow and load pressure.
     Raises InputError for an orifice load without a mean pressure.
     """
     load = rig.load
@@ -111,10 +110,12 @@ def operating_point(rig: Rig, observation, ripple: FlowRipple | None) -> Operati
 
 
 def _load_pressure(rig: Rig, observation, flow: float) -> float | None:
-    """Mean pressure before the load, as the recording's stated one and the sensors' means have it.
+    """Mean pressure before the load, Pa, estimated from the stated one and the sensors' means.
 
-    What entrained air holds goes with the pressure to the power -1.7, and an orifice's resistance
-    with the pressure itself: a stated pressure that is 0.3 % off leaves half a per cent of ripple.
+    Unknowns are the pressure and a factor on its calculated fall along the line. They are estimated
+    by iteratively reweighted least squares with Student's distribution for the sensors. The effort
+    pays: the compressibility of air goes with the pressure to the power -1.7 and an orifice's
+    resistance with the pressure, so that 0.3 % of pressure make 0.5 % of ripple.
     """
     stated = observation.load_pressure
     means = np.zeros(0) if observation.mean is None else np.atleast_1d(observation.mean)
@@ -126,23 +127,23 @@ def _load_pressure(rig: Rig, observation, flow: float) -> float | None:
     fall = np.array([_fall(rig, sensor.position, flow) for sensor in sensors]) / stated
     if len(fall) != len(means):
         return stated
-    told = np.abs(means / stated - 1.0) < COUPLED
-    fall, means = fall[told], means[told]
-    # Of the unknowns (pressure, share of the fall) those two and the sensors each say something.
+    used = np.abs(means / stated - 1.0) < MAX_MEAN_DEVIATION
+    fall, means = fall[used], means[used]
+    # Rows: prior of the pressure, prior of the factor, one for each sensor; all over `stated`.
     sheet = rig.uncertainty
-    known = np.hypot(sheet.viscosity, 4.0 * sheet.diameter)
+    fall_sd = max(np.hypot(sheet.viscosity, 4.0 * sheet.diameter), MIN_FALL_SD)
     rows = np.vstack([np.eye(2), np.column_stack([np.ones_like(fall), fall])])
     values = np.concatenate([[1.0, 1.0], means / stated])
-    sds = np.concatenate([[SET_SD, max(known, 0.01)], np.full(len(fall), MEAN_SD)])
-    weight, answer = 1.0 / sds**2, np.ones(2)
-    for _ in range(ROUNDS):
-        off = (rows[2:] @ answer - values[2:]) / sds[2:]
-        weight[2:] = (DEGREES + 1.0) / (DEGREES + off**2) / sds[2:] ** 2
-        weighted, before = rows.T * weight, answer
-        answer = np.linalg.solve(weighted @ rows, weighted @ values)
-        if np.max(np.abs(answer - before)) < SETTLED:
+    sds = np.concatenate([[STATED_PRESSURE_SD, fall_sd], np.full(len(fall), SENSOR_MEAN_SD)])
+    weight, estimate = 1.0 / sds**2, np.ones(2)
+    for _ in range(MAX_ITERATIONS):
+        off = (rows[2:] @ estimate - values[2:]) / sds[2:]
+        weight[2:] = (STUDENT_DEGREES + 1.0) / (STUDENT_DEGREES + off**2) / sds[2:] ** 2
+        weighted, before = rows.T * weight, estimate
+        estimate = np.linalg.solve(weighted @ rows, weighted @ values)
+        if np.max(np.abs(estimate - before)) < CONVERGED:
             break
-    return float(stated * answer[0])
+    return float(stated * estimate[0])
 
 
 def _fall(rig: Rig, position: float, flow: float) -> float:

@@ -1,8 +1,8 @@
-"""A physical parameter with its prior, and the coordinates in which every prior is N(0, 1).
+"""Parameters with priors, in the coordinates in which every prior is N(0, 1).
 
-Fits work in coordinates u. Then u = 0 is the data sheet, |u| is the pull on the prior in standard
-deviations, and minus the logarithm of the prior density is u^2/2 for every parameter. A parameter
-without a prior (`flat`) has a scale in its place and no pull.
+Fits work in coordinates u: u = 0 is the data sheet, |u| is the pull on the prior in standard
+deviations, and minus the logarithm of the prior density is u^2/2 plus a constant. A parameter
+without a prior (`flat`) has a scale instead, and no pull.
 """
 
 from __future__ import annotations
@@ -66,18 +66,10 @@ def coordinates(parameters: Sequence[Parameter], by_name: Mapping[str, float]) -
     )
 
 
-GUESSED_SD = 1.0
-"""Relative uncertainty of the load where its mean flow is but a guess (`operating_point`)."""
-
-
-BULK_MODULUS_SD = 0.1  # relative, of what the chambers hold: air and heat lower it
-
-
+GUESSED_LOAD_SD = 1.0  # relative, of the load where its mean flow is guessed (`operating_point`)
+BULK_MODULUS_SD = 0.1  # relative, of the liquid in the chambers: air and heat lower it
 PORT_TIMING_SD = 1.0  # deg, of the port plate's angle to the swash plate
-"""Standard deviations of the pump's numbers, where they are parameters (`pump.uncertain`)."""
-
-
-ANGLE_SCALE = 0.01  # rad, of the fit's coordinate: a few degrees of phase at the 9th harmonic
+ANGLE_SCALE = 0.01  # rad of shaft angle a coordinate: a few degrees of phase at the 9th harmonic
 
 
 def line_parameters(rig: Rig, guessed_load: bool) -> list[Parameter]:
@@ -105,7 +97,7 @@ def line_parameters(rig: Rig, guessed_load: bool) -> list[Parameter]:
     viscosity = lognormal(rig.fluid.kinematic_viscosity, sheet.viscosity)
     out.append(Parameter("viscosity", "m2/s", viscosity, place="fluid"))
     if rig.load.kind in ("orifice", "impedance"):
-        sd = GUESSED_SD if guessed_load else sheet.load
+        sd = GUESSED_LOAD_SD if guessed_load else sheet.load
         out.append(Parameter("load", "", lognormal(1.0, sd), place="load"))
     return out
 
@@ -124,15 +116,15 @@ def pump_parameters(rig: Rig) -> list[Parameter]:
 
 
 def angle_parameter(label: str) -> Parameter:
-    """Shaft angle at the first sample of the recording `label`; the data alone say it."""
+    """Shaft angle at the first sample of the recording `label`; only the data determine it."""
     prior, place = normal(0.0, ANGLE_SCALE), f"recording {label}"
     return Parameter(f"angle[{label}]", "rad", prior, place=place, flat=True)
 
 
 def effect_parameters(effects: Sequence, own: Sequence[Sequence[Parameter]]) -> list[Parameter]:
-    """Parameters `own` of each of the (effect, place) pairs, named after both.
+    """All parameters of (effect, place) pairs, `own` being each pair's, named after the pair.
 
-    Raises ValueError where an effect is twice at a place.
+    Raises ValueError where an effect occurs twice at a place.
     """
     labels = [f"{effect.name}@{place}" for effect, place in effects]
     if len(set(labels)) < len(labels):

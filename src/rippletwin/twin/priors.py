@@ -32,7 +32,7 @@ class Prior:
         return self.centre + self.scale * ndtr(u)
 
     def coordinate(self, x):
-        """Inverse of `value`; a uniform's ends are held off infinity.
+        """Inverse of `value`; a uniform's ends are clipped to finite coordinates.
 
         0 where the prior has no width: its parameter is exact, whatever x is.
         """

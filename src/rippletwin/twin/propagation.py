@@ -1,4 +1,4 @@
-"""From the flow of a pump to what the sensors read, through a twin's line in time."""
+"""Time-domain propagation of a pump's flow through a twin's line to its sensors."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from rippletwin.harmonics import one_period
 from rippletwin.line.time_domain import method_of_characteristics
 from rippletwin.line.time_domain.line_elements import End, Pipe, TimeDomainLine, capacitance
 from rippletwin.twin.effects.base import LineState
+from rippletwin.twin.twin import Twin
 
-PERIODS = 200  # at most, until the line repeats itself
+MAX_PERIODS = 200  # until the line is periodic
 
 
 def propagate(
-    twin,
+    twin: Twin,
     flow: np.ndarray,
     healthy_flow: np.ndarray,
     speed_hz: float,
@@ -30,13 +31,14 @@ def propagate(
 
     Parameters
     ----------
-    twin : calibrated, with the effects it was corrected by.
+    twin : calibrated, with the effects of its correction.
     flow, healthy_flow : (M,) m3/s at the pump outlet over one revolution, of the pump to simulate
-        and of the healthy one, whose mean settles the orifice that a faulty pump also meets; both
-        as the data sheet has them, what the twin knows better is added (`pump_change`).
+        and of the healthy one. The healthy mean determines the orifice, which a faulty pump meets
+        too. Both are the data sheet's pump; `pump_change` is added.
     speed_hz, load_pressure : rev/s, and Pa upstream of the load when the pump is healthy.
-    source_capacitance : m3/Pa of the chambers beside an ideal source, see `pump.source`.
-    steps : at least so many a revolution.
+    source_capacitance : m3/Pa of the chambers parallel to the flow source, see
+        `PumpRipple.source_capacitance`.
+    steps : least number of steps a revolution.
 
     Returns the `Transient` with M samples a revolution. The load factor of the twin scales orifice
     and mean flow alike, so that the load pressure stays that of the recording, as in the frequency
@@ -45,7 +47,7 @@ def propagate(
     line = line_in_time(twin, flow, healthy_flow, speed_hz, load_pressure, source_capacitance)
     count = method_of_characteristics.steps_a_period(line.pipes, line.period, steps)
     line.flow = resample(line.flow, count)
-    transient = method_of_characteristics.simulate(line, periods=PERIODS, tolerance=tolerance)
+    transient = method_of_characteristics.simulate(line, periods=MAX_PERIODS, tolerance=tolerance)
     return replace(
         transient,
         pressure=resample(transient.pressure, len(flow), axis=1),
@@ -54,7 +56,7 @@ def propagate(
 
 
 def line_in_time(
-    twin, flow, healthy_flow, speed_hz, load_pressure, source_capacitance=0.0
+    twin: Twin, flow, healthy_flow, speed_hz, load_pressure, source_capacitance=0.0
 ) -> TimeDomainLine:
     """The twin as a `TimeDomainLine`, every effect in it; arguments as `propagate`'s."""
     rig = twin.calibrated_rig()
@@ -63,7 +65,7 @@ def line_in_time(
             "rig.yaml", "load.kind", "a measured impedance has no time domain", "Give an orifice"
         )
     change, more = pump_change(twin, healthy_flow, speed_hz, load_pressure)
-    if source_capacitance:  # a ripple that was given is an ideal source
+    if source_capacitance:  # a given ripple is an ideal source
         source_capacitance += more
     factor = twin.values().get("load", 1.0)
     mean = nominal = float(np.mean(healthy_flow))
@@ -104,9 +106,9 @@ def line_in_time(
     return line
 
 
-def pump_change(twin, healthy_flow, speed_hz: float, load_pressure: float):
-    """Flow (M,), m3/s, and capacitance, m3/Pa, by which the source of a twin that knows its pump
-    better than the data sheet differs from the sheet's, healthy or not."""
+def pump_change(twin: Twin, healthy_flow, speed_hz: float, load_pressure: float):
+    """Flow (M,), m3/s, and capacitance, m3/Pa, that the twin's parameters of the pump add to the
+    data sheet's, for a healthy and for a faulty pump alike."""
     count, mean = len(healthy_flow), float(np.mean(healthy_flow))
     flow, capacity = np.zeros(count), 0.0
     pumping = np.array([2j * np.pi * speed_hz * twin.rig.pump.get("pistons", 1)])

@@ -1,4 +1,4 @@
-"""The twin: a rig whose numbers are uncertain, that predicts what its sensors read.
+"""The twin: a rig with uncertain parameters, which predicts what the sensors read.
 
 The parameter vector theta is in the coordinates of `parameters`: 0 is the data sheet
 and every prior is N(0, 1). Its entries, in this order (segments and recordings count from 1):
@@ -7,10 +7,10 @@ and every prior is N(0, 1). Its entries, in this order (segments and recordings 
     position[NAME]                          of each sensor
     viscosity                               kinematic
     load                                    factor on the orifice's coefficient or on the measured
-                                            load impedance; not there for other loads
+                                            load impedance; absent for other loads
     bulk_modulus, port_timing               of the pump, where `uncertain_pump` says so
-    angle[LABEL]                            shaft angle at a recording's first sample, rad: no prior
-    LABEL.NAME                              parameters of the effects, with priors of their own
+    angle[LABEL]                            shaft angle at a recording's first sample, rad; no prior
+    LABEL.NAME                              parameters of the effects, with their own priors
 
 An effect at its place is a pair (effect, place) of `rippletwin.twin.effects`; its LABEL is
 "name@place", as in "viscoelastic_wall@segment 2".
@@ -41,7 +41,7 @@ from rippletwin.twin.parameters import (
 )
 
 SOURCE_SD = 0.05
-"""Largest relative error of a nominal flow ripple's harmonic that is put down to the ripple."""
+"""Largest relative standard deviation of a nominal flow ripple's harmonics."""
 
 
 class Arrays(NamedTuple):
@@ -65,12 +65,12 @@ class Twin:
     friction : "none", "steady" (the paper) or "unsteady".
     effects : physics beyond that, applied in order.
     source_sd : largest relative standard deviation of a nominal ripple's harmonics.
-    theta : where the twin stands, (P,); nominal by default.
-    guessed_load : whether the orifice's coefficient is but a guess; by default it is where an
-        observation has neither a flow ripple nor a coefficient to tell the mean flow.
-    uncertain_pump : whether the pump's bulk modulus and port timing are parameters. They are only
-        where recordings have a nominal source and the data sheet gives the pump's geometry, from
-        which the lumped model tells what they change in the ripple.
+    theta : coordinates of the twin's own values, (P,); nominal by default.
+    guessed_load : whether the orifice's coefficient is only guessed; by default it is where an
+        observation has neither a flow ripple nor a coefficient from which the mean flow follows.
+    uncertain_pump : whether the pump's bulk modulus and port timing are parameters. They can be
+        only where recordings have a nominal source and the data sheet gives the pump's geometry,
+        from which the lumped model calculates how they change the ripple.
 
     Raises ValueError for an unknown friction or a theta of the wrong length.
     """
@@ -114,10 +114,10 @@ class Twin:
             raise ValueError(f"theta must have {len(self.parameters)} entries")
         self._ripples = {}
 
-    # what the parameters mean
+    # parameters and their values
 
     def values(self, theta: np.ndarray | None = None) -> dict[str, float]:
-        """Physical values by name, at `theta` (default: where the twin stands)."""
+        """Physical values by name, at `theta` (default: the twin's own)."""
         return coordinates.values(self.parameters, self.theta if theta is None else theta)
 
     def arrays(self, theta: np.ndarray) -> Arrays:
@@ -131,7 +131,7 @@ class Twin:
         return Arrays(a, d, lengths, x, u[k], self.load_factor(theta))
 
     def load_factor(self, theta: np.ndarray) -> float:
-        """What the load's coefficient is multiplied by at `theta`; 1 where it is no parameter."""
+        """Factor on the load's coefficient at `theta`; 1 where it is no parameter."""
         k = self.index.get("load")
         return 1.0 if k is None else self.parameters[k].value(theta[k])
 
@@ -146,21 +146,21 @@ class Twin:
 
     @property
     def friction_law(self) -> str:
-        """Of the line, with what the effects make of it."""
+        """Friction law of the line with its effects."""
         return next((e.friction for e, _ in self.effects if e.friction), self.friction)
 
     # predictions
 
     def predict(self, observations: Sequence, theta: np.ndarray | None = None) -> list[np.ndarray]:
-        """What the sensors read in each observation: list of (S, F) complex, see `Forward`.
+        """What the sensors read in each observation: list of (S, F) complex, see `ForwardModel`.
 
-        For many calls with the same observations make one `Forward` and keep it.
+        For many calls with the same observations make one `ForwardModel` and keep it.
         """
         return ForwardModel(self, observations)(self.theta if theta is None else np.asarray(theta))
 
     def operating_point(self, observation) -> OperatingPoint:
-        """Mean pressure and flow, orifice coefficient and source of an observation, see
-        `rippletwin.twin.operating_point`."""
+        """Mean pressure and flow, orifice coefficient and source of an observation or an
+        `OperatingCondition`."""
         ripple = None
         if observation.kind == "periodic" and observation.source != "free":
             ripple = observation.flow_ripple or self._pump_ripple(observation)
@@ -176,19 +176,18 @@ class Twin:
     ) -> np.ndarray:
         """Sensors' pressure harmonics (S, F) at shaft `orders` (F,) for any flow ripple, angle 0.
 
-        This is how faults are propagated: the ripple of a faulty pump through the twin as it
-        stands. The orifice keeps the coefficient that the healthy mean flow of `ripple` gives
-        where the data sheet has none.
+        This is how the ripple of a faulty pump is propagated in the frequency domain. Where the
+        data sheet gives no orifice coefficient, it follows from the mean flow of `ripple`.
         """
         twin = self if friction is None else self.with_(friction=friction)
         condition = OperatingCondition.at_orders(orders, speed_hz, load_pressure, ripple)
         return twin.predict([condition])[0]
 
     def reference_impedance(self, theta: np.ndarray, observation) -> float:
-        """What an input impedance is divided by, Pa s/m3: rho a/A of the first segment.
+        """Reference of an input impedance, Pa s/m3: rho a/A of the first segment.
 
-        A measurement given as a ratio is a ratio whatever the bore really is, so the model's own
-        is taken for it; one given in Pa s/m3 is divided by the data sheet's, as the data are.
+        A measurement given as a ratio remains one whatever the true bore, so its reference is the
+        model's own; one given in Pa s/m3 is divided by the data sheet's, as the data are.
         """
         first = self.rig.line[0]
         if observation.normalised:
@@ -214,7 +213,7 @@ class Twin:
         return twin
 
     def calibrated_rig(self) -> Rig:
-        """The rig with the values of where the twin stands: for the method of characteristics.
+        """The rig with the twin's own values, for the method of characteristics.
 
         The load factor goes into the orifice's coefficient where the data sheet gives one.
         """
@@ -231,24 +230,24 @@ class Twin:
         return replace(self.rig, line=line, sensors=sensors, load=load, fluid=fluid)
 
     def pump_changes(self, speed_hz: float, load_pressure: float) -> list[tuple]:
-        """(index, `RippleChange`) of each parameter of the pump, at rev/s into Pa; none where there
-        are no such parameters."""
+        """(index, `RippleChange`) of each parameter of the pump, at rev/s and load pressure in Pa;
+        empty where there are no such parameters."""
         if not self.uncertain_pump or not np.isfinite(load_pressure):
             return []
         from rippletwin.pump.ripple_sensitivity import ripple_change
 
-        rig, found = self.rig, []
+        rig, changes = self.rig, []
         for k in (self.index["bulk_modulus"], self.index["port_timing"]):
             p = self.parameters[k]
             ends = p.value(1.0), p.value(-1.0)
             change = ripple_change(
                 rig.pump, rig.fluid, 60.0 * speed_hz, load_pressure, p.name, ends
             )
-            found.append((k, change))
-        return found
+            changes.append((k, change))
+        return changes
 
     def _pump_ripple(self, observation) -> FlowRipple:
-        """The lumped pump model's ripple where the user gave none."""
+        """Ripple of the lumped pump model, for a recording without a flow ripple."""
         key = observation.speed_hz, observation.load_pressure
         if key not in self._ripples:
             from rippletwin.pump.outlets import ConstantPressure

@@ -28,6 +28,7 @@ FREQUENCY_BLOCKS = 8  # of a single spectrum, every second of which is held out
 class Validation:
     """Scores of the base ("before") and the explanation ("after"), in sample and held out.
 
+    calibrated    those of the plain calibration without effects; None if it was not made
     left_out      what each fold left out, in words
     disagreement  largest difference of an effect's parameter between a fold and the whole fit, in
                   standard deviations
@@ -37,6 +38,17 @@ class Validation:
     after: dict[str, Score]
     left_out: tuple[str, ...]
     disagreement: float
+    calibrated: dict[str, Score] | None = None
+
+    @property
+    def without_effects(self) -> dict[str, Score]:
+        """The best scores without effects: those of the base or of the plain calibration.
+
+        The base is fitted with an error model that leaves large residuals to an error of the
+        source. Its misfit would be an unfair figure beside that of an explanation.
+        """
+        candidates = [self.before] if self.calibrated is None else [self.before, self.calibrated]
+        return min(candidates, key=lambda scores: scores["in_sample"].misfit)
 
     @property
     def passes(self) -> bool:
@@ -66,15 +78,19 @@ class Validation:
 
 
 def cross_validate(
-    workers: Workers, base: Fit, best: Fit, late: Sequence | None = None
+    workers: Workers,
+    base: Fit,
+    best: Fit,
+    late: Sequence | None = None,
+    calibrated: Fit | None = None,
 ) -> Validation:
-    """Cross-validate the base and the best fit.
+    """Cross-validate the base and the best fit, and the plain calibration if there is one.
 
     The folds are operating points. With a single one, `late`, its late windows, are held out, or
     else blocks of frequencies. Every fold starts from the modes of the whole fits: the folds differ
     in their data only.
     """
-    fits = [base, best]
+    fits = [base, best] if calibrated is None else [base, best, calibrated]
     observations = workers.observations
     count = len(observations)
     if count > 1:
@@ -87,16 +103,17 @@ def cross_validate(
         refitted = _refit_folds(workers, fits, [(0,)])
     else:
         held_out, left_out, refitted = _refit_frequency_folds(workers, fits)
-    in_sample = [score_fit(fit, observations) for fit in fits]
-    outside = []
-    for which in range(2):
-        scores = [score_fit(fold[which], h, turn=True) for fold, h in zip(refitted, held_out)]
-        outside.append(Score(_rms([s.misfit for s in scores]), _rms([s.theil for s in scores])))
+    scores = []
+    for which, fit in enumerate(fits):
+        folds = [score_fit(fold[which], h, turn=True) for fold, h in zip(refitted, held_out)]
+        outside = Score(_rms([s.misfit for s in folds]), _rms([s.theil for s in folds]))
+        scores.append({"in_sample": score_fit(fit, observations), "held_out": outside})
     return Validation(
-        {"in_sample": in_sample[0], "held_out": outside[0]},
-        {"in_sample": in_sample[1], "held_out": outside[1]},
+        scores[0],
+        scores[1],
         left_out,
         max((_largest_difference(best, fold[1]) for fold in refitted), default=0.0),
+        None if calibrated is None else scores[2],
     )
 
 

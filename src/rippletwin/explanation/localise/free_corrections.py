@@ -46,7 +46,7 @@ class PositionProfile:
 
     @property
     def margin(self) -> float:
-        """Log Bayes factor between places that cannot be told apart."""
+        """Log Bayes factor between equivalent positions."""
         return EQUIVALENT_LOG_BAYES_FACTOR * max(self.residual_left, 1.0)
 
     def best_interval(self) -> tuple[str, float, float]:

@@ -88,4 +88,4 @@ def modulate_ripple(ripple: FlowRipple, modulation: complex) -> FlowRipple:
     spectrum = flow_harmonics(ripple, np.arange(count))
     flow = phase_modulate(spectrum, modulation, 4 * count)
     angle = 360.0 * np.arange(len(flow)) / len(flow)
-    return replace(ripple, angle_deg=angle, flow=flow, swing=modulation)
+    return replace(ripple, angle_deg=angle, flow=flow, modulation=modulation)

@@ -27,7 +27,7 @@ from rippletwin.explanation.localise.shaft_orders import (
 )
 from rippletwin.twin.forward_model import ForwardModel
 
-DRAWS = 100
+DRAWS = 60
 MIN_VALID_SHARE = 0.9  # of the draws for which the line has a finite response
 NORMAL_QUANTILE = 1.96
 

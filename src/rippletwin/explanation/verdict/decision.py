@@ -38,7 +38,7 @@ class Decision:
 
     verdict        one of VERDICTS
     accepted       the fit whose twin later stages use
-    equivalents    classes of effect names that cannot be told apart
+    equivalents    classes of effect names that fit equally well
     contradiction  for `bad_data`: what contradicts what, in words
     """
 

@@ -25,7 +25,7 @@ class Explanation:
     observations       as fitted
     search             base, best explanation and rivals
     alarms             of the base fit
-    validation         cross-validation of base and explanation
+    validation         cross-validation of base, explanation and plain calibration
     decision           the verdict and the accepted fit
     point_fits         the base fitted to each observation alone; empty for a single one
     source_free_fits   the leading fits of the search, with an unknown source
@@ -33,6 +33,7 @@ class Explanation:
     shaft_orders       ripple at orders that are no multiples of the number of pistons
     location           where the base lacks something; None where that cannot be said
     null_distribution  of the evidence without an effect, if it was asked for
+    calibrated         plain calibration without effects; None where nothing is explained
     """
 
     rig: Rig
@@ -47,6 +48,14 @@ class Explanation:
     shaft_orders: ShaftOrders | None = None
     location: MismatchLocation | None = None
     null_distribution: NullDistribution | None = None
+    calibrated: Fit | None = None
+
+    @property
+    def without_effects(self) -> Fit:
+        """The fit without effects whose scores are `validation.without_effects`."""
+        if self.validation.without_effects is self.validation.before:
+            return self.search.base
+        return self.calibrated
 
     @property
     def min_log_bayes_factor(self) -> float:

@@ -165,10 +165,16 @@ def _shaft_orders(shaft_orders: ShaftOrders | None) -> list[str]:
     """What the shaft orders indicate."""
     if shaft_orders is None or shaft_orders.name is None:
         return []
-    name = {"speed_fluctuation": "a speed fluctuation", "piston_spread": "a spread of the pistons"}
+    if shaft_orders.name == "speed_fluctuation":
+        effect = f"a speed fluctuation with a phase modulation of {shaft_orders.value:.2g} rad"
+    else:
+        effect = f"a spread of the pistons of {shaft_orders.value:.2g} of the mean flow"
+    if shaft_orders.interval is not None:
+        low, high = shaft_orders.interval
+        effect += f" (95 % interval {low:.2g} to {high:.2g})"
     return [
         f"Shaft orders between the piston orders have {shaft_orders.level:.1%} of the ripple and "
-        f"indicate {name[shaft_orders.name]}. They resemble a fault of a single piston."
+        f"indicate {effect}. They resemble a fault of a single piston."
     ]
 
 

@@ -197,7 +197,11 @@ def _stand_in(e: Explanation, entry: dict) -> dict:
 
 
 def _fit_scores(e: Explanation) -> dict:
-    """Misfits and model errors of the base ("before") and the accepted fit ("after")."""
+    """Misfits and model errors without effects ("before") and with them ("after").
+
+    The misfits before are the best that a calibration without effects reaches. The model error
+    before is that of the base.
+    """
 
     def scores(which):
         return {k: float(v.misfit) for k, v in which.items()} | {
@@ -205,7 +209,7 @@ def _fit_scores(e: Explanation) -> dict:
         }
 
     return {
-        "before": scores(e.validation.before),
+        "before": scores(e.validation.without_effects),
         "after": scores(e.validation.after),
         "model_error": {
             "before": float(e.search.base.model_error),

@@ -1,56 +1,57 @@
-"""Fixed points of functions of which one's solution leads to the next's.
+"""Anderson acceleration for a sequence of similar fixed-point problems x = f(x).
 
-Substitution mixed as Anderson does (1965, J. ACM 12:547): where x goes next is the value there less
-what, of the changes of value seen so far, would make the residual least. Each change takes one
-direction out in which substitution diverges. What has been seen is kept from one solution to the
-next, as Degroote, Bathe & Vierendeels (2009, Comput. Struct. 87:793) do from one time step to the
-next: where the function has changed little, a few passes are left.
+The next x is the present value f(x) less the combination of earlier changes of the value whose
+changes of the residual f(x) - x come closest to the present residual (Anderson 1965, J. ACM
+12:547). Each stored change removes one direction in which plain substitution diverges. The changes
+are kept from one problem to the next (Degroote, Bathe & Vierendeels 2009, Comput. Struct. 87:793,
+keep them from one time step to the next): where f has changed little, a few passes are enough.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-MAX_HISTORY = 30  # changes kept
+MAX_HISTORY = 30  # changes stored; beyond that the oldest is overwritten
 
 
-class AndersonMixing:
-    """Steps towards x, complex and of any one shape, with f(x) = x.
+class AndersonAcceleration:
+    """Iterates towards x = f(x) for complex x of any one shape.
 
-    Real and imaginary parts are mixed as unknowns of their own, for f need not be analytic.
+    Real and imaginary parts are separate unknowns, since f need not be analytic.
     """
 
     def __init__(self):
-        self._residuals = self._values = None
-        self._products = np.empty((MAX_HISTORY, MAX_HISTORY))
-        self._seen, self._last = 0, None
+        self._residuals = self._values = None  # changes (MAX_HISTORY, unknowns), of unit residual
+        self._products = np.empty((MAX_HISTORY, MAX_HISTORY))  # of the stored residuals
+        self._stored, self._last = 0, None
 
-    def begin(self) -> None:
-        """The function is another from here on, about as steep."""
+    def start(self) -> None:
+        """Begin the next problem: f is another function from here on, with a similar slope."""
         self._last = None
 
     def step(self, x: np.ndarray, value: np.ndarray) -> np.ndarray:
-        """Where to go from x, where the function has `value`."""
+        """The next x, same shape, after `value` = f(x)."""
         flat = np.ascontiguousarray(value).view(float).ravel()
         residual = flat - np.ascontiguousarray(x).view(float).ravel()
         if self._residuals is None:
             self._residuals, self._values = np.empty((2, MAX_HISTORY, flat.size))
         if self._last is not None:
-            self._see(residual - self._last[0], flat - self._last[1])
+            self._store(residual - self._last[0], flat - self._last[1])
         self._last = residual, flat
-        kept = min(self._seen, MAX_HISTORY)
-        towards = self._residuals[:kept] @ residual
-        share = np.linalg.lstsq(self._products[:kept, :kept], towards, rcond=1e-12)[0]
-        return (flat - share @ self._values[:kept]).view(complex).reshape(value.shape)
+        kept = min(self._stored, MAX_HISTORY)
+        projection = self._residuals[:kept] @ residual
+        weights = np.linalg.lstsq(self._products[:kept, :kept], projection, rcond=1e-12)[0]
+        return (flat - weights @ self._values[:kept]).view(complex).reshape(value.shape)
 
-    def _see(self, residual: np.ndarray, value: np.ndarray) -> None:
-        """Keep a change of both, of unit length lest a small one be lost beside the large."""
+    def _store(self, residual: np.ndarray, value: np.ndarray) -> None:
+        """Store a change of both, scaled to a unit change of the residual: unscaled, small changes
+        would be lost beside large ones in the least squares."""
         size = np.linalg.norm(residual)
         if not size > 0.0:
             return
-        k = self._seen % MAX_HISTORY
-        self._seen += 1
-        kept = min(self._seen, MAX_HISTORY)
+        k = self._stored % MAX_HISTORY
+        self._stored += 1
+        kept = min(self._stored, MAX_HISTORY)
         self._residuals[k], self._values[k] = residual / size, value / size
         row = self._residuals[:kept] @ self._residuals[k]
         self._products[k, :kept] = self._products[:kept, k] = row

@@ -4,13 +4,13 @@
 `rippletwin.twin.effects` change its arrays and append inserts; then it is asked for pressures,
 impedances or transfer matrices.
 
-Every answer comes from one sweep from the load to the pump in wave variables. Inside a segment
+Every result comes from one sweep from the load to the pump in wave variables. Inside a segment
 
     p = f + b,   q = (f - b)/Zc,   gamma = sqrt(Z'Y'),   Zc = gamma/Y'
 
-and a step of length d towards the pump multiplies f by exp(gamma d) and b by exp(-gamma d).
-The growing factor is taken out of both and put back as decay from the pump to the load, so
-nothing overflows however strong the loss, and only ratios of like-sized numbers are formed.
+and a step of length d towards the pump multiplies f by exp(gamma d) and b by exp(-gamma d). Both
+are divided by the growing factor, and the factors are restored as a decay from the pump to the
+load: nothing overflows however large the loss, and only numbers of like size are divided.
 (Transfer matrices of such lines: Wylie & Streeter 1993, Fluid Transients in Systems, ch. 12.)
 """
 
@@ -44,15 +44,15 @@ class FrequencyDomainLine:
     source_admittance  (F,) or scalar, m3/(Pa s), parallel to that source
     load               ("open" | "closed" | "anechoic", None), ("impedance", Z), ("admittance", Y)
                        or ("state", (p, q)): the ratio p:q at the load, in any scale
-    inserts            list of Insert or of like tuples; those at one position are met in list
-                       order from pump to load
+    inserts            list of Insert or of like tuples; those at one position follow each other in
+                       list order from pump to load
     sensor_positions   (S,) m from the pump outlet
     sensor_factor      (S, F) or broadcastable: what a sensor reads over the pressure at it
-    opening            (F,) of a valve at the load that follows the pressure, see `orifice`; what it
-                       does to a small ripple is an insert's
-    storage            what segments store beyond proportion to the pressure, at full amplitude
-    drains             (positions (N,), flows (N, F)) that leave the line whatever the pressure; for
-                       lines that let the ripple through, as with them no scale can be taken out
+    opening            (F,) of a valve at the load that follows the pressure, see `OrificeLoad`; its
+                       effect on a small ripple is an insert
+    nonlinear_compliances   list of `NonlinearCompliance`, for the ripple at full amplitude
+    outflows           (positions (N,), flows (N, F)) that leave the line whatever the pressure, for
+                       lines that the ripple passes: with them no scale can be taken out
     """
 
     s: np.ndarray
@@ -86,12 +86,13 @@ class FrequencyDomainLine:
         return self.respond(positions)[0]
 
     def flow_at(self, positions: np.ndarray) -> np.ndarray:
-        """Flow towards the load at `positions` (S,): (S, F) m3/s; beside an insert, pump's side."""
+        """Flow towards the load at `positions` (S,): (S, F) m3/s; beside an insert, on the pump's
+        side."""
         return self.respond(positions)[1]
 
     def input_impedance(self) -> np.ndarray:
         """p/q at x = 0 looking at the line, (F,) Pa s/m3, inserts at x = 0 included."""
-        entry = self._sweep([self.load_state()])[2]
+        entry = self.sweep([self.load_state()])[2]
         return entry[0, 0] / entry[0, 1]
 
     def load_state(self) -> tuple[np.ndarray | complex, np.ndarray | complex]:
@@ -116,9 +117,9 @@ class FrequencyDomainLine:
 
         This is Thévenin's theorem without its division, so it holds at resonance too.
         """
-        _, _, entry, decay = self._sweep([(1.0, 0.0), (0.0, 1.0)])
-        a, b, *drained = entry[:, 1] + self.source_admittance * entry[:, 0]
-        return a, b, self.source_flow * decay - sum(drained)
+        _, _, entry, decay = self.sweep([(1.0, 0.0), (0.0, 1.0)])
+        a, b, *forced = entry[:, 1] + self.source_admittance * entry[:, 0]
+        return a, b, self.source_flow * decay - sum(forced)
 
     def thevenin_at_load(self) -> tuple[np.ndarray, np.ndarray]:
         """Open-circuit pressure (F,) Pa and source impedance (F,) Pa s/m3 seen by the load."""
@@ -143,29 +144,28 @@ class FrequencyDomainLine:
             shunt=self.shunt,
             inserts=[(x - start, kind, value) for x, kind, value in inserts],
         )
-        _, _, entry, decay = part._sweep([(1.0, 0.0), (0.0, 1.0)])
+        _, _, entry, decay = part.sweep([(1.0, 0.0), (0.0, 1.0)])
         return (entry / decay).transpose(2, 1, 0)
 
     def respond(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pressure and flow (S, F) at `positions` with the network's own source and load."""
-        pressure, flow, entry, decay = self._sweep([self.load_state()], positions)
-        own, *drained = entry[:, 1] + self.source_admittance * entry[:, 0]
-        if not drained:
+        pressure, flow, entry, decay = self.sweep([self.load_state()], positions)
+        own, *forced = entry[:, 1] + self.source_admittance * entry[:, 0]
+        if not forced:
             scale = self.source_flow / own
             return pressure[:, 0] * scale, flow[:, 0] * scale
-        scale = (self.source_flow * decay - drained[0]) / own
+        scale = (self.source_flow * decay - forced[0]) / own
         return tuple((x[:, 0] * scale + x[:, 1]) / decay for x in (pressure, flow))
 
-    def _sweep(self, states: list, positions: np.ndarray = ()) -> tuple[np.ndarray, ...]:
-        """Carry m load states (p, q) up to x = 0: pressure and flow (S, m, F) at the positions,
+    def sweep(self, states: list, positions: np.ndarray = ()) -> tuple[np.ndarray, ...]:
+        """Propagate m load states (p, q) to x = 0: pressure and flow (S, m, F) at the positions,
         the pairs (m, 2, F) at x = 0, and the decay (F,) of the line.
 
-        What is met at x is scaled so that dividing by the decay of the whole line would give it
-        in the scale of `states`. Where there are drains, one more state follows: what they alone
-        make of a load at rest.
+        Divided by the decay of the whole line, all are in the scale of `states`. Where there are
+        outflows, one more state follows: their response with zero pressure and flow at the load.
         """
         count = len(self.s)
-        at, leaving = self.outflows or ((), np.empty((0, count), complex))
+        at, outflow = self.outflows or ((), np.empty((0, count), complex))
         load = np.zeros((len(states) + (self.outflows is not None), 2, count), complex)
         for given, (p, q) in zip(load, states):
             given[0], given[1] = p, q
@@ -178,18 +178,18 @@ class FrequencyDomainLine:
             np.array(self._plan(positions, at)),
             values,
             load,
-            np.ascontiguousarray(leaving, complex),
+            np.ascontiguousarray(outflow, complex),
             len(positions),
         )
 
-    def _plan(self, positions: np.ndarray, drains: np.ndarray) -> list[tuple[int, int, float]]:
+    def _plan(self, positions: np.ndarray, outflows: np.ndarray) -> list[tuple[int, int, float]]:
         """Steps (what, index, distance) from the load to x = 0, for `_sweep`."""
         starts = np.cumsum(self.lengths) - self.lengths
         starts, here = starts.tolist(), self.length
         # At one place inserts come before positions, the last of the list first.
         order = [(-float(x), 0, -k) for k, (x, _, _) in enumerate(self.inserts)]
         order += [(-float(x), 1, k) for k, x in enumerate(positions)]
-        order += [(-float(x), 2, k) for k, x in enumerate(drains)]
+        order += [(-float(x), 2, k) for k, x in enumerate(outflows)]
         order.sort()
         if order and (order[0][0] < -here * (1 + 1e-12) or order[-1][0] > 0.0):
             raise ValueError(f"a position lies outside the line of {here} m")
@@ -207,7 +207,7 @@ class FrequencyDomainLine:
             if what == 1:
                 plan.append((_RECORD, index, 0.0))
             elif what == 2:
-                plan.append((_DRAIN, index, 0.0))
+                plan.append((_OUTFLOW, index, 0.0))
             elif what == 0:
                 kind = self.inserts[-index][1]
                 if kind not in ("shunt", "series"):
@@ -217,12 +217,12 @@ class FrequencyDomainLine:
         return plan
 
 
-_ENTER, _WALK, _RECORD, _SHUNT, _SERIES, _DRAIN = range(6)
+_ENTER, _WALK, _RECORD, _SHUNT, _SERIES, _OUTFLOW = range(6)
 
 
 @njit(cache=True, error_model="numpy")
-def _sweep(series, shunt, plan, values, load, leaving, stops):
-    """Follow `plan` at every frequency for every load state; see `FrequencyDomainLine._sweep`."""
+def _sweep(series, shunt, plan, values, load, outflow, stops):
+    """Follow `plan` at every frequency for every load state; see `FrequencyDomainLine.sweep`."""
     states, count = load.shape[0], load.shape[2]
     pressure = np.empty((stops, states, count), np.complex128)
     flow = np.empty((stops, states, count), np.complex128)
@@ -249,11 +249,11 @@ def _sweep(series, shunt, plan, values, load, leaving, stops):
                 for m in range(states):
                     b[m] *= factors[n] * factors[n]
                     p[m], q[m] = f[m] + b[m], (f[m] - b[m]) / zc
-            elif what == _DRAIN:
-                gone = leaving[index, i] * behind
-                q[-1] += gone
-                f[-1] += 0.5 * zc * gone
-                b[-1] -= 0.5 * zc * gone
+            elif what == _OUTFLOW:
+                flow_out = outflow[index, i] * behind
+                q[-1] += flow_out
+                f[-1] += 0.5 * zc * flow_out
+                b[-1] -= 0.5 * zc * flow_out
             elif what == _SHUNT:
                 for m in range(states):
                     q[m] += values[index, i] * p[m]

@@ -1,12 +1,12 @@
-"""What a line stores beyond proportion to the pressure, at full amplitude and for many recordings.
+"""Pressure-dependent (nonlinear) compliance of a line at full amplitude, for many recordings.
 
 Where the compressibility depends on the pressure itself, a length dx stores g(p) dx beyond its
-linear part, the harmonics of one recording couple all along the line, and s g(p) dx leaves it as
-a flow of its own (`prescribed_outflows`). Substitution, together with the load's law, mixed
-(`anderson_acceleration`): g is a tenth or less of what the line stores in proportion, but at a
-sharp resonance the flows of one pass move the pressure as much as the source does, and at several
-of them by more: what is mixed must know as many directions as there are of these. Recordings do
-not couple, and each has directions of its own.
+linear part: the harmonics of one recording couple all along the line, and s g(p) dx is an outflow
+(`prescribed_outflows`). Outflows and the state at the load are found by fixed-point iteration with
+Anderson acceleration. g is a tenth or less of the linear storage, but at a sharp resonance the
+outflows of one pass change the pressure as much as the source does, and at several resonances by
+more: the acceleration must store as many directions as there are such resonances. Recordings do
+not couple, and each is accelerated separately.
 """
 
 from __future__ import annotations
@@ -19,22 +19,26 @@ from numba import njit
 from scipy.fft import next_fast_len
 
 from rippletwin.harmonics import one_period, peak_amplitudes
-from rippletwin.line.frequency_domain.anderson_acceleration import AndersonMixing
+from rippletwin.line.frequency_domain.anderson_acceleration import AndersonAcceleration
 from rippletwin.line.frequency_domain.prescribed_outflows import FundamentalSolutions
 
-A_WAVE = 2  # places on the shortest wave: what it takes up itself hardly matters
-PASSES, TOLERANCE = 80, 0.0005  # of a recording's largest flow: what a pass still changes
-HOPELESS = 25, 0.5  # passes after which this much must have been reached
-SHARES = (0.35, 0.7, 1.0)  # of what is stored, one after the other, where all at once fails
-FINE = 3  # samples a wave of the highest harmonic: what is folded of its square stays above half
-FURTHEST = 0.9  # of the law's pressure: there it is held
+CELLS_PER_WAVELENGTH = 2  # of the highest harmonic, which itself is hardly stored
+OUTFLOW_TOLERANCE = 0.0005  # change of the outflows in a pass over a recording's largest outflow
+MAX_PASSES = 80
+HOPELESS_PASSES, HOPELESS_CHANGE = 25, 0.5  # no better change after so many passes: give up
+CONTINUATION_SHARES = (0.35, 0.7, 1.0)  # of the outflows, in turn, where all at once fails
+SAMPLES_PER_HIGHEST_HARMONIC = 3  # the aliases of its square then fall above half of it
+MAX_RELATIVE_PRESSURE = 0.9  # |x| at which the law is clipped: the series diverges at 1
 
 
-class Storage(NamedTuple):
-    """Segment `segment` (from 0) of `area` (m2) stores the share sum_k c_k x^k, k = 2, 3 ..., of
-    its volume beyond its linear part where the pressure is x P above the mean.
+class NonlinearCompliance(NamedTuple):
+    """Law of one segment: it stores the share sum_k c_k x^k, k = 2, 3 ..., of its volume beyond its
+    linear part where the pressure is x P above the mean.
 
-    pressure (F,) is P in Pa and series (K, F) the c_k of the recording of each frequency.
+    segment   from 0
+    area      cross section, m2
+    pressure  (F,) P in Pa, of the recording of each frequency
+    series    (K, F) the c_k, likewise
     """
 
     segment: int
@@ -44,102 +48,108 @@ class Storage(NamedTuple):
 
 
 class NonlinearComplianceSolver:
-    """Which columns are harmonics of which recording; `slices`, `orders` as in `Orifice`.
+    """Solver for fixed recordings; `slices` and `orders` as of `OrificeLoad`.
 
     recordings  (columns, harmonics, samples a period) of each
-    tolerance   of what leaves, relative to a recording's largest flow
-    resumed     whether a solution begins where the last one ended: far fewer passes, and an answer
-                that is the same only to `tolerance`
-    solved      whether the last one is a steady state; else it is the nearest found to that
+    tolerance   relative change of the outflows at which an iteration ends
+    warm_start  whether a solution starts from the last one: far fewer passes, and a result that is
+                reproducible only to `tolerance`
+    solved      whether the last solution is a steady state; else it is the last iterate
     """
 
     def __init__(self, slices: Sequence[slice], orders: np.ndarray):
-        self.tolerance, self.resumed, self.solved = TOLERANCE, False, True
-        self._leaving, self._mixed = None, []
+        self.tolerance, self.warm_start, self.solved = OUTFLOW_TOLERANCE, False, True
+        self._outflow, self._accelerations = None, []
         self.recordings = []
         for part in slices:
             own = np.asarray(orders[part]).astype(int)
             harmonic = own // np.gcd.reduce(own)
-            self.recordings.append((part, harmonic, next_fast_len(FINE * int(harmonic.max() + 1))))
+            samples = next_fast_len(SAMPLES_PER_HIGHEST_HARMONIC * int(harmonic.max() + 1))
+            self.recordings.append((part, harmonic, samples))
 
-    def drain(self, network, law: Callable) -> tuple[np.ndarray, np.ndarray]:
-        """Give `network` the drains that its `storage` amounts to; returns the load's (p, q).
+    def solve(self, network, solve_load: Callable) -> tuple[np.ndarray, np.ndarray]:
+        """Set the outflows of `network` to what its nonlinear compliances store.
 
-        `law` (a, b, c) -> (p, q) at the load.
+        `solve_load` maps the line's relation (a, b, c), a p + b q = c, to the load's (p, q).
+        Returns that of the solution, each (F,).
         """
-        x, volume, of = _cells(network)
-        basis = FundamentalSolutions(network, x)
-        laws = []
+        x, volume, compliance = _cells(network)
+        line = FundamentalSolutions(network, x)
+        laws = []  # (cells, 1 + K) of P and the c_k, for each recording
         for part, _, _ in self.recordings:
             own = [
-                (s.pressure[part][0], *s.series[:, part][:, 0])
-                for s in network.nonlinear_compliances
+                (c.pressure[part][0], *c.series[:, part][:, 0])
+                for c in network.nonlinear_compliances
             ]
-            laws.append(np.array(own)[of])
+            laws.append(np.array(own)[compliance])
 
-        def stored(leaving):
-            pressure = basis.respond(law(*basis.relation(leaving)), leaving)
-            flow = np.zeros_like(leaving)
-            for own, (part, harmonic, samples) in zip(laws, self.recordings):
-                share = _share(own, pressure[:, part], harmonic, samples)
+        def stored(outflow):
+            pressure = line.pressure_under(solve_load(*line.load_relation(outflow)), outflow)
+            flow = np.zeros_like(outflow)
+            for law, (part, harmonic, samples) in zip(laws, self.recordings):
+                share = _stored_share(law, pressure[:, part], harmonic, samples)
                 flow[:, part] = network.s[part] * volume[:, None] * share
             return flow
 
-        leaving = self._steady(stored, (len(x), len(network.s)))
-        network.outflows = x, leaving
-        return law(*basis.relation(leaving))
+        outflow = self.find_fixed_point(stored, (len(x), len(network.s)))
+        network.outflows = x, outflow
+        return solve_load(*line.load_relation(outflow))
 
-    def _steady(self, stored: Callable, shape: tuple) -> np.ndarray:
-        """What leaves (N, F) where `stored` of it is the same, or the nearest found to that."""
+    def find_fixed_point(self, function: Callable, shape: tuple) -> np.ndarray:
+        """x of `shape` (N, F), complex, with function(x) = x; the last iterate where none is found.
+
+        Starts from the last solution (`warm_start`), then from zero, then from zero in steps of
+        CONTINUATION_SHARES.
+        """
         self.solved = False
-        if self.resumed and self._leaving is not None and self._leaving.shape == shape:
-            value = self._fixed_point(stored, self._leaving)
-        for shares in ((1.0,), SHARES):
+        if self.warm_start and self._outflow is not None and self._outflow.shape == shape:
+            value = self._iterate(function, self._outflow)
+        for shares in ((1.0,), CONTINUATION_SHARES):
             if self.solved:
                 break
-            self._mixed = [AndersonMixing() for _ in self.recordings]
+            self._accelerations = [AndersonAcceleration() for _ in self.recordings]
             value = np.zeros(shape, complex)
             for share in shares:
-                value = self._fixed_point(stored, value, share)
+                value = self._iterate(function, value, share)
                 if not self.solved:
                     break
-        self._leaving = value if self.solved else None
+        self._outflow = value if self.solved else None
         return value
 
-    def _fixed_point(self, function: Callable, x: np.ndarray, share: float = 1.0) -> np.ndarray:
-        """x (N, F), complex, with share function(x) = x, or as near as PASSES come."""
+    def _iterate(self, function: Callable, x: np.ndarray, share: float = 1.0) -> np.ndarray:
+        """Iterate from x (N, F) to share function(x) = x, at most MAX_PASSES times."""
         parts, reached = [part for part, *_ in self.recordings], np.inf
-        for mixed in self._mixed:
-            mixed.begin()
-        for done in range(1, PASSES + 1):
+        for acceleration in self._accelerations:
+            acceleration.start()
+        for done in range(1, MAX_PASSES + 1):
             value = share * function(x)
-            off, size = np.abs(value - x).max(axis=0), np.abs(value).max(axis=0)
-            error = max(off[part].max() / max(size[part].max(), 1e-300) for part in parts)
+            change, size = np.abs(value - x).max(axis=0), np.abs(value).max(axis=0)
+            error = max(change[part].max() / max(size[part].max(), 1e-300) for part in parts)
             reached = min(reached, error)
             self.solved = bool(error <= self.tolerance)
-            hopeless = done > HOPELESS[0] and reached > HOPELESS[1]
+            hopeless = done > HOPELESS_PASSES and reached > HOPELESS_CHANGE
             if self.solved or hopeless or not np.isfinite(error):
                 break
             x = x.copy()
-            for mixed, part in zip(self._mixed, parts):
-                x[:, part] = mixed.step(x[:, part], value[:, part])
+            for acceleration, part in zip(self._accelerations, parts):
+                x[:, part] = acceleration.step(x[:, part], value[:, part])
         return value
 
 
-def _share(law, pressure, harmonic, samples):
+def _stored_share(law, pressure, harmonic, samples):
     """Harmonics (cells, H) of the share stored, for those of the pressure; `law` (cells, 1 + K)
     holds P and the c_k."""
     wave = one_period(pressure, samples, harmonic)
-    _follow(law, wave)
+    _apply_law(law, wave)
     return peak_amplitudes(wave)[:, harmonic]
 
 
 @njit(cache=True)
-def _follow(law, wave):
-    """Pressures (cells, samples) become the shares stored."""
+def _apply_law(law, wave):
+    """Replace pressures (cells, samples) by the shares stored."""
     for law_here, row in zip(law, wave):
         for i in range(len(row)):
-            x = min(max(row[i] / law_here[0], -FURTHEST), FURTHEST)
+            x = min(max(row[i] / law_here[0], -MAX_RELATIVE_PRESSURE), MAX_RELATIVE_PRESSURE)
             share = 0.0
             for k in range(len(law_here) - 1, 0, -1):
                 share = (share + law_here[k]) * x
@@ -147,15 +157,15 @@ def _follow(law, wave):
 
 
 def _cells(network):
-    """Middles (N,) and volumes of cells of the storing segments, and which storage each is of."""
+    """Middles (N,) and volumes of the cells of nonlinear segments, and each cell's compliance."""
     ends = np.cumsum(network.lengths)
-    x, volume, of = [], [], []
-    for n, storage in enumerate(network.nonlinear_compliances):
-        k = storage.segment
-        turn = np.abs(np.sqrt(network.series[k] * network.shunt[k]).imag).max()
-        cells = int(np.ceil(network.lengths[k] * turn * A_WAVE / (2 * np.pi)))
+    x, volume, index = [], [], []
+    for n, compliance in enumerate(network.nonlinear_compliances):
+        k = compliance.segment
+        wavenumber = np.abs(np.sqrt(network.series[k] * network.shunt[k]).imag).max()
+        cells = int(np.ceil(network.lengths[k] * wavenumber * CELLS_PER_WAVELENGTH / (2 * np.pi)))
         length = network.lengths[k] / cells
         x.append(ends[k] - network.lengths[k] + length * (np.arange(cells) + 0.5))
-        volume.append(np.full(cells, length * storage.area))
-        of.append(np.full(cells, n))
-    return np.concatenate(x), np.concatenate(volume), np.concatenate(of)
+        volume.append(np.full(cells, length * compliance.area))
+        index.append(np.full(cells, n))
+    return np.concatenate(x), np.concatenate(volume), np.concatenate(index)

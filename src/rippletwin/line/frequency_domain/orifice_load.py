@@ -11,8 +11,8 @@ admittance, the valve's with it, and n(p) what the orifice's harmonics have beyo
 
     q = Y p + n(p),   a p + b (Y p + n(p)) = c,
 
-which couples the harmonics of one recording. Repeated substitution: |n|/|Y p| is about |p|/(4 P),
-a per cent or so, hence each pass gains about two digits.
+which couples the harmonics of one recording. It is solved by repeated substitution: |n|/|Y p| is
+about |p|/(4 P), a per cent or so, so that each pass gains about two digits.
 """
 
 from __future__ import annotations
@@ -22,17 +22,18 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
-MAX_PASSES, TOLERANCE = 50, 1e-10
-LOWEST_DROP = 1e-3  # of the mean pressure drop: the law is held there, to stay real
+MAX_PASSES = 50
+PRESSURE_TOLERANCE = 1e-10  # change in a pass over a recording's largest harmonic
+MIN_RELATIVE_DROP = 1e-3  # of the mean drop: the law is clipped there, to stay real
 
 
 class OrificeLoad:
-    """Which columns are harmonics of which recording.
+    """The orifice of fixed recordings.
 
-    slices  one a recording, of the F columns
+    slices  columns of each recording, of all F
     orders  (F,) shaft orders
-    drop, coefficient   one a recording: P in Pa and K in m3/s/sqrt(Pa) without a ripple
-    passes_flow         whether K is to let K sqrt(P) pass at the ripple that there is
+    drop, coefficient   of each recording: P in Pa and K in m3/s/sqrt(Pa) without a ripple
+    passes_flow         whether K is scaled so that the mean flow with a ripple is K sqrt(P)
     """
 
     def __init__(
@@ -55,13 +56,20 @@ class OrificeLoad:
         self._passes_flow = passes_flow
 
     def solve(
-        self, a, b, c, admittance, factor: float, opening=None, tolerance: float = TOLERANCE
+        self,
+        a,
+        b,
+        c,
+        admittance,
+        factor: float,
+        opening=None,
+        tolerance: float = PRESSURE_TOLERANCE,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Pressure and flow (F,) at the load for line relation a, b, c (F,) and `admittance` (F,).
 
-        `factor` multiplies the coefficients. `opening` (F,) is a valve's H, which `admittance` or
-        the line's relation has linearly. Columns of no recording get the linear answer.
-        `tolerance` is of the largest pressure.
+        `factor` multiplies the coefficients. `opening` (F,) is a valve's H; its linear part is
+        already in `admittance` or in the line's relation. Columns of no recording get the linear
+        solution. `tolerance` is relative to the largest harmonic of the pressure.
         """
         total = a + b * admittance
         coefficient = factor * self._coefficient
@@ -96,8 +104,8 @@ def _substitute(
                     _add(open_by, opening[k] * p[k] / (2.0 * drop[r]), m, cos, sin)
             passed = 0.0
             for i in range(samples):
-                held = np.sqrt(max(drop[r] + wave[i], LOWEST_DROP * drop[r]))
-                flow[i] = (1.0 + open_by[i]) * held
+                root_drop = np.sqrt(max(drop[r] + wave[i], MIN_RELATIVE_DROP * drop[r]))
+                flow[i] = (1.0 + open_by[i]) * root_drop
                 passed += flow[i] / samples
             scale = coefficient[r] * (root / passed if passes_flow else 1.0)
             for i in range(samples):
@@ -122,7 +130,7 @@ def _substitute(
 
 @njit(cache=True)
 def _add(wave, amplitude, harmonic, cos, sin):
-    """Put a harmonic of peak complex `amplitude` on a wave."""
+    """Add a harmonic of peak complex `amplitude` to a wave."""
     x, y = amplitude.real, amplitude.imag
     samples = len(wave)
     for i in range(samples):

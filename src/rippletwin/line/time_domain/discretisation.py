@@ -1,8 +1,8 @@
-"""A line cut into pipes and junctions, and its elements into steps of time.
+"""Discretisation of a line: segments into pipes and junctions, elements into steps of time.
 
-Elements and branches cut the segments. What stands between two pipes is a junction: a ladder of
-rungs in order from pump to load. A piece that is too short for cells of its own (less than three)
-is a rung too, by its pi section: half of its capacitance, its inertance, the other half.
+Elements and branches divide the segments. Between two pipes is a junction: a ladder of rungs in
+order from pump to load. A piece too short for cells of its own (fewer than three) becomes rungs
+too, its pi section: half of its capacitance, its inertance, the other half.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 
 from rippletwin.line.time_domain.line_elements import Element, Pipe, TimeDomainLine, capacitance
 
-SHORTEST = 3  # cells
-TOUCH = 1e-9  # m: closer than this is the same place
+MIN_CELLS = 3  # of a pipe; a shorter piece becomes a pi section
+SAME_POSITION = 1e-9  # m: positions closer than this are the same
 
 
 def bilinear(element: Element, dt: float) -> np.ndarray:
@@ -36,17 +36,17 @@ def bilinear(element: Element, dt: float) -> np.ndarray:
 
 
 def cells_of(pipe: Pipe, dt: float) -> float:
-    """Length in cells; one that is whole but for rounding counts as whole."""
+    """Length of a pipe in cells, whole numbers freed of rounding."""
     cells = pipe.length / (pipe.wave_speed * dt)
     return round(cells) if abs(cells - round(cells)) < 1e-9 * max(cells, 1) else cells
 
 
 def discretise(line: TimeDomainLine, dt: float) -> tuple[list[Pipe], list[float], list[list]]:
-    """Segments cut where elements are: pipes, their starts, and the rungs before each and last."""
+    """Divide the segments at the elements: pipes, their starts, and the rungs of each junction."""
     edges = np.concatenate([[0.0], np.cumsum([p.length for p in line.pipes])])
     if any(not 0.0 <= i.position <= edges[-1] * (1 + 1e-12) for i in line.inserts):
         raise ValueError(f"an element lies outside the line of {edges[-1]} m")
-    cuts = {i.position for i in line.inserts if np.min(np.abs(edges - i.position)) > TOUCH}
+    cuts = {i.position for i in line.inserts if np.min(np.abs(edges - i.position)) > SAME_POSITION}
     stops = np.array(sorted(set(edges) | cuts))
     at = [int(np.argmin(np.abs(stops - i.position))) for i in line.inserts]
     pipes, starts, joints = [], [], [list(line.source)]
@@ -56,7 +56,7 @@ def discretise(line: TimeDomainLine, dt: float) -> tuple[list[Pipe], list[float]
             parent = line.pipes[int(np.searchsorted(edges, before, side="right")) - 1]
             whole = abs((x - before) - parent.length) < 1e-12 * parent.length
             piece = parent if whole else replace(parent, length=float(x - before))
-            if whole or cells_of(piece, dt) >= SHORTEST:
+            if whole or cells_of(piece, dt) >= MIN_CELLS:
                 pipes.append(piece)
                 starts.append(float(before))
                 joints.append([])
@@ -70,7 +70,7 @@ def discretise(line: TimeDomainLine, dt: float) -> tuple[list[Pipe], list[float]
 
 
 def _pi_section(piece: Pipe, line: TimeDomainLine) -> list[Element]:
-    """A piece much shorter than the wave, its wall elastic and yielding."""
+    """A piece much shorter than the wave, with an elastic and a yielding wall."""
     piece, area = piece.linear(line.density), 0.25 * np.pi * piece.diameter**2
     half = 0.5 * area * piece.length / (line.density * piece.wave_speed**2)
     mass = line.density * piece.length / area

@@ -1,4 +1,4 @@
-"""A line cut into pipes, junctions and cells for the method of characteristics, and its state.
+"""Pipes, junctions and cells of a line for the method of characteristics, with their state.
 
 Pipes and junctions are those of `rippletwin.line.time_domain.discretisation`.
 """
@@ -9,27 +9,31 @@ import numpy as np
 
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
 from rippletwin.line.time_domain import moc_kernel, weighting_functions
-from rippletwin.line.time_domain.discretisation import TOUCH, bilinear, cells_of, discretise
+from rippletwin.line.time_domain.discretisation import SAME_POSITION, bilinear, cells_of, discretise
+from rippletwin.line.time_domain.kernel_arrays import JunctionArrays, PipeArrays, StateArrays
 from rippletwin.line.time_domain.line_elements import ENDS, Branch, TimeDomainLine
 
 
 class Grid:
-    """Pipes, junctions and their state as flat arrays. Raises ValueError as `moc.simulate`."""
+    """Pipes, junctions and their state as flat arrays, with the names of `kernel_arrays`.
+
+    Raises ValueError as `method_of_characteristics.simulate`.
+    """
 
     def __init__(self, line: TimeDomainLine):
         self.line, self.dt = line, line.period / len(line.flow)
         self.mean = float(np.mean(line.flow))
         self.pipes, self.starts, joints = discretise(line, self.dt)
         self.main = len(self.pipes)
-        self.thicker = [1.0] * self.main  # than the line's oil
-        self._rungs(joints)
-        self._lay()
-        self._losses()
-        self._end()
-        self._start()
+        self.viscosity_ratios = [1.0] * self.main
+        self._number_rungs(joints)
+        self._lay_nodes()
+        self._set_losses()
+        self._set_load()
+        self._set_steady_state()
 
-    def _rungs(self, joints):
-        """Rungs of all junctions one after the other; a branch's pipe comes after the line's."""
+    def _number_rungs(self, joints):
+        """Rungs of all junctions in a row; pipes of branches follow those of the line."""
         self.rungs = np.cumsum([0] + [len(joint) for joint in joints])
         self.ladder = [rung for joint in joints for rung in joint]
         self.kinds = np.zeros((len(self.ladder), 2), dtype=np.int64)
@@ -40,7 +44,7 @@ class Grid:
             if isinstance(rung, Branch):
                 self.kinds[r] = moc_kernel.BRANCH, len(self.pipes)
                 self.pipes.append(rung.pipe)
-                self.thicker.append(rung.viscosity_ratio)
+                self.viscosity_ratios.append(rung.viscosity_ratio)
                 self.starts.append(rung.position)
             else:
                 self.kinds[r, 0] = {"shunt": moc_kernel.SHUNT, "series": moc_kernel.SERIES}[
@@ -48,8 +52,8 @@ class Grid:
                 ]
                 self.filters[r] = bilinear(rung, self.dt)
 
-    def _lay(self):
-        """Nodes: first the left end, N cells on, then the right end theta cells further."""
+    def _lay_nodes(self):
+        """Nodes of each pipe: its left end, N cells on, and its right end theta cells further."""
         offsets, thetas, x, total = [], [], [], 0
         for k, (pipe, start) in enumerate(zip(self.pipes, self.starts)):
             dx, cells = pipe.wave_speed * self.dt, cells_of(pipe, self.dt)
@@ -71,7 +75,7 @@ class Grid:
             [[np.prod([(t - j) / (i - j) for j in age if j != i]) for i in age] for t in thetas]
         )
 
-    def _losses(self):
+    def _set_losses(self):
         """Per pipe Zc, r/2, u/2 and sum_k share_k phi_k; the recursions of friction and wall.
 
         share_k = kappa_k dt/(2 tau_k); over a step the wall's k-th state b follows the pressure
@@ -84,7 +88,7 @@ class Grid:
         for k, pipe in enumerate(self.pipes):
             area, radius = 0.25 * np.pi * pipe.diameter**2, 0.5 * pipe.diameter
             inertance = line.density / area * pipe.wave_speed * self.dt
-            rate = self.thicker[k] * line.viscosity / radius**2
+            rate = self.viscosity_ratios[k] * line.viscosity / radius**2
             soft = 0.0
             for m, (kappa, tau) in enumerate(pipe.creep):
                 x = self.dt / tau
@@ -107,8 +111,8 @@ class Grid:
         self.parameters = np.array(rows)
         self.decays, self.gains, self.bends = np.array(recursions).transpose(1, 0, 2).copy()
 
-    def _end(self):
-        """(law, coefficient, pressure, constant flow, conductance) of the load for the kernel."""
+    def _set_load(self):
+        """`load` for the kernel, see `JunctionArrays`."""
         end, laws = self.line.end, {"orifice": 2, "open": 1}
         if end.kind not in ENDS:
             raise ValueError(f"end must be one of {ENDS}, not {end.kind!r}")
@@ -123,7 +127,7 @@ class Grid:
         law = laws.get(end.kind, 0)
         self.load = (law, end.coefficient, end.pressure, constant, conductance)
 
-    def _steady(self, mean):
+    def _steady_pressure(self, mean):
         """Pressure at every node of the line, Pa, at a steady flow `mean`: it falls linearly."""
         end, after = self.line.end, 0.0
         exit_pressure = end.pressure
@@ -138,15 +142,16 @@ class Grid:
             after += drop * pipe.length
         return pressure
 
-    def _start(self):
-        """Steady flow of the mean."""
+    def _set_steady_state(self):
+        """Start from the steady flow of the mean."""
         reference = self.line.mean_flow if self.line.mean_flow is not None else self.mean
         count = self.offsets[-1]
         self.pressure, self.steady, self.flow = np.empty(count), np.empty(count), np.zeros(count)
-        self.pressure[: self.load_node + 1] = self._steady(self.mean)
+        self.pressure[: self.load_node + 1] = self._steady_pressure(self.mean)
         self.flow[: self.load_node + 1] = self.mean
-        self.steady[: self.load_node + 1] = steady = self._steady(reference)
-        self.references, self.state = np.zeros(len(self.filters)), np.zeros((len(self.filters), 2))
+        self.steady[: self.load_node + 1] = steady = self._steady_pressure(reference)
+        self.references = np.zeros(len(self.filters))
+        self.filter_states = np.zeros((len(self.filters), 2))
         for r, rung in enumerate(self.ladder):
             joint = int(np.searchsorted(self.rungs, r, side="right")) - 1
             node = self.load_node if joint == self.main else self.offsets[joint]
@@ -158,17 +163,17 @@ class Grid:
             now = self.mean, reference
             if rung.kind == "shunt":
                 now = self.pressure[node], steady[node]
-            self._rest(r, rung, *now)
+            self._set_filter(r, rung, *now)
         if self.line.end.valve is not None:
-            self._rest(-1, self.line.end.valve, self.pressure[self.load_node], steady[-1])
-        # A wall at rest holds b = phi p = follow/(1 - keep) p.
-        held = self.follow / np.where(self.share > 0.0, 1.0 - self.keep, 1.0)
+            self._set_filter(-1, self.line.end.valve, self.pressure[self.load_node], steady[-1])
+        # A wall at rest has b = phi p = follow/(1 - keep) p.
+        at_rest = self.follow / np.where(self.share > 0.0, 1.0 - self.keep, 1.0)
         sizes = np.diff(self.offsets)
-        self.strain = np.repeat(held.T, sizes, axis=1) * self.pressure
-        self.held = np.zeros((3, count))
+        self.strain = np.repeat(at_rest.T, sizes, axis=1) * self.pressure
+        self.stored = np.zeros((3, count))
         x = (self.pressure - self.steady) / np.repeat(np.maximum(self.laws[:, 0], 1.0), sizes)
         for power, c in enumerate(self.laws[:, 1:].T):
-            self.held[0] += np.repeat(c, sizes) * x ** (power + 1)
+            self.stored[0] += np.repeat(c, sizes) * x ** (power + 1)
         self.memory = np.zeros((len(weighting_functions.FRICTION_RATES), count))
         self.change, self.last_change = np.zeros(count), np.zeros(count)
         zc = np.repeat(self.parameters[:, 0], sizes)
@@ -181,48 +186,27 @@ class Grid:
         self.history[:, 0] = (self.forward[near] - more[:, 0] * loss[near])[:, None]
         self.history[:, 1] = (self.backward[last] + more[:, 0] * loss[last])[:, None]
 
-    def _rest(self, r, element, now, reference):
-        """The state of a filter that has long seen `now`."""
+    def _set_filter(self, r, element, now, reference):
+        """Set the steady state of a filter for the input `now`."""
         self.references[r] = reference
         u, (b0, _, b2, _, a2) = now - reference, self.filters[r]
         y = u * element.immittance(0.0)
-        self.state[r] = y - b0 * u, b2 * u - a2 * y
+        self.filter_states[r] = y - b0 * u, b2 * u - a2 * y
 
     def advance(self, nodes):
-        """One period: pressure and flow (len(nodes), M) at `nodes`, the state moved on."""
+        """One period: pressure and flow (len(nodes), M) at `nodes`; the state is updated."""
+        flow = np.asarray(self.line.flow, dtype=float)
         return moc_kernel.advance(
-            np.asarray(self.line.flow, dtype=float),
+            flow,
             nodes,
-            self.main,
-            self.offsets,
-            self.thetas,
-            self.taps,
-            self.parameters,
-            self.decays,
-            self.gains,
-            self.bends,
-            self.keep,
-            self.follow,
-            self.share,
-            self.laws,
-            self.rungs,
-            self.kinds,
-            self.filters,
-            self.references,
-            self.load,
-            self.pressure,
-            self.flow,
-            self.forward,
-            self.backward,
-            self.strain,
-            self.steady,
-            self.held,
-            self.memory,
-            self.change,
-            self.last_change,
-            self.history,
-            self.state,
+            self._arrays(PipeArrays),
+            self._arrays(JunctionArrays),
+            self._arrays(StateArrays),
         )
+
+    def _arrays(self, kind):
+        """The attributes of the grid that a tuple of `kernel_arrays` wants."""
+        return kind(*(getattr(self, name) for name in kind._fields))
 
     def locate(self, x):
         """(pipe, nearest node, distance from it to x towards the load, m)."""
@@ -230,13 +214,13 @@ class Grid:
             raise ValueError(f"position {x} m lies outside the line of {self.line.length} m")
         starts = np.array(self.starts[: self.main])
         ends = starts + [pipe.length for pipe in self.pipes[: self.main]]
-        # On an edge the pipe on the pump's side, whose flow has not passed the element there.
-        away = np.maximum(np.maximum(starts - x, x - ends), TOUCH)
+        # On an edge take the pipe on the pump's side: its flow has not passed the element there.
+        away = np.maximum(np.maximum(starts - x, x - ends), SAME_POSITION)
         k = int(np.argmin(away))
         nodes = np.arange(self.offsets[k], self.offsets[k + 1])
         node = int(nodes[np.argmin(np.abs(self.x[nodes] - x))])
         offset = x - self.x[node]
-        return k, node, 0.0 if abs(offset) < TOUCH else float(offset)
+        return k, node, 0.0 if abs(offset) < SAME_POSITION else float(offset)
 
     def shift(self, k, offset, pressure, flow):
         """Periodic pressure and flow (M,) a fraction of a cell further on, by the exact line."""

@@ -17,13 +17,12 @@ ENDS = ("orifice", "open", "closed", "anechoic", "resistance")
 
 @dataclass(frozen=True)
 class Pipe:
-    """Length and diameter in m, wave speed in m/s of the elastic wall; `creep` holds the terms
-    (kappa, tau in s) of what yields with delay:
+    """Length and diameter in m, wave speed in m/s of the elastic wall.
 
-        Y' = A s/(rho a^2) (1 + sum_k kappa_k/(1 + s tau_k))
-
-    and of its volume it stores the share sum_k c_k x^k besides, where the pressure is x P above
-    the steady state: `law` is (P in Pa, c_1, c_2 ...).
+    creep   terms (kappa, tau in s) of a retarded compliance:
+            Y' = A s/(rho a^2) (1 + sum_k kappa_k/(1 + s tau_k))
+    law     (P in Pa, c_1, c_2 ...) of a nonlinear compliance: the pipe also stores the share
+            sum_k c_k x^k of its volume where the pressure is x P above the steady state
     """
 
     length: float
@@ -37,13 +36,13 @@ class Pipe:
         return 1.0 + sum(kappa / (1.0 + s * tau) for kappa, tau in self.creep) + 0.0 * s
 
     def softened(self, added: float) -> Pipe:
-        """The pipe whose elastic Y' is 1 + `added` times as large, its delayed part as it was."""
+        """The pipe with an elastic Y' 1 + `added` times as large and the same retarded part."""
         more = 1.0 + added
         creep = tuple((kappa / more, tau) for kappa, tau in self.creep)
         return replace(self, wave_speed=self.wave_speed / np.sqrt(more), creep=creep)
 
     def linear(self, density: float) -> Pipe:
-        """The pipe for small ripple: what `law` stores is a slower wave."""
+        """The pipe for a small ripple: `law` becomes a lower wave speed."""
         if not self.law:
             return self
         added = density * self.wave_speed**2 * self.law[1] / self.law[0]
@@ -56,9 +55,9 @@ class Element:
 
     kind "shunt": the flow q = (N/D) p leaves the line; "series": the pressure falls by (N/D) q.
     `numerator` and `denominator` are coefficients of s, highest power first, s^2 at most, and N
-    at most one power higher than D. Sums are several elements at one position. They answer to
-    what differs from the steady state at the line's mean flow: what a leak draws from the mean is
-    in that flow already.
+    at most one power higher than D. Sums are several elements at one position. They respond to the
+    deviation from the steady state at the line's mean flow, in which their mean flows are already
+    contained.
     """
 
     position: float
@@ -87,8 +86,8 @@ class Branch:
 class End:
     """The load. kind and its numbers:
 
-    "orifice"     q = K (1 + y) sqrt(p - p0): `coefficient` K, `pressure` p0 behind it, and y what
-                  the `valve` N/D opens for what p differs from the steady state
+    "orifice"     q = K (1 + y) sqrt(p - p0): `coefficient` K, `pressure` p0 behind it, and y the
+                  response of the `valve` N/D to the deviation of p from the steady state
     "open"        p = p0
     "closed"      q = 0
     "anechoic"    q = q0 + (p - p0)/Zc, Zc that of the lossless last pipe, q0 the mean flow
@@ -108,9 +107,9 @@ class TimeDomainLine:
     pipes      pump first
     flow       (M,) m3/s of the pump at M even steps of a `period` (s)
     end        the load
-    density, kinematic viscosity, friction   as in `segment.series_impedance`
+    density, kinematic viscosity, friction   as in `pipe_immittance.series_impedance`
     positions  (S,) m where pressure and flow are wanted (flow beside an element: pump's side)
-    mean_flow  m3/s, the steady state that elements measure from; that of `flow` by default
+    mean_flow  m3/s of the steady state from which elements measure; that of `flow` by default
     source     shunt elements parallel to the pump; their position does not matter
     inserts    elements and branches on the line, those at one position in order from the pump
     load       elements right before the end, in order; their position does not matter

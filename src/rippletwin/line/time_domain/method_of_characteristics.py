@@ -1,16 +1,16 @@
 """The line in the time domain by the method of characteristics (Wylie & Streeter 1993, ch. 3).
 
-Pipes meet at junctions. A pipe of length L is cut into cells of exactly a dt, along which
-p + Zc q and p - Zc q arrive unchanged but for the losses, and one last cell of theta in [2, 3)
-such steps, which takes up the rest: through it the waves are delayed by theta dt, read from their
-last four values by Lagrange's cubic, which is passive for these theta and exact at theta = 2. So
-no wave speed is rounded to the grid, whatever dt. Over a cell the losses are trapezoidal:
+Pipes meet at junctions. A pipe of length L is divided into cells of exactly a dt, through which
+p + Zc q and p - Zc q travel unchanged but for the losses, and one last cell of theta in [2, 3) such
+steps for the rest. Through it the waves are delayed by theta dt: their last four values are
+interpolated by Lagrange's cubic, which is passive for these theta and exact at theta = 2. So no
+wave speed is rounded to the grid, whatever dt. Over a cell the losses are trapezoidal:
 
     p + Zc q = [p + Zc q]_foot - dx/2 (f + f_foot) - dt/2 sum_k kappa_k (e_k' + e_k'_foot)
 
-f = (rho/A)((8 nu/R^2) q + (4 nu/R^2) sum_k y_k): steady friction and `weighting`'s recursion for
-the unsteady part, both implicit at the new point; e_k' = (p - e_k)/tau_k: the retarded strains of
-a wall (or fluid) that yields with delay, Y' = A s/(rho a^2) (1 + sum_k kappa_k/(1 + s tau_k)),
+f = (rho/A)((8 nu/R^2) q + (4 nu/R^2) sum_k y_k): steady friction and the recursion of
+`weighting_functions` for the unsteady part, both implicit at the new point. e_k' = (p - e_k)/tau_k:
+the retarded strains of a wall or fluid with Y' = A s/(rho a^2) (1 + sum_k kappa_k/(1 + s tau_k)),
 integrated exactly for a p that is linear within the step. Elements at a junction are discretised
 by the trapezoidal rule and solved with the pipes at each step.
 """
@@ -38,7 +38,7 @@ class Transient:
     worst_position   where that is, m from the pump (of the junction, within a branch)
     converged        change below the tolerance
     periods          how many were computed
-    remainder        (n,) what of each segment is no whole number of cells, in cells, [0, 1)
+    remainder        (n,) part of each segment beyond whole cells, in cells, [0, 1)
     """
 
     pressure: np.ndarray
@@ -63,7 +63,7 @@ def steps_a_period(segments: Sequence[Pipe], period: float, at_least: int) -> in
 
 
 def simulate(line: TimeDomainLine, periods: int = 60, tolerance: float = 1e-6) -> Transient:
-    """Drive the line with its periodic flow, at steps of period/M, until it repeats itself.
+    """Simulate the line driven by its periodic flow, at steps of period/M, until it is periodic.
 
     Starts from the steady flow of the mean and stops when `tolerance` or `periods` is reached.
 
@@ -91,7 +91,7 @@ def simulate(line: TimeDomainLine, periods: int = 60, tolerance: float = 1e-6) -
         if offset != 0.0:
             pressure[k], rate[k] = grid.shift(pipe, offset, pressure[k], rate[k])
     for k, factor in line.sensors:
-        pressure[k] = _through(factor, pressure[k], line.period)
+        pressure[k] = _apply_filter(factor, pressure[k], line.period)
     dt = line.period / len(line.flow)
     return Transient(
         pressure=pressure[:-2],
@@ -104,7 +104,7 @@ def simulate(line: TimeDomainLine, periods: int = 60, tolerance: float = 1e-6) -
     )
 
 
-def _through(factor, signal: np.ndarray, period: float) -> np.ndarray:
+def _apply_filter(factor, signal: np.ndarray, period: float) -> np.ndarray:
     """A periodic signal (M,) after a linear filter H(s), harmonic by harmonic."""
     spectrum = np.fft.rfft(signal)
     s = 2j * np.pi * np.arange(len(spectrum)) / period

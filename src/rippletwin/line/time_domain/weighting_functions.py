@@ -13,8 +13,8 @@ J. Sound Vib. 39, 1, eq. 32)
 
     gamma - (gamma - 1) I2(r)/I0(r) = 1 + (gamma - 1) sum_n 4/(r^2 + j_n^2),   r^2 = s R^2 Pr/nu,
 
-j_n the zeros of J0: an endless sum of terms that yield with delay. Ten positive ones, hence
-passive, are fitted to it.
+j_n the zeros of J0: an infinite sum of retarded compliances. Ten positive ones, hence passive, are
+fitted to it.
 """
 
 from __future__ import annotations

@@ -1,13 +1,12 @@
-"""What an effect is: a piece of physics that a twin may lack, at a place it can be.
+"""The base of all effects: a piece of physics that a twin may lack, and its places on a rig.
 
-An effect is one file in this folder that defines `EFFECT`, an instance of `Effect`. The registry
-finds it there; nothing else changes. It says the same thing twice: `apply` mutates a network of
-the frequency domain (`FrequencyDomainLine`), `apply_in_time` a line of the time domain
-(`rippletwin.line.time_domain.line_elements.TimeDomainLine`): its pipes, elements, flow or sensors.
+An effect is one file in this folder that defines `EFFECT`, an instance of `Effect`; `library` finds
+it there. It states the same physics twice: `apply` changes a `FrequencyDomainLine`, `apply_in_time`
+a `TimeDomainLine` (its pipes, elements, flow or sensors).
 
-For `apply`, values may be floats or arrays of shape (B, 1) for B parameter sets at once:
-everything there is elementwise, so that a network with leading batch dimension is mutated by the
-same lines. `apply_in_time` gets floats and a `LineState` of one operating point.
+For `apply`, values are floats or arrays of shape (B, 1) for B parameter sets at once. Everything
+there is elementwise, so that the same statements change a line with a leading batch dimension.
+`apply_in_time` gets floats and the `LineState` of one operating point.
 """
 
 from __future__ import annotations
@@ -43,19 +42,19 @@ class Place:
 
 @dataclass
 class LineState:
-    """The numbers of the line at which an effect acts; each may carry a batch dimension (B, 1).
+    """The quantities of a line that effects use; each may have a batch dimension (B, 1).
 
     density          kg/m3
     viscosity        kinematic, m2/s
-    friction         law of the line with all its effects, as in `segment.series_impedance`
+    friction         law of the line with all its effects, as in `series_impedance`
     diameters, lengths   (n,) of m, wave_speeds (n,) of m/s: one entry a segment, pump first
     mean_pressure    Pa at the load, (F,) or scalar: each frequency's own operating point's
     load_resistance  static dp/dq of the load in Pa s/m3, (F,) or scalar; None where it has none
     heat_capacity_ratio, prandtl   of a gas, else None
     orders, recording, mean_flow   shaft order, recording's number and mean flow (m3/s) of each
                      frequency, (F,); None where there is no shaft
-    load_passes_flow whether the load's coefficient rests on that mean flow: what leaves the line
-                     before the load has not passed it
+    load_passes_flow whether the load's coefficient is calculated from that mean flow: a flow that
+                     leaves the line before the load must be subtracted
     """
 
     density: float
@@ -96,7 +95,7 @@ class LineState:
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """A piece of missing physics.
+    """A piece of physics that a twin may lack.
 
     name        as in a verdict
     element     kind of element it acts on: line, segment, position, load, source or sensor
@@ -108,10 +107,10 @@ class Effect:
     apply       (network: FrequencyDomainLine, state: LineState, values: name -> value, place)
                 mutates the network
     apply_in_time   (line: TimeDomainLine, state: LineState, values, place) mutates the line
-    named       False for a passive network that stands in for physics without a name
-    certain     no real line is without it: where something is missing at all, it is taken in
-                unless the data speak against it
-    friction    law that it puts in place of the line's, as in `segment.series_impedance`
+    named       False for a passive network that represents physics without a name
+    certain     always present in real lines: accepted with any other effect unless the data
+                contradict it
+    friction    law by which it replaces the line's, as in `series_impedance`
     """
 
     name: str
@@ -164,7 +163,7 @@ def sensor_places(rig) -> tuple[Place, ...]:
 
 
 def position_parameter(rig) -> Parameter:
-    """Distance from the pump outlet, uniform over the line; set out from twelve places."""
+    """Distance from the pump outlet, uniform over the line; fits start from twelve positions."""
     prior = uniform(0.0, sum(s.length for s in rig.line))
     return Parameter("position", "m", prior, tuple(ndtri((np.arange(12) + 0.5) / 12)))
 
@@ -176,7 +175,7 @@ def segment_at(lengths: np.ndarray, position) -> int:
 
 
 def on_line(network, position):
-    """`position` (m), held on the line, which a fit may have made a little shorter.
+    """`position` (m), clipped to the line, which a fit may have made a little shorter.
 
     `network` is a `FrequencyDomainLine` or a `TimeDomainLine`.
     """
@@ -184,7 +183,7 @@ def on_line(network, position):
 
 
 def scale_sensor(network, index: int, factor) -> None:
-    """Multiply what sensor `index` reads by `factor` (..., F)."""
+    """Multiply the reading of sensor `index` by `factor` (..., F)."""
     count = len(network.sensor_positions)
     shape = np.broadcast_shapes(np.shape(network.sensor_factor), (count, *np.shape(factor)))
     factors = np.array(np.broadcast_to(network.sensor_factor, shape), dtype=complex)

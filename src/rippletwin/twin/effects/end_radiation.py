@@ -1,7 +1,7 @@
-"""An open end radiates: it is a little longer than the tube, and a little lossy.
+"""Radiation of an open end, which lengthens the tube a little and loses sound.
 
-Without a flange the sound goes into the full space, with one into half of it, so that the same flow
-out of the end meets twice the pressure in phase with it. To a long wave, k R << 1,
+Without a flange the sound goes into the full space, with one into half of it: the same flow out of
+the end then meets twice the pressure in phase with it. For long waves, k R << 1,
 
     unflanged   Re Z_r = Zc (k R)^2/4,  delta = 0.6133 R    Levine & Schwinger 1948
     flanged     Re Z_r = Zc (k R)^2/2,  delta = 0.8217 R    Rayleigh 1896; Norris & Sheng 1989

@@ -1,7 +1,7 @@
 """Free air in the oil: a compressibility that falls with the pressure.
 
-To a small ripple it is a slower wave at one mean pressure and gives itself away at two. A ripple of
-a tenth of the mean feels it stiffen in its crests: what it holds beyond proportion to the pressure
+To a small ripple it is a lower wave speed, which two mean pressures tell from any other. A ripple
+of a tenth of the mean pressure meets a stiffer liquid in its crests: the nonlinear compliance
 couples the harmonics all along the line.
 """
 
@@ -13,23 +13,23 @@ import numpy as np
 from scipy.special import binom
 
 from rippletwin.case.model import ATMOSPHERE
-from rippletwin.line.frequency_domain.nonlinear_compliance import Storage
+from rippletwin.line.frequency_domain.nonlinear_compliance import NonlinearCompliance
 from rippletwin.twin.effects.base import Effect, line_place
 from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal, normal
 
-TERMS = 6  # of the series in x = p/mean: the next is 1e-3 of the second at x = 0.3
+SERIES_TERMS = 6  # in x = p/mean; the next is 1e-3 of the second at x = 0.3
 
 
 def gas_series(gas_fraction, exponent, mean_pressure):
-    """[c_1, c_2 ...] of the share sum_k c_k x^k of the volume by which free air gives way to x
-    times the mean pressure p, of -alpha (p_atm/p)^(1/n) ((1 + x)^(-1/n) - 1).
+    """[c_1, c_2 ...] of the volume share sum_k c_k x^k by which free air is compressed where the
+    pressure is x times the mean p above it: of -alpha (p_atm/p)^(1/n) ((1 + x)^(-1/n) - 1).
 
     `gas_fraction` alpha is by volume at the atmosphere's pressure, `exponent` n the polytropic one,
     `mean_pressure` in Pa absolute.
     """
     share = gas_fraction * (ATMOSPHERE / mean_pressure) ** (1.0 / exponent)
-    return [-share * binom(-1.0 / exponent, k) for k in range(1, TERMS + 1)]
+    return [-share * binom(-1.0 / exponent, k) for k in range(1, SERIES_TERMS + 1)]
 
 
 def _apply(network, state, values, place):
@@ -37,7 +37,9 @@ def _apply(network, state, values, place):
         mean = np.broadcast_to(state.absolute_pressure_in(k), np.shape(network.shunt[k]))
         first, *beyond = gas_series(values["gas_fraction"], values["polytropic_exponent"], mean)
         network.shunt[k] = network.shunt[k] + state.area(k) * network.s * first / mean
-        network.nonlinear_compliances.append(Storage(k, state.area(k), mean, np.array(beyond)))
+        network.nonlinear_compliances.append(
+            NonlinearCompliance(k, state.area(k), mean, np.array(beyond))
+        )
 
 
 def _apply_in_time(line, state, values, place):

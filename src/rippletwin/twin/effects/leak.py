@@ -18,30 +18,30 @@ from rippletwin.twin.effects.base import (
 from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal, uniform
 
-MOST_DRAWN = 0.5  # of the mean flow: more is no leak
+MAX_DRAWN_SHARE = 0.5  # of the mean flow: more is no leak
 REFERENCE_PRESSURE = 1e7  # Pa, at which the conductance is stated
 
 
 def leak_conductance(conductance, pressure_exponent, pressure):
     """dq/dp, m3/(Pa s), of a leak to the atmosphere from `pressure` (Pa); `conductance` is that at
     10 MPa. It takes the load's mean pressure, wherever the leak is."""
-    # Spectra may come without a mean pressure: then as at one atmosphere.
+    # Spectra may come without a mean pressure: then it is as at one atmosphere.
     relative = np.maximum(pressure, ATMOSPHERE) / REFERENCE_PRESSURE
     return conductance * relative ** (-pressure_exponent)
 
 
 def drawn_share(values, state):
-    """Share of the nominal mean flow that the leak draws and an orifice behind it never sees.
+    """Share of the nominal mean flow that the leak draws, so that it does not pass the orifice.
 
-    q = integral of G dp = G p/(1 - m). An orifice's coefficient is taken from the mean flow and the
-    load pressure, and its slope dq/dp = q/(2 p) is as much too large as the flow. Zero where the
-    load's coefficient is known otherwise.
+    q = integral of G dp = G p/(1 - m). The orifice's coefficient is calculated from mean flow and
+    load pressure; without this share its slope dq/dp = q/(2 p) would be too large in proportion.
+    Zero where the coefficient is given.
     """
     if not state.load_passes_flow:
         return 0.0
     exponent, pressure = values["pressure_exponent"], state.mean_pressure
     slope = leak_conductance(values["conductance"], exponent, pressure)
-    return np.minimum(slope * pressure / (1.0 - exponent) / state.mean_flow, MOST_DRAWN)
+    return np.minimum(slope * pressure / (1.0 - exponent) / state.mean_flow, MAX_DRAWN_SHARE)
 
 
 def _apply(network, state, values, place):
@@ -73,7 +73,7 @@ def _apply_in_time(line, state, values, place):
         values["conductance"], values["pressure_exponent"], state.mean_pressure
     )
     line.inserts.append(Element(on_line(line, values["position"]), "shunt", (conductance,)))
-    # An element answers to what differs from the steady state, so the draw leaves by the source.
+    # An element responds to deviations from the steady state: the mean draw leaves the source flow.
     share = float(drawn_share(values, state))
     line.end = replace(line.end, coefficient=line.end.coefficient * (1.0 - share))
     line.flow = line.flow - share * line.mean_flow

@@ -38,7 +38,7 @@ copyreg.pickle(Effect, lambda effect: (_by_name, (effect.name,)))
 def candidates(rig, named: bool = True) -> list[tuple[Effect, Place]]:
     """Every effect that the rig's medium allows, at every place it can be.
 
-    With `named` False the passive networks that stand in for effects without a name.
+    With `named` False the passive networks that represent physics without a name.
     """
     return [
         (effect, place)

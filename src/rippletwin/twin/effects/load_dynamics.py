@@ -1,4 +1,4 @@
-"""A load that answers with delay: a valve spool on its spring, or oil in the valve's passage."""
+"""A load that responds with delay: a valve spool on its spring, or oil in the valve's passage."""
 
 from __future__ import annotations
 

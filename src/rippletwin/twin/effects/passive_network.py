@@ -1,9 +1,9 @@
-"""A passive one-port of no particular physics, for what is missing and has no name.
+"""A passive one-port without particular physics, for what is missing and not in the library.
 
 Foster's second form: any lossless admittance is a sum of a capacitance, an inductance and series
-resonators; with resistances in them, every sum with positive elements is realisable, hence passive.
-A conductance, a capacitance and two resonators go far below 5 kHz. As a series impedance the dual
-network stands.
+resonators; with resistances in them, every sum of positive elements is realisable, hence passive.
+A conductance, a capacitance and two resonators describe most things below 5 kHz. For a series
+impedance the dual network is used.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ RESONATORS = ((500.0, "first"), (1800.0, "second"))  # prior median frequency in
 
 
 def _one_port(s, values, unit):
-    """Immittance in the unit of `unit`, a characteristic immittance."""
+    """Immittance of the network, `unit` being a characteristic admittance or impedance."""
     total = values["flat"] + s * values["rising"] / (2.0 * np.pi * 1000.0)
     for _, name in RESONATORS:
         w = 2.0 * np.pi * values[f"{name}_frequency"]

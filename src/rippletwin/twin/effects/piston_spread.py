@@ -1,6 +1,6 @@
-"""Pistons that are not all alike: lines at every shaft order, the lowest first.
+"""Unequal pistons: lines at every shaft order, the lowest strongest.
 
-They look like a fault of a single piston, and so are never absorbed silently.
+They look like a fault of a single piston, so that a twin must not absorb them silently.
 """
 
 from __future__ import annotations

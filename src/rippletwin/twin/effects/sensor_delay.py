@@ -1,4 +1,4 @@
-"""A sensor whose channel is late: unsynchronised acquisition, an anti-alias filter of its own."""
+"""A sensor whose channel is late: unsynchronised acquisition, a separate anti-alias filter."""
 
 from __future__ import annotations
 

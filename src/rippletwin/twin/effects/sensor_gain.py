@@ -1,4 +1,4 @@
-"""A sensor with a wrong calibration factor. Only ratios of gains are seen without the source."""
+"""A sensor with a wrong calibration factor. Without a known source only ratios show."""
 
 from __future__ import annotations
 

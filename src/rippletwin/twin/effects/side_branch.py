@@ -21,7 +21,7 @@ from rippletwin.twin.priors import lognormal
 def branch_admittance(s, length, diameter, wave_speed, density, viscosity, friction):
     """Input admittance sqrt(Y'/Z') tanh(l sqrt(Z' Y')) of a closed branch, m3/(Pa s).
 
-    `s` (F,) in 1/s, the rest in SI units, broadcast; `friction` as in `segment.series_impedance`.
+    `s` (F,) in 1/s, the rest in SI units, broadcast; `friction` as in `series_impedance`.
     """
     series = series_impedance(
         s, density=density, viscosity=viscosity, diameter=diameter, friction=friction
@@ -62,8 +62,8 @@ EFFECT = Effect(
         position_parameter(rig),
         Parameter("length", "m", lognormal(0.4, 0.8), (-1.2, 0.0, 1.2)),
         Parameter("diameter", "m", lognormal(0.6 * rig.line[0].diameter, 0.5)),
-        # Oil that stands in a dead end is as cold as the room, and fittings add a loss to its own:
-        # at resonance that alone decides how sharp the notch is.
+        # Oil in a dead end is as cold as the room, and fittings add losses: at resonance these
+        # alone determine how sharp the notch is.
         Parameter("viscosity_ratio", "1", lognormal(1.0, 1.0)),
     ),
     places=position_place,

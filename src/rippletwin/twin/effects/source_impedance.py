@@ -1,4 +1,4 @@
-"""The pump is no ideal flow source: outlet volume and leakage are parallel to its flow."""
+"""A pump that is no ideal flow source: outlet volume and leakage are parallel to its flow."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The shaft does not turn evenly: sidebands a shaft order beside every piston order."""
+"""A shaft of fluctuating speed: sidebands one shaft order from every piston order."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from rippletwin.twin.effects.base import Effect, line_place
 
 
 def thermal_factor(s, viscosity, diameter, heat_capacity_ratio, prandtl):
-    """gamma - (gamma - 1) I2(r)/I0(r), r = R sqrt(s Pr/nu): what multiplies the adiabatic Y'.
+    """gamma - (gamma - 1) I2(r)/I0(r), r = R sqrt(s Pr/nu): the factor on the adiabatic Y'.
 
     Broadcast over a batch of viscosities and diameters.
     """
@@ -29,7 +29,7 @@ def _apply(network, state, values, place):
 
 
 def _apply_in_time(line, state, values, place):
-    # The isothermal layer is a wall that yields with delay, a sum of exponentials.
+    # The isothermal layer acts as a retarded compliance of the wall, a sum of exponentials.
     for k, diameter in enumerate(state.diameters):
         rate = 4.0 * state.viscosity / (state.prandtl * diameter**2)
         terms = conduction_terms(rate, state.heat_capacity_ratio)

@@ -11,7 +11,7 @@ from rippletwin.twin.effects.base import Effect, line_place
 def friction_excess(s, viscosity, diameter, density):
     """Z'_unsteady - Z'_steady, Pa s/m4, broadcast over a batch of viscosities and diameters.
 
-    Bessel functions are the cost: they are evaluated once for each distinct nu/R^2 of the batch.
+    Bessel functions take the time: they are evaluated once for each distinct nu/R^2 of the batch.
     """
     rate = np.atleast_1d(4.0 * viscosity / diameter**2)
     distinct, inverse = np.unique(rate, return_inverse=True)
