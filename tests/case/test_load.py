@@ -9,7 +9,7 @@ from nptdms import ChannelObject, TdmsWriter
 from case_folders import RATE, ripple, sheet, write_case, write_hdf5
 from paths import MEASURED, ROOT
 from rippletwin.case.load import load_case
-from rippletwin.case.rig_yaml import schema
+from rippletwin.case.schema_errors import schema
 from rippletwin.cli import main
 from rippletwin.spectra.observation import observe
 

@@ -19,10 +19,10 @@ from rippletwin.case.model import (
     Sensor,
     Uncertainty,
 )
-from rippletwin.case.plausibility import implausible
+from rippletwin.case.plausibility import unusual_values
 from rippletwin.case.readers.registry import read_signals
-from rippletwin.case.rig_yaml import find_sheet, read_sheet, schema_errors
-from rippletwin.case.sheet_checks import sheet_errors
+from rippletwin.case.rig_yaml import faults, find_sheet, parse_sheet
+from rippletwin.case.sheet_checks import missing_files
 from rippletwin.case.signal_checks import sampling_rate, signal_errors
 from rippletwin.errors import InputError, raise_any
 
@@ -48,19 +48,19 @@ def load_case(folder: str | Path, states: Collection[str] | None = None) -> Case
         raise ValueError(f"unknown states {sorted(strange)}; known: {', '.join(STATE_CODES)}")
     sheet_path = find_sheet(folder)
     folder = sheet_path.parent
-    sheet = read_sheet(sheet_path)
-    errors, warnings = implausible(sheet_path, sheet)
-    raise_any([*schema_errors(sheet_path, sheet), *sheet_errors(sheet_path, sheet), *errors])
+    sheet = parse_sheet(sheet_path)
+    raise_any([*faults(sheet_path, sheet), *missing_files(sheet_path, sheet)])
     rig = _rig(folder, sheet)
-    recordings, faults = [], []
+    recordings, errors = [], []
     for entry in sheet["recordings"]:
         if states is not None and entry["state"] not in states:
             continue
         try:
             recordings.append(_recording(folder, entry, rig))
         except InputError as error:
-            faults.append(error)
-    raise_any(faults)
+            errors.append(error)
+    raise_any(errors)
+    warnings = unusual_values(sheet_path, sheet)
     return Case(folder=folder, rig=rig, recordings=tuple(recordings), warnings=tuple(warnings))
 
 

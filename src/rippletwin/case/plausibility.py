@@ -22,8 +22,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from rippletwin.case.rig_yaml import leaves
-from rippletwin.case.sheet_checks import entries, line_length, mapping, number
+from rippletwin.case.sheet_values import entries, leaves, line_length, mapping, number
 from rippletwin.errors import InputError
 
 
@@ -109,24 +108,31 @@ SMALLEST_PRESSURE = 1000.0  # Pa; a pressure below it other than 0 is most likel
 KELVIN = 273.15
 
 
-def implausible(path: Path, sheet: dict) -> tuple[list[InputError], list[str]]:
-    """Errors and warnings (one line of text each) for values of a sheet that cannot be right."""
+def implausible_values(path: Path, sheet: dict) -> list[InputError]:
+    """An error for every value of a sheet that cannot be right, by itself or beside another."""
+    errors = [error for found, _ in _compared(path, sheet) for error in found]
+    wrong = {error.field for error in errors}
+    errors += (e for fields, e in _contradictions(path, sheet) if wrong.isdisjoint(fields))
+    return errors
+
+
+def unusual_values(path: Path, sheet: dict) -> list[str]:
+    """A line of text for every value of a sheet that is possible, but unusual."""
+    return [warning for _, found in _compared(path, sheet) for warning in found]
+
+
+def _compared(path: Path, sheet: dict) -> Iterator[tuple[list[InputError], list[str]]]:
+    """Errors and warnings of each value of a sheet that has a range."""
     ranges = GAS if "heat_capacity_ratio" in mapping(sheet, "fluid") else LIQUID
-    errors, warnings = [], []
     for field, value in leaves(sheet):
         allowed = ranges.get(re.sub(r"\[\d+\]", "", field))
         good = isinstance(value, (int, float)) and not isinstance(value, bool)
-        # what is not above zero where it must be is the schema's matter
         if allowed is None or not good or not math.isfinite(value):
             continue
+        # what is not above zero where it must be is the schema's matter
         if (value == 0 and allowed.zero) or (value <= 0 and allowed.possible[0] > 0):
             continue
-        error, warning = _compare(path, field, value, allowed)
-        errors += error
-        warnings += warning
-    reported = {error.field for error in errors}
-    errors += (e for fields, e in _contradictions(path, sheet) if reported.isdisjoint(fields))
-    return errors, warnings
+        yield _compare(path, field, value, allowed)
 
 
 def _compare(

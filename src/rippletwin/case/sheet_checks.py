@@ -1,4 +1,4 @@
-"""What the schema of rig.yaml cannot say: files exist, kinds have their keys, names are unique.
+"""What the schema of rig.yaml cannot say: kinds have their keys, names are unique, files exist.
 
 A sheet is a mapping that may still violate its schema: every fault is found at once, so each check
 looks only at values of the right type.
@@ -6,10 +6,10 @@ looks only at values of the right type.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
 
+from rippletwin.case.sheet_values import entries, line_length, mapping, number
 from rippletwin.errors import InputError, printable
 
 LONGEST_LABEL = 100
@@ -18,38 +18,13 @@ SAME_PLACE = 1e-3  # m; closer together two sensors are one
 
 
 def sheet_errors(path: Path, sheet: dict) -> list[InputError]:
-    """Every fault of a sheet that concerns several of its values, or files beside it."""
+    """Every fault of a sheet that concerns several of its values."""
     return [
         *_load_errors(path, sheet),
         *_sensor_errors(path, sheet),
         *_recording_errors(path, sheet),
         *_label_errors(path, sheet),
     ]
-
-
-def mapping(sheet: object, key: str) -> dict:
-    """The mapping under a key; empty where there is none."""
-    value = sheet.get(key) if isinstance(sheet, dict) else None
-    return value if isinstance(value, dict) else {}
-
-
-def entries(sheet: dict, key: str) -> list[dict]:
-    """The mappings in the list under a key; one that is no mapping stands as an empty one."""
-    value = sheet.get(key)
-    return [e if isinstance(e, dict) else {} for e in value] if isinstance(value, list) else []
-
-
-def number(sheet: dict, key: str) -> float | None:
-    """The finite number under a key; None where there is none."""
-    value = sheet.get(key)
-    good = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return float(value) if good and math.isfinite(value) else None
-
-
-def line_length(sheet: dict) -> float | None:
-    """Length of the line, m; None where a segment's is not a number."""
-    lengths = [number(segment, "length") for segment in entries(mapping(sheet, "line"), "segments")]
-    return None if not lengths or None in lengths else sum(lengths)
 
 
 def _load_errors(path: Path, sheet: dict) -> Iterator[InputError]:
@@ -64,8 +39,6 @@ def _load_errors(path: Path, sheet: dict) -> Iterator[InputError]:
             "missing" if kind == "impedance" else f"given, but the load's kind is {kind}",
             "A load of kind impedance names its file in the key impedance; no other kind does",
         )
-    elif "impedance" in load:
-        yield from _missing_file(path, "load.impedance", load["impedance"])
 
 
 def _sensor_errors(path: Path, sheet: dict) -> Iterator[InputError]:
@@ -110,12 +83,6 @@ def _recording_errors(path: Path, sheet: dict) -> Iterator[InputError]:
     for index, entry in enumerate(entries(sheet, "recordings")):
         field = f"recordings[{index}]"
         kind = entry.get("kind", "periodic")
-        for key in ("file", "flow_ripple"):
-            if key in entry:
-                yield from _missing_file(path, f"{field}.{key}", entry[key])
-        repeats = entry.get("repeats")
-        for count, name in enumerate(repeats if isinstance(repeats, list) else []):
-            yield from _missing_file(path, f"{field}.repeats[{count}]", name)
         for key, why in _needed(kind, load_kind):
             whole = key in ("pump", "sensors")
             if (sheet.get(key) if whole else key in entry) or (key, whole) in reported:
@@ -178,10 +145,20 @@ def _label_errors(path: Path, sheet: dict) -> Iterator[InputError]:
         first.setdefault(label, index)
 
 
-def _missing_file(path: Path, field: str, name: object) -> Iterator[InputError]:
-    """An error where `name` is text, but not the name of a file that may be read."""
-    if not isinstance(name, str):
-        return
+def missing_files(path: Path, sheet: dict) -> list[InputError]:
+    """An error for every file that a sheet names and that is not there."""
+    named = [("load.impedance", mapping(sheet, "load").get("impedance"))]
+    for index, entry in enumerate(entries(sheet, "recordings")):
+        field, repeats = f"recordings[{index}]", entry.get("repeats")
+        named += [(f"{field}.{key}", entry.get(key)) for key in ("file", "flow_ripple")]
+        for count, name in enumerate(repeats if isinstance(repeats, list) else []):
+            named.append((f"{field}.repeats[{count}]", name))
+    return [
+        e for field, name in named if isinstance(name, str) for e in _missing(path, field, name)
+    ]
+
+
+def _missing(path: Path, field: str, name: str) -> Iterator[InputError]:
     remedy = "Correct the name (relative to rig.yaml) or add the file"
     try:
         if (path.parent / name).is_file():
