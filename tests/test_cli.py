@@ -114,7 +114,8 @@ def test_interrupt_ends_without_a_traceback(tmp_path, capsys, monkeypatch):
 
 
 FITS = """
-import sys, time
+import signal, sys, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a suite in the background ignores it
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 import rippletwin.explanation.explain as module
