@@ -114,14 +114,14 @@ def test_interrupt_ends_without_a_traceback(tmp_path, capsys, monkeypatch):
 
 
 FITS = """
-import signal, sys, time
+import os, signal, sys, time
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a suite in the background ignores it
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 import rippletwin.explanation.explain as module
 
 def work(_):
-    print("ready", flush=True)
+    os.write(1, b"ready" + bytes([10]))  # in one piece: two processes write
     time.sleep(100)
 
 def slow(*_):

@@ -31,6 +31,7 @@ ROOMS = (
     "diagnosis",
     "figures",
     "cli",
+    "__main__",
 )
 ASIDE = {"learning": ("errors", "store")}
 """Rooms outside that order, and what each may import besides itself."""

@@ -83,4 +83,4 @@ def test_no_draw_without_an_effect_reaches_the_threshold(fitted, monkeypatch):
         bootstrap_null(fit, observations, 9)
 
 
-KEPT = ("unsteady_friction", "load_volume", "entrained_air")
+KEPT = ("unsteady_friction", "load_volume", "source_impedance")
