@@ -101,9 +101,9 @@ def recorded_of(wildcards):
 
 
 def samples_of(wildcards):
-    """What a network learns from: a store a seed, or the recordings."""
+    """What a network learns from, as a list: a store for each seed, or that of the recordings."""
     if DATASETS[wildcards.dataset].line == "rig":
-        return recorded_of(wildcards)
+        return [recorded_of(wildcards)]
     return for_network(
         wildcards,
         every_seed("samples/{dataset}/single/{seed}x1.zarr"),
