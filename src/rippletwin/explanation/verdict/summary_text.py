@@ -84,7 +84,7 @@ def _named(e: Explanation, result: dict, entries: Sequence[dict]) -> list[str]:
 def _unexplained(e: Explanation, result: dict, entries: Sequence[dict]) -> list[str]:
     """Where something is missing, and what describes it best."""
     before, after = (result["fit"][which]["held_out"] for which in ("before", "after"))
-    where = f"; it acts at the {_place(e, entries[0])}" if entries else ""
+    where = f" (location: {_place(e, entries[0])})" if entries else ""
     sentences = [f"Something is missing that no effect of the library explains{where}."]
     misfits = f"the misfit on held-out data goes from {before:.1%} to {after:.1%}"
     if "stand_in" in result:
@@ -204,7 +204,7 @@ def _pulls(e: Explanation, is_off_data_sheet: bool = False) -> list[str]:
 
 
 def _effect_and_place(e: Explanation, entry: dict) -> str:
-    return f"{_words(entry['effect'].name)} at the {_place(e, entry)}"
+    return f"{_words(entry['effect'].name)} ({_place(e, entry)})"
 
 
 def _place(e: Explanation, entry: dict) -> str:
@@ -213,7 +213,7 @@ def _place(e: Explanation, entry: dict) -> str:
         e.rig, entry["effect"], entry["place"], entry["parameters"]
     )
     if "position" in entry["parameters"]:
-        return f"line, {low:.2f} to {high:.2f} m from the pump ({element})"
+        return f"{element}, {low:.2f} to {high:.2f} m from the pump"
     return element
 
 
