@@ -211,7 +211,7 @@ def plot_position_profile(e: Explanation) -> Figure | None:
             ax.axvspan(low, high, color=style.CORRECTED, alpha=0.35, lw=0, label="fitted position")
     ax.set_xlim(edges[0], edges[-1])
     ax.set_xlabel("distance from the pump / m (segments numbered)")
-    ax.set_ylabel("log Bayes factor of a free correction")
+    ax.set_ylabel("log Bayes factor")
     ax.legend()
     ax = axes[0, 1]
     ax.plot(list(values.values()), "o", color=style.CORRECTED)
