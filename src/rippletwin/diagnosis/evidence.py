@@ -174,9 +174,8 @@ def _piston_chances(model, candidates, chances, k) -> np.ndarray:
 def piston_index(model: ObservationModel, piston: int, turn: float) -> int:
     """How many pistons begin their delivery in the recording before the faulty one does.
 
-    At the recording's first sample piston 0 of the simulation, turned by `angle`, is at that angle
-    past its outer dead centre.
+    The angles add up to how far the faulty piston is past its outer dead centre at the recording's
+    first sample; it comes there again after the rest of the revolution.
     """
-    pitch = 2.0 * np.pi / model.pistons
-    ahead = model.anchor.angle + pitch * piston + turn
-    return int(np.ceil(-ahead / pitch - 1e-9) % model.pistons)
+    ahead = (model.anchor.angle + turn) / (2.0 * np.pi) - model.start
+    return int(np.floor((-ahead * model.pistons - piston) % model.pistons))

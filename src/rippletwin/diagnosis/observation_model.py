@@ -54,11 +54,21 @@ class Errors:
 
 
 class ObservationModel:
-    """The recording `observation`, its anchor and line, and the leaks' flows by fault name."""
+    """The recording `observation`, its anchor and line, and the leaks' flows by fault name.
+
+    `start`, in revolutions, is how far the shaft turns from the recording's first sample to where
+    the observation's shaft angle counts from.
+    """
 
     def __init__(
-        self, observation, anchor: Anchor, line: DriftingLine, flows: Mapping[str, LeakFlow]
+        self,
+        observation,
+        anchor: Anchor,
+        line: DriftingLine,
+        flows: Mapping[str, LeakFlow],
+        start: float = 0.0,
     ):
+        self.start = start
         self.observation = at_orders(observation, len(anchor.orders))
         self.anchor, self.line, self.flows = anchor, line, flows
         self.orders = anchor.orders
