@@ -33,7 +33,9 @@ def record(label, fault=None, turn=0.0, rng=None, wave_speed=WAVE_SPEED, diamete
     dead centre at the first sample. The operator has set the load pressure anew."""
     rng = rng or np.random.default_rng(0)
     pipe = Pipe(
-        Segment(LENGTH, diameter, wave_speed), tuple(s.position for s in SENSORS), load_pressure=LOAD
+        Segment(LENGTH, diameter, wave_speed),
+        tuple(s.position for s in SENSORS),
+        load_pressure=LOAD,
     )
     run = simulate(TRUE, OIL, SPEED, pipe, fault, samples_per_revolution=1536, min_steps=3072)
     values = 2.0 * np.fft.rfft(run.sensor_pressure)[:, ORDERS] / run.sensor_pressure.shape[1]

@@ -43,7 +43,7 @@ class DriftingLine:
 
     def response(self, drift: np.ndarray | None = None) -> np.ndarray:
         """Readings (S, F), Pa s/m3, for unit flow; `drift` (D,) in standard deviations."""
-        return self._forward.unit_response(self._theta(drift))[self._forward.rows[0]]
+        return self._forward.unit_response(self._theta(drift))[0]
 
     def slopes(self, drift: np.ndarray) -> np.ndarray:
         """Derivatives (D, S, F) of `response` at `drift`."""

@@ -21,7 +21,8 @@ from rippletwin.harmonics import peak_amplitudes
 from rippletwin.pump.geometry import Geometry
 from rippletwin.pump.outlets import ConstantPressure
 from rippletwin.pump.simulation import PumpRipple, simulate
-from rippletwin.twin.twin import Point, Twin
+from rippletwin.twin.operating_point import OperatingCondition
+from rippletwin.twin.twin import Twin
 
 STEPS = 3072  # a revolution: the change moves by 0.3 % when they are doubled, 1 % at 1e-8 m2
 NODES = 11  # leak areas that are simulated, a factor of 1.9 apart
@@ -46,7 +47,7 @@ def with_fitted_pump(twin: Twin, mean_flow: float | None = None, speed_hz: float
         kept[[twin.index[name] for name in FITTED]] = False
     return Twin(
         replace(twin.rig, pump=pump),
-        [Point(label=label) for label in twin.labels],
+        [OperatingCondition(label=label) for label in twin.labels],
         friction=twin.friction,
         effects=twin.effects,
         source_sd=twin.source_sd,

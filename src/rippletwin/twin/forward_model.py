@@ -112,13 +112,6 @@ class ForwardModel:
                 predicted.append(pressure[rows, part])
         return predicted
 
-    def unit_response(self, theta: np.ndarray) -> np.ndarray:
-        """Readings (S, F), Pa s/m3, for unit flow of the source at every frequency: orifice and
-        compliance are linear."""
-        network = self._linear(theta)
-        network.source_flow = np.ones(len(self.s), complex)
-        return network.readings()
-
     @cached_property
     def has_nonlinear_compliance(self) -> bool:
         """Whether the line has a pressure-dependent compliance that a ripple excites."""
