@@ -24,7 +24,7 @@ def test_a_gaussian_is_integrated_wherever_it_is(middle, sd):
 
 
 def test_a_flat_density_has_the_prior_as_posterior():
-    """Where the data say nothing the integral is the interval's length and the median its middle."""
+    """Where the data say nothing, the integral is the interval, the median its middle."""
     found = explore(lambda x: 0.0, LOW, HIGH)
     assert found.log_integral == pytest.approx(np.log(HIGH - LOW))
     assert found.quantiles([0.5])[0] == pytest.approx(0.5 * (LOW + HIGH))
