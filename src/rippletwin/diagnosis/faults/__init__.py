@@ -1,1 +1,0 @@
-"""Faults as hypotheses, one file each."""
