@@ -49,7 +49,7 @@ def test_delays_and_impedances_of_every_segment_within_half_a_percent():
 def test_from_a_data_sheet_two_standard_deviations_off(seed):
     """Every parameter of the line is two prior standard deviations from the data sheet: wave
     speeds 10 %, diameters 6 %, lengths 2 %. Five starts that scale all wave speeds alike end in a
-    wrong valley for both of these; see the long test for the rate.
+    wrong local mode for both of these; see the long test for the rate.
     """
     rig = paper_rig()
     errors = calibrated(rig, three_points(rig), 1000 + seed, distance=2.0)[3]

@@ -58,12 +58,4 @@ def select_below(observation, max_frequency_hz: float | None = None, pistons: in
     if max_frequency_hz is not None:
         lowest = np.min(observation.frequency_hz[keep])
         keep &= observation.frequency_hz <= max(max_frequency_hz, lowest)
-    if np.all(keep):
-        return observation
-    return replace(
-        observation,
-        frequency_hz=observation.frequency_hz[keep],
-        orders=None if observation.orders is None else observation.orders[keep],
-        values=observation.values[:, keep],
-        covariance=observation.covariance[keep],
-    )
+    return observation if np.all(keep) else select_frequencies(observation, keep)
