@@ -17,6 +17,7 @@ IMPORT_ROOTS = (ROOT / "src", ROOT / "workflow" / "scripts")
 
 PLUGIN_FOLDERS = {
     "src/rippletwin/twin/effects/library.py": "src/rippletwin/twin/effects",
+    "src/rippletwin/diagnosis/faults/library.py": "src/rippletwin/diagnosis/faults",
     "src/rippletwin/case/readers/registry.py": "src/rippletwin/case/readers",
 }
 """Modules that import by a computed name -> the folder whose modules they import."""

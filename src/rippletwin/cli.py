@@ -155,6 +155,92 @@ def explain(commands) -> None:
     parser.set_defaults(run=run)
 
 
+def diagnose(commands) -> None:
+    """rippletwin diagnose CASE --out DIR"""
+    parser = commands.add_parser(
+        "diagnose", help="say what is wrong with the pump in recordings of unknown state"
+    )
+    parser.add_argument("case", help="a folder with a rig.yaml")
+    parser.add_argument("--out", required=True, help="folder for diagnosis.json and figures")
+    parser.add_argument(
+        "--twin",
+        metavar="TWIN.json",
+        help="the twin, as explain or calibrate wrote it; without it the healthy recordings are "
+        "explained first, and verdict.json and twin.json are written too",
+    )
+    parser.add_argument(
+        "--recording",
+        action="append",
+        default=[],
+        metavar="LABEL",
+        help="diagnose this one, again for more; all of unknown state by default",
+    )
+    parser.add_argument(
+        "--faults",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="also try the fault that a Python file defines as FAULT, or one of the library that "
+        "is not tried by default, by its name (valve_plate)",
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="print the diagnosis as JSON and nothing else"
+    )
+    parser.add_argument("--processes", type=int, default=2, help="processes to explain with")
+    parser.add_argument("--no-figures", action="store_true", help="write no figures")
+
+    def run(arguments) -> int:
+        import json
+
+        os.environ.setdefault("OMP_NUM_THREADS", "1")
+        from rippletwin.case.load import load_case
+        from rippletwin.diagnosis.diagnose import diagnose as find
+        from rippletwin.diagnosis.diagnose import select_recordings
+        from rippletwin.diagnosis.diagnosis_file import write_diagnosis
+        from rippletwin.diagnosis.faults.library import select_faults
+
+        _check_out(arguments.out)
+        _check_processes(arguments.processes)
+        faults = select_faults(arguments.faults)
+        states = None if arguments.recording else {"healthy", "unknown"}
+        case = load_case(arguments.case, states=states)
+        _warn(case)
+        recordings = select_recordings(case, arguments.recording)
+        with _progress_bars(arguments.json) as progress:
+            twin = _twin_of(arguments, case, recordings, progress)
+            found = find(case, twin, recordings, faults, progress)
+        result = write_diagnosis(found, arguments.out)
+        if not arguments.no_figures:
+            from rippletwin.figures.fault_posterior import draw
+
+            draw(found, arguments.out)
+        if arguments.json:
+            print(json.dumps(result))
+        else:
+            print("\n".join(each["sentence"] for each in result["recordings"]))
+        return 0
+
+    parser.set_defaults(run=run)
+
+
+def _twin_of(arguments, case, recordings, progress):
+    """The twin that the command line names, or the one that explains the healthy recordings."""
+    if arguments.twin is not None:
+        from rippletwin.twin.twin_file import load_twin
+
+        return load_twin(arguments.twin)
+    from dataclasses import replace
+
+    from rippletwin.explanation.explain import explain as find
+    from rippletwin.explanation.verdict.verdict_file import write_verdict
+
+    diagnosed = {recording.label for recording in recordings}
+    known = tuple(r for r in case.recordings if r.label not in diagnosed)
+    explanation = find(replace(case, recordings=known), arguments.processes, progress)
+    write_verdict(explanation, arguments.out)
+    return explanation.twin
+
+
 @contextmanager
 def _progress_bars(quiet: bool = False, passing: bool = False):
     """A function of (what, done, total) that draws one bar for each `what` on standard error.
@@ -232,7 +318,7 @@ def _check_out(out: str) -> None:
         raise InputError("command line", "--out", problem, "name a folder that you may write to")
 
 
-COMMANDS = (check, calibrate, explain)
+COMMANDS = (check, calibrate, explain, diagnose)
 
 
 def _end_quietly() -> None:

@@ -35,12 +35,14 @@ class Revolutions:
     """Whole revolutions at equal shaft angles.
 
     windows (R, S, M) as the pressure given; speed_hz (R,), the mean of each revolution;
-    sampling_rate_hz = M times the mean speed.
+    sampling_rate_hz = M times the mean speed. start is how far, in revolutions, the shaft turns
+    from the recording's first sample to the first window.
     """
 
     windows: np.ndarray
     speed_hz: np.ndarray
     sampling_rate_hz: float
+    start: float = 0.0
 
 
 def cut_revolutions(
@@ -74,7 +76,9 @@ def cut_revolutions(
     for r in range(count):
         angle = first + r + np.arange(step) / step
         windows[r] = interpolate(pressure, time(angle) * sampling_rate_hz, cutoff)
-    return Revolutions(windows, speed, step * count / (edges[-1] - edges[0]))
+    before = _angles_at_ends(time, (pressure.shape[1] - 1) / sampling_rate_hz)[0]
+    rate = step * count / (edges[-1] - edges[0])
+    return Revolutions(windows, speed, rate, float(first - before))
 
 
 def interpolate(signal: np.ndarray, position: np.ndarray, cutoff: float = 1.0) -> np.ndarray:

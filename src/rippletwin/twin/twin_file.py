@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor, Uncertainty
+from rippletwin.errors import InputError
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.operating_point import OperatingCondition
@@ -79,5 +80,14 @@ def twin_of(data: dict) -> Twin:
 
 
 def load_twin(path: str | Path) -> Twin:
-    """The twin of a twin.json, that of a calibration or the corrected one of `explain`."""
-    return twin_of(json.loads(Path(path).read_text()))
+    """The twin of a twin.json, that of a calibration or the corrected one of `explain`.
+
+    Raises InputError where the file cannot be read or holds no twin.
+    """
+    try:
+        return twin_of(json.loads(Path(path).read_text()))
+    except OSError as error:
+        problem = f"cannot be read ({error.strerror})"
+    except (ValueError, KeyError, TypeError) as error:
+        problem = f"holds no twin ({error!r})"
+    raise InputError(path, "twin", problem, "Give a twin.json as calibrate or explain writes it")

@@ -1,0 +1,121 @@
+"""`diagnose`: from a case and its twin to the state of its recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from threadpoolctl import threadpool_limits
+
+from rippletwin.case.model import Case, Recording
+from rippletwin.diagnosis.anchor import distance
+from rippletwin.diagnosis.diagnoser import MOST_REPEATS, Diagnoser
+from rippletwin.diagnosis.diagnosis import Diagnosis
+from rippletwin.diagnosis.faults.base import Fault
+from rippletwin.errors import InputError
+from rippletwin.spectra.observation import observe, revolutions_of
+from rippletwin.twin.twin import Twin
+
+HIGHEST_HZ = 4000.0
+
+
+def diagnose(
+    case: Case,
+    twin: Twin,
+    recordings: Sequence[Recording],
+    faults: Sequence[Fault],
+    progress: Callable[[str, int, int], None] | None = None,
+) -> list[Diagnosis]:
+    """Diagnose periodic recordings of a case by its twin, each anchored to the healthy recording of
+    the nearest operating point, itself excepted.
+
+    `progress` is told what is done, how much of it, and of how much. Raises InputError where the
+    twin is that of another rig, and where there is no healthy recording to anchor one to.
+    """
+    _check_twin(case, twin)
+    healthy = {r.label: _anchors(case, r)[: 1 + MOST_REPEATS] for r in recordings}
+    diagnoser, read, found = Diagnoser(twin, faults), {}, []
+    with threadpool_limits(1):
+        for k, recording in enumerate(recordings):
+            if progress:
+                progress("diagnosing", k, len(recordings))
+            for each in (recording, *healthy[recording.label]):
+                if each.label not in read:
+                    read[each.label] = _read(each, case.rig)
+            observation, start = read[recording.label]
+            beside = [read[each.label][0] for each in healthy[recording.label]]
+            found.append(diagnoser(observation, beside, start))
+    if progress:
+        progress("diagnosing", len(recordings), len(recordings))
+    return found
+
+
+def select_recordings(case: Case, labels: Sequence[str] = ()) -> list[Recording]:
+    """The recordings of these labels, or all whose state is unknown.
+
+    Raises InputError for a label that is not there, a recording that is not periodic, and where
+    there is nothing to diagnose.
+    """
+    sheet = case.folder / "rig.yaml"
+    known = {r.label: r for r in case.recordings}
+    for label in labels:
+        if label not in known:
+            raise InputError(
+                sheet, "recordings", f"no recording {label}", f"There are {', '.join(known)}"
+            )
+    chosen = [known[label] for label in dict.fromkeys(labels)]
+    if not labels:
+        chosen = [r for r in case.recordings if r.state == "unknown"]
+    for recording in chosen:
+        if recording.kind != "periodic":
+            raise InputError(
+                sheet,
+                f"recording {recording.label}",
+                f"of kind {recording.kind}",
+                "Only periodic recordings can be diagnosed",
+            )
+    if not chosen:
+        raise InputError(
+            sheet,
+            "recordings",
+            "none has state: unknown",
+            "Mark those to diagnose, or name them with --recording",
+        )
+    return chosen
+
+
+def _anchors(case: Case, recording: Recording) -> list[Recording]:
+    """The healthy recording whose operating point is nearest, and others of the same point."""
+
+    def apart(other: Recording) -> float:
+        return distance(
+            other.speed_rpm, recording.speed_rpm, other.load_pressure, recording.load_pressure
+        )
+
+    healthy = [r for r in case.healthy if r.kind == "periodic" and r.label != recording.label]
+    if not healthy:
+        raise InputError(
+            case.folder / "rig.yaml",
+            "recordings",
+            f"no healthy periodic recording beside {recording.label}",
+            "Diagnosing needs one, best of the same operating point",
+        )
+    nearest = min(map(apart, healthy))
+    return [r for r in healthy if apart(r) == nearest]
+
+
+def _read(recording: Recording, rig) -> tuple:
+    """The observation of a recording, and how far, in revolutions, the shaft turns from its first
+    sample to where the observation's shaft angle counts from."""
+    revolutions = revolutions_of(recording, rig)
+    return observe(recording, rig, HIGHEST_HZ, revolutions=revolutions), revolutions.start
+
+
+def _check_twin(case: Case, twin: Twin) -> None:
+    ours, its = ([s.name for s in rig.sensors] for rig in (case.rig, twin.rig))
+    if set(ours) - set(its) or "pistons" not in twin.rig.pump:
+        raise InputError(
+            case.folder / "rig.yaml",
+            "sensors",
+            f"{', '.join(ours)}, but the twin has {', '.join(its)}",
+            "Give the twin of this rig, or none to have the healthy recordings explained",
+        )

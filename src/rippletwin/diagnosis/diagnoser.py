@@ -1,0 +1,98 @@
+"""From observations to a diagnosis: one recording, healthy ones beside it, and the twin."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from rippletwin.diagnosis.anchor import Anchor, distance, make_anchor
+from rippletwin.diagnosis.diagnosis import Diagnosis
+from rippletwin.diagnosis.drifting_line import DriftingLine
+from rippletwin.diagnosis.evidence import ErrorPrior, StateEvidence, scatter_of, weigh_states
+from rippletwin.diagnosis.faults.base import Fault
+from rippletwin.diagnosis.faults.library import state_name, states_of
+from rippletwin.diagnosis.observation_model import ObservationModel
+from rippletwin.diagnosis.pump_flow import healthy_flow, leak_flow, with_fitted_pump
+from rippletwin.diagnosis.unlike import judge_residual
+from rippletwin.twin.twin import Twin
+
+MOST_REPEATS = 2  # healthy recordings beside the anchor whose scatter is looked at
+MIN_CHANGE_ERROR = 0.04  # relative, of the change by a leak behind the best of twins
+CHANGE_ERROR_SHARE = 0.8  # of the twin's misfit of the healthy ripple
+MAX_CHANGE_ERROR = 0.5
+DIGITS = 3  # of speed and load pressure at which the pump is simulated
+PRIOR = (0.5, 0.4, 0.1)
+"""Prior probabilities of no fault, of one and of two; states of a kind share theirs evenly."""
+
+
+class Diagnoser:
+    """A twin and the faults to try; called with observations of all shaft orders."""
+
+    def __init__(self, twin: Twin, faults: Sequence[Fault]):
+        self.twin, self.faults = twin, tuple(faults)
+
+    def __call__(self, observation, healthy: Sequence, start: float = 0.0) -> Diagnosis:
+        """The diagnosis of a periodic observation, anchored to the first of `healthy`; the others
+        tell how far healthy recordings of one operating point scatter. `start` as in
+        `ObservationModel`."""
+        model = self.model(observation, healthy[0], start)
+        prior = self._error_prior(model.anchor, healthy)
+        weighed = weigh_states(model, states_of(self.faults), prior)
+        probabilities = _probabilities(weighed)
+        best = max(weighed, key=lambda w: probabilities[state_name(w.state)])
+        return Diagnosis(
+            label=observation.label,
+            probabilities=probabilities,
+            best=best,
+            unlikeness=judge_residual(model, best, prior),
+            anchor=model.anchor,
+            model=model,
+        )
+
+    def model(self, observation, healthy, start: float = 0.0) -> ObservationModel:
+        """The observation model of an observation, anchored to a healthy one."""
+        point = self.twin.operating_point(replace(observation, source="free"))
+        pressure = _rounded(observation.load_pressure or point.load_pressure)
+        speed_rpm = _rounded(60.0 * observation.speed_hz)
+        given = healthy.flow_ripple
+        mean_flow = None if given is None else float(np.mean(given.flow))
+        twin = with_fitted_pump(self.twin, mean_flow, healthy.speed_hz)
+        pump, fluid = twin.rig.pump, twin.rig.fluid
+        line = DriftingLine(twin, observation, healthy_flow(pump, fluid, speed_rpm, pressure))
+        anchor = make_anchor(twin, healthy, observation, line, speed_rpm, pressure)
+        flows = {
+            fault.name: leak_flow(pump, fluid, speed_rpm, pressure, fault) for fault in self.faults
+        }
+        return ObservationModel(observation, anchor, line, flows, start)
+
+    def _error_prior(self, anchor: Anchor, healthy: Sequence) -> ErrorPrior:
+        """What the twin's misfit and the scatter of healthy repeats say of the errors."""
+        change = np.hypot(MIN_CHANGE_ERROR, CHANGE_ERROR_SHARE * anchor.misfit)
+        prior = ErrorPrior(change=float(min(change, MAX_CHANGE_ERROR)))
+        first, *others = healthy
+        repeats = [o for o in others if not between(o, first)][:MOST_REPEATS]
+        scatters = [scatter_of(self.model(o, first), prior) for o in repeats]
+        return replace(prior, scatter=float(np.exp(np.mean(np.log([prior.scatter, *scatters])))))
+
+
+def between(one, other) -> float:
+    """Distance of the operating points of two observations."""
+    return distance(one.speed_hz, other.speed_hz, one.load_pressure, other.load_pressure)
+
+
+def _rounded(value: float) -> float:
+    """To some digits: recordings of one operating point share the pump's simulations."""
+    return float(f"{value:.{DIGITS}g}")
+
+
+def _probabilities(weighed: Sequence[StateEvidence]) -> dict[str, float]:
+    """Posterior probabilities by state's name."""
+    sizes = [len(w.state) for w in weighed]
+    log_posterior = np.array(
+        [w.log_evidence + np.log(PRIOR[n] / sizes.count(n)) for w, n in zip(weighed, sizes)]
+    )
+    chances = np.exp(log_posterior - logsumexp(log_posterior))
+    return {state_name(w.state): float(p) for w, p in zip(weighed, chances)}

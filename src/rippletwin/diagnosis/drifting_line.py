@@ -1,0 +1,61 @@
+"""What the sensors read for unit flow at the pump while the line's state drifts a little.
+
+Between two recordings the oil warms by a degree or two and the load is set anew: wave speeds change
+by half a per cent, which at 4 kHz turns the phase by a radian on nine metres of line. So nothing is
+compared before the line has been brought to the state of the recording.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from rippletwin.case.model import FlowRipple
+from rippletwin.twin.forward_model import ForwardModel
+from rippletwin.twin.twin import Twin
+
+DRIFTS = {"wave_speed": 0.005, "load": 0.02, "viscosity": 0.05}
+"""What drifts, and its relative standard deviation from one recording to another."""
+STEP = 1e-3  # of the difference quotients, in standard deviations
+
+
+class DriftingLine:
+    """The twin's line at the operating point of an observation, at all of its shaft orders.
+
+    `ripple` is the pump's: its chambers are beside the flow, its mean flow settles the orifice.
+    """
+
+    def __init__(self, twin: Twin, observation, ripple: FlowRipple):
+        self.twin, self.orders = twin, np.asarray(observation.orders)
+        point = replace(observation, flow_ripple=ripple, source="nominal")
+        self._forward = ForwardModel(twin, [point])
+        self.load_pressure = float(self._forward.load_pressure[0])
+        self._moved = {
+            name: [twin.index[p.name] for p in twin.parameters if p.name.split("[")[0] == name]
+            for name in DRIFTS
+        }
+
+    @property
+    def drifts(self) -> tuple[str, ...]:
+        """What can drift on this line; `response` takes them in this order."""
+        return tuple(name for name, indices in self._moved.items() if indices)
+
+    def response(self, drift: np.ndarray | None = None) -> np.ndarray:
+        """Readings (S, F), Pa s/m3, for unit flow; `drift` (D,) in standard deviations."""
+        return self._forward.unit_response(self._theta(drift))[0]
+
+    def slopes(self, drift: np.ndarray) -> np.ndarray:
+        """Derivatives (D, S, F) of `response` at `drift`."""
+        base = self.response(drift)
+        moved = [self.response(drift + STEP * e) for e in np.eye(len(drift))]
+        return (np.array(moved).reshape(len(drift), *base.shape) - base) / STEP
+
+    def _theta(self, drift: np.ndarray | None) -> np.ndarray:
+        theta = self.twin.theta.copy()
+        for name, amount in zip(self.drifts, () if drift is None else drift):
+            for k in self._moved[name]:
+                prior = self.twin.parameters[k].prior
+                value = prior.value(theta[k]) * np.exp(DRIFTS[name] * amount)
+                theta[k] = prior.coordinate(value)
+        return theta

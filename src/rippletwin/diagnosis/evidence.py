@@ -1,0 +1,181 @@
+"""How probable each state is: likelihoods integrated over leak areas, shaft angle and errors.
+
+For every state the best candidate of the screen is followed to its mode (shaft angle, drift of the
+line, areas, relative errors), the likelihood is integrated over the areas about it, and the other
+pistons and shaft angles count by their scores in the screen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from rippletwin.diagnosis.faults.base import Fault
+from rippletwin.diagnosis.integration import Density, explore
+from rippletwin.diagnosis.observation_model import Errors, Hypothesis, ObservationModel
+from rippletwin.diagnosis.screening import Candidate, Screen
+
+LIMITS_HZ = (1000.0, 2000.0, np.inf)  # up to which angle and drift are followed, in turn
+ROUNDS = 2  # of following and searching the areas
+SCATTERS = np.geomspace(0.002, 0.02, 5)
+CHANGES = np.geomspace(0.03, 0.8, 6)
+
+
+@dataclass(frozen=True)
+class ErrorPrior:
+    """Lognormal priors of the two relative errors: medians, and sds of their logarithms."""
+
+    scatter: float = 0.005
+    change: float = 0.1
+    scatter_sd: float = 0.5
+    change_sd: float = 0.6
+
+    def log_weights(self) -> np.ndarray:
+        """Log probabilities (len(SCATTERS), len(CHANGES)) on the grid of both."""
+        a = -0.5 * (np.log(SCATTERS / self.scatter) / self.scatter_sd) ** 2
+        b = -0.5 * (np.log(CHANGES / self.change) / self.change_sd) ** 2
+        return (a - logsumexp(a))[:, None] + (b - logsumexp(b))
+
+
+@dataclass(frozen=True)
+class StateEvidence:
+    """A state's log evidence, the hypothesis at its mode with its errors, the density over the
+    logarithm of each fault's area, and the probability (pistons,) of each of its pistons."""
+
+    state: tuple[Fault, ...]
+    log_evidence: float
+    mode: Hypothesis
+    errors: Errors
+    areas: Mapping[str, Density] = field(repr=False)
+    pistons: Mapping[str, np.ndarray] = field(repr=False)
+
+
+def weigh_states(
+    model: ObservationModel, states: Sequence[tuple[Fault, ...]], prior: ErrorPrior
+) -> list[StateEvidence]:
+    """The evidence of each state."""
+    screen = Screen(model)
+    ranked = {}
+    for state in states:
+        if not state:
+            ranked[state] = screen.healthy()
+        elif len(state) == 1:
+            ranked[state] = screen.one(state[0])
+        else:
+            ranked[state] = screen.two(ranked[state[:1]], ranked[state[1:]])
+    return [_weigh(model, candidates, prior) for candidates in ranked.values()]
+
+
+def scatter_of(model: ObservationModel, prior: ErrorPrior) -> float:
+    """Relative scatter that a recording known to be healthy shows against its anchor."""
+    best = Screen(model).healthy()[0]
+    mode = Hypothesis((), (), (), best.turn, np.zeros(len(model.line.drifts)))
+    mode = model.followed(mode, Errors(prior.scatter, prior.change), LIMITS_HZ)
+    return _best_errors(model, mode, prior)[0].scatter
+
+
+def _weigh(
+    model: ObservationModel, candidates: Sequence[Candidate], prior: ErrorPrior
+) -> StateEvidence:
+    best = candidates[0]
+    drift = np.zeros(len(model.line.drifts))
+    mode = Hypothesis(best.state, best.areas, best.pistons, best.turn, drift)
+    errors = Errors(prior.scatter, prior.change)
+    for _ in range(ROUNDS):
+        mode = model.followed(mode, errors, LIMITS_HZ)
+        mode = _at_best_areas(model, mode, errors)
+        errors, _ = _best_errors(model, mode, prior)
+    mode = model.followed(mode, errors, LIMITS_HZ[-1:])
+    errors, over_errors = _best_errors(model, mode, prior)
+    integral, areas = _over_areas(model, mode, errors)
+    at_mode = model.evaluate(mode, errors).log_likelihood
+    scores = np.array([c.score for c in candidates])
+    places = logsumexp(scores - best.score) - _log_places(model, best.state)
+    log_evidence = over_errors + integral - at_mode + places
+    chances = np.exp(scores - logsumexp(scores))
+    pistons = {
+        fault.name: _piston_chances(model, candidates, chances, k)
+        for k, fault in enumerate(best.state)
+        if fault.one_piston
+    }
+    return StateEvidence(best.state, float(log_evidence), mode, errors, areas, pistons)
+
+
+def _log_places(model: ObservationModel, state: Sequence[Fault]) -> float:
+    """Log of the number of equally probable pistons and pitches of the shaft angle."""
+    return np.log(model.pistons) * (1 + sum(fault.one_piston for fault in state))
+
+
+def _at_best_areas(model: ObservationModel, mode: Hypothesis, errors: Errors) -> Hypothesis:
+    for k, fault in enumerate(mode.state):
+        found = explore(_along(model, mode, errors, k), *_ends(fault))
+        mode = _with_area(mode, k, found.nodes[np.argmax(found.log_density)])
+    return mode
+
+
+def _best_errors(model, mode: Hypothesis, prior: ErrorPrior) -> tuple[Errors, float]:
+    """Most likely errors on the grid, and the log likelihood integrated over them."""
+    weights = prior.log_weights()
+    changes = CHANGES if mode.state else CHANGES[:1]
+    values = np.array(
+        [[model.evaluate(mode, Errors(s, c)).log_likelihood for c in changes] for s in SCATTERS]
+    )
+    values = values + (weights if mode.state else logsumexp(weights, axis=1)[:, None])
+    at = np.unravel_index(np.argmax(values), values.shape)
+    change = CHANGES[at[1]] if mode.state else prior.change
+    return Errors(float(SCATTERS[at[0]]), float(change)), float(logsumexp(values))
+
+
+def _over_areas(
+    model: ObservationModel, mode: Hypothesis, errors: Errors
+) -> tuple[float, dict[str, Density]]:
+    """Log of the likelihood's mean over the prior of the areas, and each area's own density.
+
+    Two areas are taken as independent about the mode. What ties them is mostly that either change
+    may be relatively wrong, which each density has in it.
+    """
+    if not mode.state:
+        return model.evaluate(mode, errors).log_likelihood, {}
+    volume = sum(float(np.log(np.subtract(*_ends(fault)[::-1]))) for fault in mode.state)
+    densities = {
+        fault.name: explore(_along(model, mode, errors, k), *_ends(fault))
+        for k, fault in enumerate(mode.state)
+    }
+    at_mode = model.evaluate(mode, errors).log_likelihood
+    integral = at_mode - volume + sum(d.log_integral - at_mode for d in densities.values())
+    return integral, densities
+
+
+def _along(model, mode: Hypothesis, errors: Errors, k: int):
+    return lambda x: model.evaluate(_with_area(mode, k, x), errors).log_likelihood
+
+
+def _with_area(mode: Hypothesis, k: int, log_area: float) -> Hypothesis:
+    areas = list(mode.areas)
+    areas[k] = float(np.exp(log_area))
+    return replace(mode, areas=tuple(areas))
+
+
+def _ends(fault: Fault) -> tuple[float, float]:
+    return float(np.log(fault.smallest)), float(np.log(fault.largest))
+
+
+def _piston_chances(model, candidates, chances, k) -> np.ndarray:
+    """Probability (pistons,) of each piston of fault k, counted in pitches from the recording."""
+    out = np.zeros(model.pistons)
+    for candidate, chance in zip(candidates, chances):
+        out[piston_index(model, candidate.pistons[k], candidate.turn)] += chance
+    return out
+
+
+def piston_index(model: ObservationModel, piston: int, turn: float) -> int:
+    """How many pistons begin their delivery in the recording before the faulty one does.
+
+    The angles add up to how far the faulty piston is past its outer dead centre at the recording's
+    first sample; it comes there again after the rest of the revolution.
+    """
+    ahead = (model.anchor.angle + turn) / (2.0 * np.pi) - model.start
+    return int(np.floor((-ahead * model.pistons - piston) % model.pistons))

@@ -1,0 +1,43 @@
+"""What a fault is: leaks of the pump model, with a prior on their area.
+
+A fault is one file in this folder that defines `FAULT`, an instance of `Fault`; the registry finds
+it there. A file of the user's own that defines `FAULT` counts just as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from rippletwin.pump.faults import Cylinder, Slipper
+
+SMALLEST, LARGEST = 1e-8, 5e-6
+"""Leak areas, m2, between which a prior is log-uniform: from 1 % of a healthy ripple to several
+times that ripple on the default pump."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault hypothesis.
+
+    name          as in diagnosis.json
+    words         what it is, for the sentence: "a worn slipper"
+    leaks         (leak area m2, piston, number of pistons) -> the pump model's faults
+    source        author, year and section, or why it is so
+    smallest, largest   ends of the log-uniform prior on the leak area, m2
+    one_piston    whether it is at one piston; else all pistons are alike
+    by_default    whether it is tried unless asked for otherwise
+    """
+
+    name: str
+    words: str
+    leaks: Callable[[float, int, int], Sequence[Slipper | Cylinder]]
+    source: str
+    smallest: float = SMALLEST
+    largest: float = LARGEST
+    one_piston: bool = True
+    by_default: bool = True
+
+    def __post_init__(self):
+        if not 0.0 < self.smallest < self.largest:
+            raise ValueError(f"fault {self.name!r}: 0 < smallest < largest must hold")

@@ -1,0 +1,87 @@
+"""The library of faults: every module of this package that defines `FAULT`, and users' files."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import pkgutil
+from collections.abc import Sequence
+from itertools import combinations
+from pathlib import Path
+
+from rippletwin.diagnosis import faults
+from rippletwin.diagnosis.faults.base import Fault
+from rippletwin.errors import InputError
+
+
+def _discover() -> dict[str, Fault]:
+    found = {}
+    for module in pkgutil.iter_modules(faults.__path__):
+        fault = getattr(importlib.import_module(f"{faults.__name__}.{module.name}"), "FAULT", None)
+        if fault is not None:
+            if fault.name in found:
+                raise ValueError(f"two faults are called {fault.name!r}")
+            found[fault.name] = fault
+    # The order of the contract: slipper before cylinder.
+    first = [name for name in ("slipper", "cylinder") if name in found]
+    return {name: found[name] for name in [*first, *sorted(set(found) - set(first))]}
+
+
+FAULTS: dict[str, Fault] = _discover()
+"""Name -> fault, those that are not tried by default included."""
+
+
+def select_faults(asked: Sequence[str | Path] = ()) -> tuple[Fault, ...]:
+    """The faults to try: those tried by default, and those asked for by name or by file.
+
+    Raises InputError for a name that is not known, and for a file without a usable `FAULT`.
+    """
+    chosen = [fault for fault in FAULTS.values() if fault.by_default]
+    for each in asked:
+        fault = FAULTS.get(str(each)) or read_fault(each)
+        if fault.name in {other.name for other in chosen if other is not fault}:
+            raise InputError(
+                each, "FAULT", f"a second fault {fault.name!r}", "Give it its own name"
+            )
+        if fault not in chosen:
+            chosen.append(fault)
+    return tuple(chosen)
+
+
+def read_fault(path: str | Path) -> Fault:
+    """The `FAULT` of a user's Python file; raises InputError where there is none."""
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(
+            path,
+            "--faults",
+            "neither a known fault nor a file",
+            f"Give a Python file that defines FAULT, or one of {', '.join(FAULTS)}",
+        )
+    spec = importlib.util.spec_from_file_location(f"fault_of_{path.stem}", path)
+    if spec is None:
+        raise InputError(path, "--faults", "no Python file", "Its name must end in .py")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # a user's code may raise anything
+        raise InputError(path, "FAULT", f"the file fails: {error!r}", "Correct it") from error
+    fault = getattr(module, "FAULT", None)
+    if not isinstance(fault, Fault):
+        raise InputError(
+            path,
+            "FAULT",
+            "missing, or no Fault",
+            "Define FAULT = rippletwin.diagnosis.faults.base.Fault(...)",
+        )
+    return fault
+
+
+def states_of(chosen: Sequence[Fault]) -> tuple[tuple[Fault, ...], ...]:
+    """The states to tell apart: healthy, each fault alone, and two together."""
+    return ((), *((fault,) for fault in chosen), *combinations(chosen, 2))
+
+
+def state_name(state: Sequence[Fault]) -> str:
+    """As in diagnosis.json: "healthy", "slipper", "slipper+cylinder"."""
+    return "+".join(fault.name for fault in state) or "healthy"

@@ -1,0 +1,206 @@
+"""What a recording should read under a hypothesis, and how far it may be off.
+
+    reading = anchor at the recording's operating point + change by leaks, turned by the shaft angle
+
+The change is that of the pump's flow through the twin's line. A hypothesis names the leaks, their
+areas and pistons, the shaft angle between the recordings and how far the line's state has drifted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from rippletwin.diagnosis.anchor import Anchor, at_orders
+from rippletwin.diagnosis.drifting_line import DRIFTS, DriftingLine
+from rippletwin.diagnosis.faults.base import Fault
+from rippletwin.diagnosis.likelihood import Marginal, complex_columns, marginal
+from rippletwin.diagnosis.pump_flow import LeakFlow
+
+TURN_SD = 0.02  # rad, of a shaft angle that has been found already
+SOURCE_DRIFT, SOURCE_WAVES = 0.01, 4
+"""The healthy pump's own flow drifts by 1 %, smoothly over the frequency, in four cosines."""
+CHANGE_WAVES = 6  # cosines over the frequency in which the change's relative error is smooth
+SMOOTH_SHARE = 0.5  # of the change's relative error, in each of these
+AREA_SD = 0.05  # relative, at least: no leak is an ideal orifice
+NEIGHBOURS = 9  # shaft orders over which a power is averaged
+BETWEEN = 0.01  # share of the ripple's power whose scatter shows at orders that pistons do not make
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """State, leak areas (m2) and pistons of its faults, shaft angle (rad), drift in sds (D,).
+
+    Pistons count in pitches from the anchor's; `turn` is the angle by which the recording's shaft
+    is ahead of the anchor's.
+    """
+
+    state: tuple[Fault, ...]
+    areas: tuple[float, ...]
+    pistons: tuple[int, ...]
+    turn: float
+    drift: np.ndarray
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Relative errors: `scatter` of the healthy ripple, `change` of what leaks change in it."""
+
+    scatter: float
+    change: float
+
+
+class ObservationModel:
+    """The recording `observation`, its anchor and line, and the leaks' flows by fault name.
+
+    `start`, in revolutions, is how far the shaft turns from the recording's first sample to where
+    the observation's shaft angle counts from.
+    """
+
+    def __init__(
+        self,
+        observation,
+        anchor: Anchor,
+        line: DriftingLine,
+        flows: Mapping[str, LeakFlow],
+        start: float = 0.0,
+    ):
+        self.start = start
+        self.observation = at_orders(observation, len(anchor.orders))
+        self.anchor, self.line, self.flows = anchor, line, flows
+        self.orders = anchor.orders
+        self.pistons = int(line.twin.rig.pump["pistons"])
+        self.values = self.observation.values
+        self.noise = anchor.variance + np.einsum("fss->sf", self.observation.covariance).real
+        self._waves = _cosines(self.observation.frequency_hz, CHANGE_WAVES)
+        self._base = None
+
+    # predictions
+
+    def change(self, hypothesis: Hypothesis) -> np.ndarray:
+        """Change (K, F) of the flow by each of the hypothesis's leaks, m3/s, as the anchor's shaft
+        stands."""
+        found = [
+            self.leak_change(fault, area, piston)
+            for fault, area, piston in zip(
+                hypothesis.state, hypothesis.areas, hypothesis.pistons, strict=True
+            )
+        ]
+        return np.array(found).reshape(len(found), len(self.orders))
+
+    def leak_change(self, fault: Fault, area: float, piston: int) -> np.ndarray:
+        """The same (F,) of one leak."""
+        harmonics = self.flows[fault.name].harmonics(area)[self.orders]
+        angle = self.anchor.angle + 2.0 * np.pi * piston / self.pistons
+        return harmonics * np.exp(1j * self.orders * angle)
+
+    def state_of_line(self, hypothesis: Hypothesis) -> np.ndarray:
+        """Drift (D,) with what the leaks' loss of mean flow makes of an orifice set anew."""
+        drift = np.array(hypothesis.drift, float)
+        rig = self.line.twin.rig
+        if hypothesis.state and rig.load.passes_flow and "load" in self.line.drifts:
+            lost = sum(
+                self.flows[fault.name].harmonics(area)[0].real / self.flows[fault.name].mean
+                for fault, area in zip(hypothesis.state, hypothesis.areas)
+            )
+            drift[self.line.drifts.index("load")] += np.log1p(max(lost, -0.9)) / DRIFTS["load"]
+        return drift
+
+    def linearise_line(self, hypothesis: Hypothesis) -> None:
+        """From here on the line is linear in the drift about that of the hypothesis."""
+        drift = self.state_of_line(hypothesis)
+        self._base = drift, self.line.response(drift), self.line.slopes(drift)
+
+    @property
+    def response(self) -> np.ndarray:
+        """Readings (S, F), Pa s/m3, for unit flow, where the line was last linearised."""
+        return self._base[1][:, : len(self.orders)]
+
+    def parts(self, hypothesis: Hypothesis) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The healthy part (S, F) of the reading, the leaks' parts (K, S, F), and the slopes
+        (D, S, F) of their sum by the drift, all turned by the shaft angle."""
+        at, _, slopes = self._base
+        slopes = slopes[..., : len(self.orders)]
+        moved = self.response + np.tensordot(self.state_of_line(hypothesis) - at, slopes, 1)
+        leaks = self.change(hypothesis)
+        flow = self.anchor.flow + np.sum(leaks, axis=0)
+        turn = np.exp(1j * self.orders * hypothesis.turn)
+        healthy = (moved * self.anchor.flow + self.anchor.rest) * turn
+        return healthy, moved * leaks[:, None] * turn, slopes * flow * turn
+
+    # likelihood
+
+    def evaluate(
+        self, hypothesis: Hypothesis, errors: Errors, highest_hz: float = np.inf
+    ) -> Marginal:
+        """Marginal likelihood of the recording below a frequency. The first amplitudes are those of
+        the shaft angle, in `TURN_SD`, and of the drift."""
+        healthy, leaks, slopes = self.parts(hypothesis)
+        below = self.observation.frequency_hz <= highest_hz
+        columns = self._columns(healthy, leaks, slopes, errors)
+        # The drift is about zero: where it has been followed, back to there in a straight line.
+        residual = self.values - healthy - leaks.sum(axis=0)
+        residual = residual + np.tensordot(hypothesis.drift, slopes, 1)
+        variance = self.variance(healthy, leaks, errors)
+        return marginal(residual[:, below], variance[:, below], columns[..., below])
+
+    def variance(self, healthy: np.ndarray, leaks: np.ndarray, errors: Errors) -> np.ndarray:
+        """Variance (S, F), Pa2, of the readings' independent errors."""
+        scatter = errors.scatter**2 * self.scatter_power(healthy)
+        change = errors.change**2 * local_power(leaks.sum(axis=0))
+        return self.noise + scatter + change
+
+    def scatter_power(self, healthy: np.ndarray) -> np.ndarray:
+        """Power (F,) to which the scatter of repeated healthy recordings is in proportion."""
+        own, all_orders = self.power_by_class(healthy), local_power(healthy)
+        return own + BETWEEN * all_orders
+
+    def power_by_class(self, readings: np.ndarray) -> np.ndarray:
+        """Local power (F,) of readings (S, F), of pistons' orders and of all others apart."""
+        out = np.empty(len(self.orders))
+        even = self.orders % self.pistons == 0
+        for which in (even, ~even):
+            if np.any(which):
+                out[which] = local_power(readings[:, which])
+        return out
+
+    def followed(
+        self, hypothesis: Hypothesis, errors: Errors, limits_hz: Sequence[float]
+    ) -> Hypothesis:
+        """The hypothesis with its shaft angle and drift at their most likely values, found below
+        one frequency after the other: phases at high ones would be lost at first."""
+        for limit in limits_hz:
+            self.linearise_line(hypothesis)
+            amplitudes = self.evaluate(hypothesis, errors, limit).amplitudes
+            hypothesis = replace(
+                hypothesis,
+                turn=hypothesis.turn + TURN_SD * amplitudes[0],
+                drift=amplitudes[1 : 1 + len(self.line.drifts)],
+            )
+        self.linearise_line(hypothesis)
+        return hypothesis
+
+    def _columns(self, healthy, leaks, slopes, errors: Errors) -> np.ndarray:
+        whole = healthy + leaks.sum(axis=0)
+        turning = TURN_SD * 1j * self.orders * whole
+        source = SOURCE_DRIFT * healthy * self._waves[:SOURCE_WAVES, None]
+        sizes = np.full(CHANGE_WAVES, SMOOTH_SHARE * errors.change)
+        sizes[0] = np.hypot(sizes[0], AREA_SD)
+        changed = [sizes[:, None, None] * self._waves[:, None] * leak for leak in leaks]
+        return np.concatenate([turning[None], slopes, *map(complex_columns, (source, *changed))])
+
+
+def local_power(readings: np.ndarray) -> np.ndarray:
+    """Mean square (F,) of readings (S, F) over sensors and neighbouring orders: a zero of one
+    sensor, or of one order, is no place where an error is small."""
+    power = np.mean(np.abs(readings) ** 2, axis=0)
+    return uniform_filter1d(power, min(NEIGHBOURS, len(power)), mode="nearest")
+
+
+def _cosines(frequency_hz: np.ndarray, count: int) -> np.ndarray:
+    """Cosines (count, F) over the frequency, the first of them constant."""
+    share = frequency_hz / frequency_hz[-1]
+    return np.cos(np.pi * np.outer(np.arange(count), share))

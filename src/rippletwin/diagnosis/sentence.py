@@ -1,0 +1,57 @@
+"""One sentence about a recording that an engineer can act on."""
+
+from __future__ import annotations
+
+from rippletwin.diagnosis.diagnosis import Diagnosis
+
+ORDINALS = {1: "first", 2: "second", 3: "third"}
+MARGIN = 0.01  # probability of another state that is worth mentioning
+
+
+def sentence(diagnosis: Diagnosis) -> str:
+    """The diagnosis in words."""
+    d = diagnosis
+    if d.state == "unlike":
+        text = _unlike(d)
+    elif d.state == "healthy":
+        text = f"healthy, with a probability of {_share(d.probabilities['healthy'])}"
+    else:
+        parts = [_fault(d, fault) for fault in d.best.state]
+        text = f"{' and '.join(parts)}, with a probability of {_share(d.probabilities[d.state])}"
+    others = {name: p for name, p in d.probabilities.items() if name != d.state and p > MARGIN}
+    if others and d.state != "unlike":
+        listed = ", ".join(f"{name} {_share(p)}" for name, p in others.items())
+        text += f" (it may also be: {listed})"
+    text += f"; compared with {d.anchor.label}"
+    if d.anchor.distance:
+        text += ", which is of another operating point, so that less can be told"
+    return f"{d.label}: {text}."
+
+
+def _unlike(d: Diagnosis) -> str:
+    where = {
+        None: "",
+        "source": " at the pump",
+        "line": " in the line or at the load",
+    }.get(d.unlikeness.element, f" at {d.unlikeness.element}")
+    text = f"neither healthy nor any fault that was tried: something else has changed{where}"
+    if d.unlikeness.orders:
+        text += f", most at shaft orders {', '.join(map(str, d.unlikeness.orders))}"
+    return text
+
+
+def _fault(d: Diagnosis, fault) -> str:
+    area = d.severities[fault.name]
+    text = f"{fault.words} with a leak of {area.value:.2g} m2"
+    text += f" ({area.low:.2g} to {area.high:.2g})"
+    if not fault.one_piston:
+        return text
+    piston = d.pistons.get(fault.name)
+    if piston is None:
+        return f"{text} at a piston that cannot be told"
+    ordinal = ORDINALS.get(piston + 1, f"{piston + 1}th")
+    return f"{text} at the {ordinal} piston to begin its delivery in the recording"
+
+
+def _share(p: float) -> str:
+    return "more than 99.9 %" if p > 0.999 else f"{100 * p:.3g} %"

@@ -1,0 +1,39 @@
+"""The healthy recording that a diagnosis is anchored to."""
+
+import numpy as np
+import pytest
+
+from rippletwin.diagnosis.anchor import alignment, correlation, distance
+
+
+def test_an_operating_point_set_twice_is_one():
+    """Half a per cent of speed and one of pressure are no distance; more is the sum of both."""
+    assert distance(1000.0, 1005.0, 9.5e6, 9.6e6) == 0.0
+    assert distance(1000.0, 1200.0, 9.5e6, 9.5e6) == pytest.approx(np.log(1.2))
+    assert distance(1000.0, 1200.0, 10e6, 5e6) == pytest.approx(np.log(1.2) + np.log(2.0))
+
+
+def test_a_pressure_that_is_not_known_is_no_distance():
+    """A load that states no pressure is told apart by its speed alone."""
+    assert distance(1000.0, 1000.0, None, 5e6) == 0.0
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.31, 0.69])
+def test_alignment_is_the_angle_by_which_a_spectrum_was_turned(angle):
+    """Piston orders turned by an angle within a pitch: found to the step of the search."""
+    rng = np.random.default_rng(0)
+    orders = np.arange(9, 200, 9)
+    here = rng.normal(size=(2, len(orders))) + 1j * rng.normal(size=(2, len(orders)))
+    there = here * np.exp(1j * orders * angle)
+    assert alignment(here, there, orders, 2 * np.pi / 9) == pytest.approx(angle, abs=1e-3)
+
+
+def test_correlation_is_that_of_the_turned_spectrum():
+    """At each angle the inner product as it is defined."""
+    rng = np.random.default_rng(1)
+    orders = np.arange(1, 40)
+    here, there = rng.normal(size=(2, 2, 39)) + 1j * rng.normal(size=(2, 2, 39))
+    found = correlation(here, there, orders, 1.0, 128)
+    for k in (0, 17, 90):
+        turned = here * np.exp(1j * orders * 2 * np.pi * k / 128)
+        assert found[k] == pytest.approx(np.sum(np.conj(turned) * there).real)

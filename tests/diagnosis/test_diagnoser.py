@@ -1,0 +1,108 @@
+"""Diagnosis of a leaking pump by a twin that knows pump and line only roughly.
+
+Independent truth: the pump coupled to its pipe step by step in time, with known leaks.
+"""
+
+import numpy as np
+import pytest
+
+import leaking_pump
+from rippletwin.diagnosis.diagnoser import Diagnoser
+from rippletwin.diagnosis.diagnosis_file import diagnosis_dict
+from rippletwin.diagnosis.faults.library import select_faults
+from rippletwin.pump.faults import Cylinder, Slipper
+from rippletwin.twin.twin import Twin
+
+DRIFTED = leaking_pump.WAVE_SPEED * 1.003
+FIRST_TURN, TURN = 0.3, 2.1  # rad, of the anchor's shaft and of the diagnosed one's
+
+STATES = {
+    "healthy": (None, {"wave_speed": DRIFTED}),
+    "slipper": (Slipper(1e-7, 2), {"wave_speed": DRIFTED}),
+    "cylinder": (Cylinder(4e-7, 5), {"wave_speed": DRIFTED}),
+    "slipper+cylinder": ([Slipper(2e-7, 1), Cylinder(3e-7, 6)], {}),
+    "unlike": (None, {"wave_speed": 1.08 * leaking_pump.WAVE_SPEED}),
+}
+
+
+@pytest.fixture(scope="module")
+def diagnoses():
+    """The diagnosis of one recording of each state."""
+    rng = np.random.default_rng(0)
+    anchor = leaking_pump.record("anchor", turn=FIRST_TURN, rng=rng)
+    diagnoser = Diagnoser(Twin(leaking_pump.rig(), [anchor]), select_faults())
+    return {
+        state: diagnoser(leaking_pump.record(state, fault, TURN, rng, **line), [anchor])
+        for state, (fault, line) in STATES.items()
+    }
+
+
+@pytest.mark.parametrize("state", STATES)
+def test_the_state_is_right(diagnoses, state):
+    """A leak that changes the ripple by 10 % and more, or none, behind a line whose wave speed has
+    drifted by 0.3 %; and a line of another wave speed, which is no fault of the pump."""
+    assert diagnoses[state].state == state
+
+
+@pytest.mark.parametrize("state", ["healthy", "slipper", "cylinder", "slipper+cylinder"])
+def test_probabilities_are_sure_and_add_up(diagnoses, state):
+    """They add up to one, and the true state has nearly all."""
+    found = diagnoses[state].probabilities
+    assert sum(found.values()) == pytest.approx(1.0)
+    assert found[state] > (0.5 if state == "healthy" else 0.95)
+
+
+@pytest.mark.parametrize("state", ["slipper", "cylinder", "slipper+cylinder"])
+def test_leak_areas_lie_in_their_intervals(diagnoses, state):
+    """Each true area lies within its 95 % interval, which is no wider than a factor of two."""
+    fault, _ = STATES[state]
+    for each in fault if isinstance(fault, list) else [fault]:
+        found = diagnoses[state].severities[type(each).__name__.lower()]
+        assert found.low < each.leak_area < found.high
+        assert found.high < 2.0 * found.low
+
+
+@pytest.mark.parametrize("state", ["slipper", "cylinder"])
+def test_the_piston_is_told_from_the_first_sample(diagnoses, state):
+    """Pistons are counted as they begin their delivery after the first sample."""
+    fault, _ = STATES[state]
+    pistons = leaking_pump.PISTONS
+    past = TURN / (2 * np.pi) - fault.piston / pistons  # outer dead centre, in revolutions
+    assert diagnoses[state].piston == int((-past % 1.0) * pistons)
+
+
+def test_two_pistons_are_no_single_one(diagnoses):
+    """Faults at different pistons: each has its own, and the recording has none."""
+    assert diagnoses["slipper+cylinder"].piston is None
+    assert set(diagnoses["slipper+cylinder"].pistons) == {"slipper", "cylinder"}
+
+
+def test_a_changed_line_is_told_from_the_pump(diagnoses):
+    """The p-value is small, orders are named, and all of them are the pistons': the line does not
+    make others. No severity is stated."""
+    found = diagnoses["unlike"]
+    assert found.unlikeness.p_value < 1e-3
+    assert found.unlikeness.element == "line"
+    assert found.unlikeness.orders
+    assert all(order % leaking_pump.PISTONS == 0 for order in found.unlikeness.orders)
+    assert found.severities == {}
+
+
+def test_known_states_are_not_unlike(diagnoses):
+    """A drift of the line's state is no reason to call a recording unlike."""
+    assert all(diagnoses[s].unlikeness.p_value > 0.05 for s in STATES if s != "unlike")
+
+
+def test_the_file_has_the_contract_s_keys(diagnoses):
+    """diagnosis.json, key by key."""
+    (entry,) = diagnosis_dict([diagnoses["slipper"]])["recordings"]
+    assert list(entry) == [
+        "label", "state", "probabilities", "severity", "piston", "unlike", "networks", "sentence",
+    ]  # fmt: skip
+    assert list(entry["probabilities"]) == ["healthy", "slipper", "cylinder", "slipper+cylinder"]
+    assert set(entry["severity"]["slipper"]) == {"value", "ci95", "unit"}
+    assert entry["severity"]["slipper"]["unit"] == "m2"
+    assert set(entry["unlike"]) == {"p_value", "where"}
+    assert entry["unlike"]["where"] == {"orders": [], "element": None}
+    assert entry["networks"] == {}
+    assert "slipper" in entry["sentence"] and entry["label"] in entry["sentence"]

@@ -1,0 +1,36 @@
+"""Integrals over the logarithm of an area.
+
+Independent truth: closed forms of Gaussian and flat densities.
+"""
+
+import numpy as np
+import pytest
+from scipy.special import ndtri
+
+from rippletwin.diagnosis.integration import explore
+
+LOW, HIGH = np.log(1e-8), np.log(5e-6)
+
+
+@pytest.mark.parametrize("middle", [-17.0, -15.3, -13.05])
+@pytest.mark.parametrize("sd", [0.02, 0.1, 0.5])
+def test_a_gaussian_is_integrated_wherever_it_is(middle, sd):
+    """A peak forty times narrower than the first nodes are apart is found, and its integral and
+    its 95 % interval are right to a few per cent."""
+    found = explore(lambda x: -0.5 * ((x - middle) / sd) ** 2, LOW, HIGH)
+    assert found.log_integral == pytest.approx(np.log(np.sqrt(2 * np.pi) * sd), abs=0.05)
+    ends = middle + sd * ndtri([0.025, 0.5, 0.975])
+    np.testing.assert_allclose(found.quantiles([0.025, 0.5, 0.975]), ends, atol=0.1 * sd)
+
+
+def test_a_flat_density_has_the_prior_as_posterior():
+    """Where the data say nothing, the integral is the interval, the median its middle."""
+    found = explore(lambda x: 0.0, LOW, HIGH)
+    assert found.log_integral == pytest.approx(np.log(HIGH - LOW))
+    assert found.quantiles([0.5])[0] == pytest.approx(0.5 * (LOW + HIGH))
+
+
+def test_large_log_likelihoods_do_not_overflow():
+    """Log likelihoods of 1e5 are only a common factor."""
+    found = explore(lambda x: 1e5 - 0.5 * (x + 15.0) ** 2, LOW, HIGH)
+    assert np.isfinite(found.log_integral)

@@ -1,0 +1,62 @@
+"""What a leak changes in the flow of the pump.
+
+Independent truth: the pump simulated with the very leak.
+"""
+
+import numpy as np
+import pytest
+
+from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor
+from rippletwin.diagnosis.faults.library import FAULTS
+from rippletwin.diagnosis.pump_flow import STEPS, leak_flow, with_fitted_pump
+from rippletwin.harmonics import peak_amplitudes
+from rippletwin.pump.faults import Cylinder, Slipper
+from rippletwin.pump.geometry import Geometry
+from rippletwin.pump.outlets import ConstantPressure
+from rippletwin.pump.simulation import simulate
+from rippletwin.twin.twin import Twin
+
+OIL, PUMP = Fluid(870.0, 3.2e-5), {"pistons": 9, "discharge_coefficient": 0.65}
+SPEED, PRESSURE = 1000.0, 9.5e6
+ORDERS = np.arange(200)
+
+
+def simulated(pump, fault=None):
+    run = simulate(pump, OIL, SPEED, ConstantPressure(PRESSURE), fault, min_steps=STEPS)
+    return peak_amplitudes(run.flow)[ORDERS]
+
+
+@pytest.mark.parametrize(("name", "fault"), [("slipper", Slipper), ("cylinder", Cylinder)])
+def test_areas_between_the_simulated_ones_are_right(name, fault):
+    """Small, middling and large leaks that are no nodes: within 1 % of the change."""
+    flow = leak_flow(PUMP, OIL, SPEED, PRESSURE, FAULTS[name])
+    healthy = simulated(PUMP)
+    for area in (3.1e-8, 4.4e-7, 3.3e-6):
+        truth = simulated(PUMP, fault(area)) - healthy
+        found = flow.harmonics(area)[ORDERS]
+        assert np.linalg.norm(found - truth) < 0.01 * np.linalg.norm(truth)
+
+
+def test_a_leak_has_a_discharge_coefficient_of_its_own_where_the_sheet_has_none():
+    """An area of 0.7 stands for as much leak as a larger one of the default pump's 0.65."""
+    pump = {"pistons": 9}
+    flow = leak_flow(pump, OIL, SPEED, PRESSURE, FAULTS["slipper"])
+    truth = simulated(pump, Slipper(4e-7 * 0.7 / 0.65)) - simulated(pump)
+    assert np.linalg.norm(flow.harmonics(4e-7)[ORDERS] - truth) < 0.01 * np.linalg.norm(truth)
+
+
+def _twin(pump):
+    rig = Rig(OIL, pump, (Segment(5.0, 0.02, 1200.0),), (Sensor("p1", 0.5),), Load("orifice"))
+    return Twin(rig)
+
+
+def test_a_pump_known_by_its_pistons_alone_delivers_the_ripple_s_mean_flow():
+    """The default pump scaled to twice its flow has twice its displacement."""
+    flow = 2.0 * Geometry.from_dict({"pistons": 9}).displacement * 20.0
+    pump = with_fitted_pump(_twin({"pistons": 9}), flow, 20.0).rig.pump
+    assert Geometry.from_dict(pump).displacement * 20.0 == pytest.approx(flow)
+
+
+def test_a_pump_of_known_geometry_is_left_as_it_is():
+    """A ripple's mean flow does not overrule the data sheet."""
+    assert with_fitted_pump(_twin(dict(PUMP)), 1.0, 20.0).rig.pump == PUMP

@@ -1,0 +1,27 @@
+# What is wrong with the pump, by the corrected twin itself: snakemake --cores 2 diagnose
+rule diagnose:
+    input:
+        rig=rig_sheet(),
+        recordings=recordings(),
+        twin=rules.explain.output.twin,
+        faults=[name for name in config["faults"]["files"] if name.endswith(".py")],
+        source=scripts_sources("diagnose.py"),
+    output:
+        diagnosis=f"{RESULTS}/diagnosis/diagnosis.json",
+        figures=report(
+            directory(f"{RESULTS}/diagnosis/figures"),
+            patterns=["{name}.png"],
+            category="diagnosis by the twin",
+            caption="../report/diagnose.rst",
+        ),
+    log:
+        f"{RESULTS}/logs/diagnose.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/diagnose.tsv"
+    resources:
+        mem_mb=2000,
+    params:
+        rig=rig_sections("pump", "sensors", "recordings"),
+        faults=config["faults"]["files"],
+    script:
+        "../scripts/diagnose.py"
