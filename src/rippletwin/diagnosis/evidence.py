@@ -119,14 +119,11 @@ def _at_best_areas(model: ObservationModel, mode: Hypothesis, errors: Errors) ->
 def _best_errors(model, mode: Hypothesis, prior: ErrorPrior) -> tuple[Errors, float]:
     """Most likely errors on the grid, and the log likelihood integrated over them."""
     weights = prior.log_weights()
-    changes = CHANGES if mode.state else CHANGES[:1]
-    values = np.array(
-        [[model.evaluate(mode, Errors(s, c)).log_likelihood for c in changes] for s in SCATTERS]
+    values = weights + np.array(
+        [[model.evaluate(mode, Errors(s, c)).log_likelihood for c in CHANGES] for s in SCATTERS]
     )
-    values = values + (weights if mode.state else logsumexp(weights, axis=1)[:, None])
     at = np.unravel_index(np.argmax(values), values.shape)
-    change = CHANGES[at[1]] if mode.state else prior.change
-    return Errors(float(SCATTERS[at[0]]), float(change)), float(logsumexp(values))
+    return Errors(float(SCATTERS[at[0]]), float(CHANGES[at[1]])), float(logsumexp(values))
 
 
 def _over_areas(

@@ -21,9 +21,15 @@ class Marginal(NamedTuple):
     square: float
 
 
-def marginal(residual: np.ndarray, variance: np.ndarray, columns: np.ndarray) -> Marginal:
-    """Of residuals (S, F) with errors of `variance` (S, F) and directions `columns` (J, S, F)."""
-    root = 1.0 / np.sqrt(variance)
+def marginal(
+    residual: np.ndarray, variance: np.ndarray, columns: np.ndarray, alike: float = 1.0
+) -> Marginal:
+    """Of residuals (S, F) with errors of `variance` (S, F) and directions `columns` (J, S, F).
+
+    Errors of which about `alike` go together count as one: the log likelihood of independent errors
+    is divided by it (composite likelihood; Pauli, Racugno and Ventura 2011, Statistica Sinica 21).
+    """
+    root = 1.0 / np.sqrt(alike * variance)
     r = (residual * root).ravel()
     b = (columns * root).reshape(len(columns), r.size)
     # Real amplitudes: the inner product of two complex columns is twice its real part.
@@ -34,8 +40,8 @@ def marginal(residual: np.ndarray, variance: np.ndarray, columns: np.ndarray) ->
     amplitudes = np.linalg.solve(factor.T, along)
     square = float(r @ r - along @ along)
     value = -0.5 * square
-    value -= np.sum(np.log(np.pi * variance)) + np.sum(np.log(np.diag(factor)))
-    return Marginal(float(value), amplitudes, square)
+    value -= np.sum(np.log(np.pi * variance)) / alike + np.sum(np.log(np.diag(factor)))
+    return Marginal(float(value), amplitudes, alike * square)
 
 
 def _parts(x: np.ndarray) -> np.ndarray:

@@ -26,6 +26,7 @@ SOURCE_DRIFT, SOURCE_WAVES = 0.01, 4
 CHANGE_WAVES = 6  # cosines over the frequency in which the change's relative error is smooth
 SMOOTH_SHARE = 0.5  # of the change's relative error, in each of these
 AREA_SD = 0.05  # relative, at least: no leak is an ideal orifice
+ALIKE = 8.0  # readings whose errors go together: those of a line are as wide as its resonances
 NEIGHBOURS = 9  # shaft orders over which a power is averaged
 BETWEEN = 0.01  # share of the ripple's power whose scatter shows at orders that pistons do not make
 
@@ -46,8 +47,29 @@ class Hypothesis:
 
 
 @dataclass(frozen=True)
+class Parts:
+    """A prediction, Pa, all turned by the shaft angle.
+
+    healthy   (S, F) what the healthy pump would make
+    drifted   (S, F) share of it that the drift of the line has made
+    leaks     (K, S, F) what each leak adds
+    slopes    (D, S, F) derivatives of the reading by the drift
+    """
+
+    healthy: np.ndarray
+    drifted: np.ndarray
+    leaks: np.ndarray
+    slopes: np.ndarray
+
+    @property
+    def reading(self) -> np.ndarray:
+        """The whole prediction (S, F)."""
+        return self.healthy + self.leaks.sum(axis=0)
+
+
+@dataclass(frozen=True)
 class Errors:
-    """Relative errors: `scatter` of the healthy ripple, `change` of what leaks change in it."""
+    """Relative errors: `scatter` of the healthy ripple, `change` of what changes in it."""
 
     scatter: float
     change: float
@@ -77,6 +99,7 @@ class ObservationModel:
         self.noise = anchor.variance + np.einsum("fss->sf", self.observation.covariance).real
         self._waves = _cosines(self.observation.frequency_hz, CHANGE_WAVES)
         self._base = None
+        self._undrifted = line.response()[:, : len(self.orders)]
 
     # predictions
 
@@ -119,17 +142,20 @@ class ObservationModel:
         """Readings (S, F), Pa s/m3, for unit flow, where the line was last linearised."""
         return self._base[1][:, : len(self.orders)]
 
-    def parts(self, hypothesis: Hypothesis) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The healthy part (S, F) of the reading, the leaks' parts (K, S, F), and the slopes
-        (D, S, F) of their sum by the drift, all turned by the shaft angle."""
+    def parts(self, hypothesis: Hypothesis) -> Parts:
+        """The prediction of a hypothesis, divided."""
         at, _, slopes = self._base
         slopes = slopes[..., : len(self.orders)]
         moved = self.response + np.tensordot(self.state_of_line(hypothesis) - at, slopes, 1)
         leaks = self.change(hypothesis)
         flow = self.anchor.flow + np.sum(leaks, axis=0)
         turn = np.exp(1j * self.orders * hypothesis.turn)
-        healthy = (moved * self.anchor.flow + self.anchor.rest) * turn
-        return healthy, moved * leaks[:, None] * turn, slopes * flow * turn
+        return Parts(
+            healthy=(moved * self.anchor.flow + self.anchor.rest) * turn,
+            drifted=(moved - self._undrifted) * self.anchor.flow * turn,
+            leaks=moved * leaks[:, None] * turn,
+            slopes=slopes * flow * turn,
+        )
 
     # likelihood
 
@@ -138,20 +164,20 @@ class ObservationModel:
     ) -> Marginal:
         """Marginal likelihood of the recording below a frequency. The first amplitudes are those of
         the shaft angle, in `TURN_SD`, and of the drift."""
-        healthy, leaks, slopes = self.parts(hypothesis)
+        parts = self.parts(hypothesis)
         below = self.observation.frequency_hz <= highest_hz
-        columns = self._columns(healthy, leaks, slopes, errors)
+        columns = self._columns(parts, errors)
         # The drift is about zero: where it has been followed, back to there in a straight line.
-        residual = self.values - healthy - leaks.sum(axis=0)
-        residual = residual + np.tensordot(hypothesis.drift, slopes, 1)
-        variance = self.variance(healthy, leaks, errors)
-        return marginal(residual[:, below], variance[:, below], columns[..., below])
+        residual = self.values - parts.reading + np.tensordot(hypothesis.drift, parts.slopes, 1)
+        variance = self.variance(parts, errors)
+        return marginal(residual[:, below], variance[:, below], columns[..., below], ALIKE)
 
-    def variance(self, healthy: np.ndarray, leaks: np.ndarray, errors: Errors) -> np.ndarray:
-        """Variance (S, F), Pa2, of the readings' independent errors."""
-        scatter = errors.scatter**2 * self.scatter_power(healthy)
-        change = errors.change**2 * local_power(leaks.sum(axis=0))
-        return self.noise + scatter + change
+    def variance(self, parts: Parts, errors: Errors) -> np.ndarray:
+        """Variance (S, F), Pa2, of the readings' independent errors. What the twin says of a change
+        is relatively wrong, whether a leak makes it or a drift of the line."""
+        scatter = errors.scatter**2 * self.scatter_power(parts.healthy)
+        changed = local_power(parts.leaks.sum(axis=0)) + self.power_by_class(parts.drifted)
+        return self.noise + scatter + errors.change**2 * changed
 
     def scatter_power(self, healthy: np.ndarray) -> np.ndarray:
         """Power (F,) to which the scatter of repeated healthy recordings is in proportion."""
@@ -183,14 +209,14 @@ class ObservationModel:
         self.linearise_line(hypothesis)
         return hypothesis
 
-    def _columns(self, healthy, leaks, slopes, errors: Errors) -> np.ndarray:
-        whole = healthy + leaks.sum(axis=0)
-        turning = TURN_SD * 1j * self.orders * whole
-        source = SOURCE_DRIFT * healthy * self._waves[:SOURCE_WAVES, None]
+    def _columns(self, parts: Parts, errors: Errors) -> np.ndarray:
+        turning = TURN_SD * 1j * self.orders * parts.reading
+        source = SOURCE_DRIFT * parts.healthy * self._waves[:SOURCE_WAVES, None]
         sizes = np.full(CHANGE_WAVES, SMOOTH_SHARE * errors.change)
         sizes[0] = np.hypot(sizes[0], AREA_SD)
-        changed = [sizes[:, None, None] * self._waves[:, None] * leak for leak in leaks]
-        return np.concatenate([turning[None], slopes, *map(complex_columns, (source, *changed))])
+        changed = [sizes[:, None, None] * self._waves[:, None] * leak for leak in parts.leaks]
+        smooth = map(complex_columns, (source, *changed))
+        return np.concatenate([turning[None], parts.slopes, *smooth])
 
 
 def local_power(readings: np.ndarray) -> np.ndarray:

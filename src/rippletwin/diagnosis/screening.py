@@ -55,7 +55,8 @@ class Screen:
         self.model = model
         nothing = Hypothesis((), (), (), 0.0, np.zeros(len(model.line.drifts)))
         model.linearise_line(nothing)
-        healthy, _, slopes = model.parts(nothing)
+        parts = model.parts(nothing)
+        healthy, slopes = parts.healthy, parts.slopes
         self._response = model.response
         drifted = np.sum(np.abs(slopes) ** 2, axis=(0, 1))
         drifted = drifted / np.maximum(np.sum(np.abs(healthy) ** 2, axis=0), 1e-300)

@@ -8,10 +8,9 @@ import numpy as np
 from scipy.special import gammaincc
 
 from rippletwin.diagnosis.evidence import CHANGES, SCATTERS, ErrorPrior, StateEvidence
-from rippletwin.diagnosis.observation_model import Errors, ObservationModel
+from rippletwin.diagnosis.observation_model import ALIKE, Errors, ObservationModel
 
 UNLIKE = 0.01  # p-value below which a recording is like nothing that was tried
-ALIKE = 8.0  # residuals that go together: errors of a line have the bandwidth of its resonances
 STANDS_OUT = 3.0  # residual over its expected error, of an order worth naming
 MOST_ORDERS = 12
 COHERENT = 0.7  # share of the residual that one flow at the pump must account for
@@ -40,21 +39,21 @@ def judge_residual(model: ObservationModel, best: StateEvidence, prior: ErrorPri
     """
     medians = Errors(prior.scatter, prior.change)
     model.linearise_line(best.mode)
-    healthy, leaks, _ = model.parts(best.mode)
+    parts = model.parts(best.mode)
     misfit = model.evaluate(best.mode, medians).square
-    usual = model.variance(healthy, leaks, medians)
+    usual = model.variance(parts, medians)
     count = 2.0 * usual.size
     chances = np.exp(prior.log_weights())
     p = 0.0
     for i, scatter in enumerate(SCATTERS):
         for k, change in enumerate(CHANGES):
             errors = Errors(float(scatter), float(change))
-            ratio = float(np.mean(model.variance(healthy, leaks, errors) / usual))
+            ratio = float(np.mean(model.variance(parts, errors) / usual))
             freedom = count / ALIKE / 2.0
             p += chances[i, k] * gammaincc(freedom, freedom * misfit / (count * ratio))
     if p >= UNLIKE:
         return Unlikeness(float(p))
-    residual = model.values - healthy - leaks.sum(axis=0)
+    residual = model.values - parts.reading
     return Unlikeness(float(p), *_where(model, residual, usual))
 
 

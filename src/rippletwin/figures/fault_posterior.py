@@ -34,7 +34,8 @@ def change(d: Diagnosis) -> Figure:
     state, with the error that is allowed for."""
     model, best = d.model, d.best
     model.linearise_line(best.mode)
-    healthy, leaks, _ = model.parts(best.mode)
+    parts = model.parts(best.mode)
+    healthy, leaks = parts.healthy, parts.leaks
     error = np.sqrt(model.variance(healthy, leaks, best.errors)) / 1e3
     measured, predicted = (np.abs(x) / 1e3 for x in (model.values - healthy, leaks.sum(axis=0)))
     sensors = model.line.twin.rig.sensors
