@@ -26,6 +26,7 @@ SOURCE_DRIFT, SOURCE_WAVES = 0.01, 4
 CHANGE_WAVES = 6  # cosines over the frequency in which the change's relative error is smooth
 SMOOTH_SHARE = 0.5  # of the change's relative error, in each of these
 AREA_SD = 0.1  # relative: discharge coefficients of leaks are between 0.6 and 0.8
+MIN_CHANGE_ERROR = 0.04  # relative, of the change by a leak behind the best of twins
 ALIKE = 8.0  # readings whose errors go together: those of a line are as wide as its resonances
 NEIGHBOURS = 9  # shaft orders over which a power is averaged
 BETWEEN = 0.01  # share of a power whose errors show at orders that have none of it
@@ -71,7 +72,8 @@ class Parts:
 
 @dataclass(frozen=True)
 class Errors:
-    """Relative errors: `scatter` of the healthy ripple, `change` of what changes in it."""
+    """Errors of a prediction: `scatter`, relative, of the healthy ripple, and `change` of what
+    changes in it, over what the twin's own misfit of the healthy ripple leads to expect."""
 
     scatter: float
     change: float
@@ -100,6 +102,7 @@ class ObservationModel:
         self.values = self.observation.values
         self.noise = anchor.variance + np.einsum("fss->sf", self.observation.covariance).real
         self._waves = _cosines(self.observation.frequency_hz, CHANGE_WAVES)
+        self._expected = np.hypot(MIN_CHANGE_ERROR, anchor.misfit)
         self._base = None
         self._undrifted = line.response()[:, : len(self.orders)]
 
@@ -182,7 +185,7 @@ class ObservationModel:
         scatter = errors.scatter**2 * self.scatter_power(parts.healthy)
         leaks = local_power(parts.leaks.sum(axis=0)) + BETWEEN * parts.spread
         changed = self._measured_share(parts) ** 2 * leaks + self.power_by_class(parts.drifted)
-        return self.noise + scatter + errors.change**2 * changed
+        return self.noise + scatter + (errors.change * self._expected) ** 2 * changed
 
     def _measured_share(self, parts: Parts) -> float:
         """The measured change over the predicted one. Errors of a leak's change are relative to
@@ -226,7 +229,7 @@ class ObservationModel:
         turning = TURN_SD * 1j * self.orders * parts.reading
         source = SOURCE_DRIFT * parts.healthy * self._waves[:SOURCE_WAVES, None]
         leaks = self._measured_share(parts) * parts.leaks
-        waves = SMOOTH_SHARE * errors.change * self._waves[:, None]
+        waves = SMOOTH_SHARE * errors.change * self._expected * self._waves[:, None]
         smooth = map(complex_columns, (source, *(waves * leak for leak in leaks)))
         return np.concatenate([turning[None], parts.slopes, AREA_SD * leaks, *smooth])
 
