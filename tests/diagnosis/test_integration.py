@@ -1,6 +1,6 @@
 """Integrals over the logarithm of an area.
 
-Independent truth: closed forms of Gaussian densities, cut off at the ends of the prior, and of flat ones.
+Independent truth: closed forms of flat densities, and of Gaussian ones between the prior's ends.
 """
 
 import numpy as np
