@@ -119,7 +119,7 @@ def _at_best_areas(model: ObservationModel, mode: Hypothesis, errors: Errors) ->
         return model.evaluate(hypothesis, errors).log_likelihood
 
     for k, fault in enumerate(mode.state):
-        found = explore(_along(mode, k, likelihood), *model.area_ends(fault))
+        found = explore(_along(mode, k, likelihood), *model.area_ends(fault, mode.beside(k)))
         mode = _with_area(mode, k, found.nodes[np.argmax(found.log_density)])
     return mode
 
@@ -146,7 +146,7 @@ def _over_areas(
     likelihood = partial(_over_changes, model, errors=errors, prior=prior)
     at_mode = likelihood(mode)
     densities = {
-        fault.name: explore(_along(mode, k, likelihood), *model.area_ends(fault))
+        fault.name: explore(_along(mode, k, likelihood), *model.area_ends(fault, mode.beside(k)))
         for k, fault in enumerate(mode.state)
     }
     volume = sum(float(d.nodes[-1] - d.nodes[0]) for d in densities.values())

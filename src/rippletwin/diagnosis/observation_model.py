@@ -46,6 +46,10 @@ class Hypothesis:
     turn: float
     drift: np.ndarray
 
+    def beside(self, k: int) -> tuple[float, ...]:
+        """Areas of the other leaks."""
+        return self.areas[:k] + self.areas[k + 1 :]
+
 
 @dataclass(frozen=True)
 class Parts:
@@ -138,10 +142,14 @@ class ObservationModel:
         ]
         return np.sum(each, axis=0) if each else np.zeros((0, len(self.orders)), complex)
 
-    def area_ends(self, fault: Fault) -> tuple[float, float]:
-        """Ends of the prior on the logarithm of a fault's leak area, m2."""
-        areas = self.flows[fault.name].areas
-        return float(np.log(areas[0])), float(np.log(areas[-1]))
+    def area_ends(self, fault: Fault, beside: Sequence[float] = ()) -> tuple[float, float]:
+        """Ends of the prior on the logarithm of a fault's leak area, m2, with leaks of areas
+        `beside` it. A leak below what the twin errs by in the other's change is part of that error.
+        """
+        areas, error = self.flows[fault.name].areas, float(np.median(self._expected))
+        low = max([areas[0], *(error * other for other in beside)])
+        high = min([areas[-1], *(other / error for other in beside)])
+        return float(np.log(low)), float(np.log(high))
 
     def state_of_line(self, hypothesis: Hypothesis) -> np.ndarray:
         """Drift (D,) with what the leaks' loss of mean flow makes of an orifice set anew."""

@@ -104,7 +104,10 @@ class Screen:
             leak = self.model.leak_change(state[0], areas[0], pistons[0])
             base = self._term(base.reading + self._response * leak)
         found = {}
+        low, high = np.exp(self.model.area_ends(fault, areas))
         for area, term in self._leaks_of(fault):
+            if not low <= area * (1.0 + 1e-9) <= high * (1.0 + 2e-9):
+                continue
             product = np.sum(self._weight * np.conj(base.reading) * term.reading, axis=0)
             cross = 2.0 * (self._turns @ product).real
             for piston in range(self.model.pistons if fault.one_piston else 1):
