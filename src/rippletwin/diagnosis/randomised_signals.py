@@ -150,7 +150,7 @@ class SignalSource:
         return own + self._smooth(self.misfit, len(moved), rng) * changed
 
     def _leak(self, leak, area: float, rng) -> tuple[np.ndarray | float, float]:
-        """Change (F,) of the flow at a random piston, and the share of the mean flow that is lost."""
+        """Change (F,) of the flow at a random piston, and the share of the mean flow it loses."""
         piston = rng.integers(self._pistons)
         if leak is None:
             return 0.0, 0.0

@@ -65,9 +65,13 @@ class Classifier(nn.Module):
         x = (x - self.architecture.silence) / self.scale
         return self.features(x.contiguous(memory_format=torch.channels_last))
 
+    def penultimate(self, x: torch.Tensor) -> torch.Tensor:
+        """x as ``feature_maps`` takes it -> features (n, width) that the linear layer sees"""
+        return self.pool(self.feature_maps(x)).flatten(1)
+
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         """x as ``feature_maps`` takes it -> logits (n, classes)"""
-        return self.head(self.pool(self.feature_maps(x)).flatten(1))
+        return self.head(self.penultimate(x))
 
 
 def _plain(a: Architecture, channels: int) -> tuple[nn.Sequential, int]:
