@@ -54,7 +54,7 @@ def test_readme_has_a_row_for_every_key_and_no_other():
     assert shown == expected
 
 
-@pytest.mark.parametrize("overlay", ["", "smoke.yaml", "paper.yaml"])
+@pytest.mark.parametrize("overlay", ["", "smoke.yaml", "paper.yaml", "severity.yaml"])
 def test_configurations_are_valid(overlay):
     """The shipped overlays, laid over the defaults, satisfy the schema."""
     config = DEFAULTS

@@ -11,7 +11,13 @@ from snakemake.utils import validate
 ROOT = Path(workflow.basedir)
 sys.path[:0] = [str(ROOT / "workflow"), str(ROOT / "src")]
 
-from config_errors import check_config, check_datasets, check_names, check_severity, read_rig
+from config_errors import (
+    check_config,
+    check_datasets,
+    check_names,
+    check_severity,
+    read_rig,
+)
 from rippletwin.learning.architectures import ARCHITECTURES, CLASSES
 from rippletwin.learning.malloc_settings import MALLOC_ENVIRONMENT
 from source_files import package_files, source_files_of

@@ -39,8 +39,9 @@ paper = pd.read_csv(paths.paper)
 page = f"""# Diagnostic accuracy on recordings, per cent
 
 The recordings are {params.recordings}, of each state the first; mean and standard deviation over
-{len(endings)} seeds, the paper's values in brackets. A recorded cylinder fault is right as {params.severity["pressure"]} for
-pressure and as {params.severity["flow"]} for flow, and as either in randomised datasets.
+{len(endings)} seeds, the paper's values in brackets. A recorded cylinder fault is right as
+{params.severity["pressure"]} for pressure and as {params.severity["flow"]} for flow, and as either
+in randomised datasets.
 
 {accuracy_table(results, paper, params.columns)}
 ## Either severity of a cylinder fault counts as right
