@@ -49,7 +49,7 @@ def test_readme_has_a_row_for_every_key_and_no_other():
     expected = []
     for key, description in leaves(SCHEMA).items():
         value = values(DEFAULTS)[key]
-        text = ", ".join(value) if isinstance(value, list) else value
+        text = ", ".join(map(str, value)) if isinstance(value, list) else value
         expected.append(f"| `{key}` | {text} | {description} |")
     assert shown == expected
 

@@ -151,7 +151,7 @@ def test_a_row_of_datasets_that_nobody_uses_reruns_nothing(workflow):
     """Edited or added: the rows of the configured datasets decide, each for itself."""
     table = workflow / "config/datasets.tsv"
     edit(table, "experimental\tpressure\trig\tnone", "experimental\tflow\trig\tcalibrated")
-    edit(table, "CFD-P\t", "mine\tflow\ttwin\tcalibrated\tnone\nCFD-P\t")
+    edit(table, "CFD-P\t", "mine\tflow\ttwin\tcalibrated\tno\tno\tnone\nCFD-P\t")
     assert planned(workflow)[0] == set()
 
 
