@@ -14,7 +14,7 @@ from rippletwin.errors import InputError
 from rippletwin.learning.conformal import fit_conformal
 from rippletwin.learning.kept_networks import KeptNetworks, load_networks
 from rippletwin.learning.networks import build
-from rippletwin.learning.training import penultimate_features
+from rippletwin.learning.training import activation_statistics
 
 SAMPLES, RATE = 3072, 51200.0
 
@@ -26,9 +26,9 @@ def kept(seed=0, dataset="CFD-MOC-PR", architecture="cnn1d_341_100", **changes):
     networks = [build(architecture, 2).eval() for _ in range(2)]
     conformal = [
         fit_conformal(
-            penultimate_features(network, x),
+            activation_statistics(network, x),
             np.arange(60) % 4,
-            penultimate_features(network, held_out),
+            activation_statistics(network, held_out),
         )
         for network in networks
     ]

@@ -24,8 +24,8 @@ def fitted(rng, held_out=99):
 
 
 def test_the_promised_rate_holds_on_exchangeable_data():
-    """Over 300 calibrations of 99 samples the mean rate of false alarms is the promised one, 5 / 100
-    exactly for distances without ties, within four standard errors."""
+    """Over 300 calibrations of 99 samples the mean rate of false alarms is the promised one, which
+    is 5 / 100 exactly for distances without ties, within four standard errors."""
     rng = np.random.default_rng(0)
     rates = [
         np.mean(fitted(rng).p_values(features(rng, 100)[0]) <= PROMISED_RATE) for _ in range(300)

@@ -94,7 +94,8 @@ def test_an_unknown_name_is_named_with_its_neighbours():
 )
 def test_the_schema_of_datasets_has_teeth(changes):
     """Each row is wrong in one way: an unknown word, a twin without use, a use without a twin, a
-    comparison that is none, random twins of no twin, an anchor of a single revolution, a slash in a file's name, a column nobody reads."""
+    comparison that is none, random twins of no twin, an anchor of a single revolution,
+    a slash in a file's name, a column nobody reads."""
     row = {"name": "a", "signal": "pressure", "line": "pipe", "twin": "none"}
     row |= {"randomised": "no", "anchored": "no", "uncorrected": "none"}
     good = pd.DataFrame([row])

@@ -16,7 +16,7 @@ from rippletwin.twin import twin_file
 from rippletwin.twin.twin import Twin
 from run_script import run_script
 
-SAMPLES, DATASET, NETWORK = 1024, "CFD-MOC-PR", "cnn1d_150_50"
+SAMPLES, DATASET, NETWORK = 3072, "CFD-MOC-PR", "cnn1d_341_100"
 TRAINING = {
     "batch_size": 8, "learning_rate": 0.003, "validation_fraction": 0.2, "target_loss": 0.05,
     "patience": 1, "plateau": 10, "min_improvement": 0.01, "max_epochs": 25,
@@ -67,7 +67,7 @@ def test_networks_of_a_range_of_severities_are_kept_and_used(tmp_path):
         stores,
         wildcards,
         {
-            "signal": "pressure", "anchored": False, "draws": 60, "limit": 3.46e-7,
+            "signal": "pressure", "anchored": False, "draws": 200, "limit": 3.46e-7,
             "severity": {"S": [1e-7, 2e-6], "C": [1e-7, 2e-6]},
             "bandwidth_hz": 1500, "learnt_share": 0.8,
         },
@@ -75,14 +75,14 @@ def test_networks_of_a_range_of_severities_are_kept_and_used(tmp_path):
         twin=tmp_path / "twin.json",
     )  # fmt: skip
     learnt = store.load(stores["learnt"])
-    assert learnt.signal.shape == (4, 60, 2, SAMPLES) and (learnt.leak_area[0] == 0).all()
+    assert learnt.signal.shape == (4, 200, 2, SAMPLES) and (learnt.leak_area[0] == 0).all()
     assert not np.array_equal(learnt.signal, store.load(stores["held_out"]).signal)
     run_script(
         "augment",
         tmp_path,
         {"seed": tmp_path / "samples.zarr"},
         wildcards | {"revolutions": "1"},
-        {"samples_per_class": 120, "noise": 0.15},
+        {"samples_per_class": 200, "noise": 0.15},
         signals=stores["learnt"],
         recorded=tmp_path / "recorded.zarr",
     )

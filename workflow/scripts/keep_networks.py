@@ -14,7 +14,7 @@ from rippletwin.learning.conformal import PROMISED_RATE, fit_conformal
 from rippletwin.learning.dataset import each_once, split_by_time
 from rippletwin.learning.kept_networks import KeptNetworks
 from rippletwin.learning.networks import restore_networks
-from rippletwin.learning.training import penultimate_features
+from rippletwin.learning.training import activation_statistics
 
 report_progress = open_log(snakemake)
 torch.set_num_threads(snakemake.threads)
@@ -28,8 +28,7 @@ noise = recorded.noise_std.values
 weights = torch.load(snakemake.input.weights, weights_only=True)
 conformal = []
 for network in restore_networks(name, x.shape[1], weights):
-    features = (penultimate_features(network, samples) for samples in (x, held_out))
-    learnt, others = features
+    learnt, others = (activation_statistics(network, samples) for samples in (x, held_out))
     conformal.append(fit_conformal(learnt, y, others))
 kept = KeptNetworks(
     architecture=name,

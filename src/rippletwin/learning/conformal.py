@@ -1,10 +1,11 @@
 """Whether a window is unlike everything a network learnt: a p-value with a promised rate.
 
-Nonconformity is the Mahalanobis distance to the nearest class in the network's penultimate layer,
-with one covariance for all classes (Lee, Lee, Lee & Shin 2018, NeurIPS 31). Its rank among the
-distances of held-out samples is the p-value of split conformal prediction (Vovk, Gammerman & Shafer
-2005, Algorithmic Learning in a Random World, section 4.2): where a window is exchangeable with the
-held-out samples, p <= r happens with a probability of at most r, whatever the network.
+Nonconformity is the Mahalanobis distance to the nearest class, with one covariance for all classes,
+of the activations of all layers (Lee, Lee, Lee & Shin 2018, NeurIPS 31). The last layer alone keeps
+little of what tells no classes apart, such as a line that somebody changed. The distance's rank
+among those of held-out samples is the p-value of split conformal prediction (Vovk, Gammerman &
+Shafer 2005, Algorithmic Learning in a Random World, section 4.2): where a window is exchangeable
+with the held-out samples, p <= r happens with a probability of at most r, whatever the network.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from rippletwin.errors import InputError
 from rippletwin.learning.architectures import CLASSES
 from rippletwin.learning.conformal import Conformal
 from rippletwin.learning.networks import restore_networks
-from rippletwin.learning.training import penultimate_features, predict
+from rippletwin.learning.training import activation_statistics, predict
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class KeptNetworks:
         said, p_values = [], []
         for network, conformal in zip(networks, self.conformal, strict=True):
             said.append(predict(network, windows)[0])
-            p_values.append(conformal.p_values(penultimate_features(network, windows)))
+            p_values.append(conformal.p_values(activation_statistics(network, windows)))
         return np.array(said), np.array(p_values)
 
     def save(self, path: str | Path) -> None:

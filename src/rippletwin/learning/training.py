@@ -156,11 +156,11 @@ def predict(
 
 
 @torch.no_grad()
-def penultimate_features(network: nn.Module, x: np.ndarray, batch_size: int = 64) -> np.ndarray:
-    """Features (n, width) of x that the network's linear layer sees."""
+def activation_statistics(network: nn.Module, x: np.ndarray, batch_size: int = 64) -> np.ndarray:
+    """``Classifier.activation_statistics`` (n, D) of x."""
     network.eval()
     batches = torch.as_tensor(x, dtype=torch.float32).split(batch_size)
-    return torch.cat([network.penultimate(batch) for batch in batches]).numpy()
+    return torch.cat([network.activation_statistics(batch) for batch in batches]).numpy()
 
 
 @torch.no_grad()
