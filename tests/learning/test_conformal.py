@@ -35,8 +35,8 @@ def test_the_promised_rate_holds_on_exchangeable_data():
 
 
 def test_a_network_that_knows_its_training_samples_keeps_the_promise():
-    """Means and covariance of 20 samples in 16 dimensions fit those 20 too well; the held-out ones
-    set the threshold, so the rate holds all the same."""
+    """The covariance of 20 samples in 16 dimensions fits those 20 too well; the held-out ones set
+    the threshold, so the rate holds all the same."""
     rng = np.random.default_rng(1)
     rates = []
     for _ in range(200):
@@ -62,16 +62,35 @@ def test_a_feature_that_was_silent_and_speaks_is_caught():
     assert np.mean(conformal.p_values(x) <= PROMISED_RATE) > 0.9
 
 
-def test_the_distance_is_mahalanobis_to_the_nearest_class():
-    """Two clusters of known covariance: by hand, two standard deviations along either axis."""
+def test_nonconformity_is_a_ratio_of_distances():
+    """By hand on a line of samples one apart: in their midst 1.2 over a mean of 1.8, and ten beyond
+    their end 12 over a mean of 2.12."""
+    x = np.arange(21.0)[:, None]
+    conformal = fit_conformal(x, np.zeros(21, int), x)
+    found = conformal.nonconformity(np.array([[10.0], [30.0]]))
+    np.testing.assert_allclose(found, [1.2 / 1.8, 12 / 2.12])
+
+
+def test_directions_count_by_their_spread_within_a_class():
+    """Two clusters far apart, wide in one direction: in the distance's coordinates each has unit
+    deviation in both directions."""
     rng = np.random.default_rng(4)
     spread = np.array([1.0, 10.0])
-    centres = np.array([[0.0, 0.0], [100.0, 0.0]])
-    labels = np.repeat([0, 1], 20000)
-    x = centres[labels] + rng.normal(size=(40000, 2)) * spread
+    labels = np.repeat([0, 1], 2000)
+    x = np.array([[0.0, 0.0], [1000.0, 0.0]])[labels] + rng.normal(size=(4000, 2)) * spread
     conformal = fit_conformal(x, labels, x[:100])
-    found = conformal.distance(np.array([[2.0, 0.0], [100.0, 20.0], [98.0, 0.0]]))
-    np.testing.assert_allclose(found, 2.0, rtol=0.05)
+    apart = conformal.learnt[:2000].std(axis=0)
+    np.testing.assert_allclose(np.sort(apart), 1.0, rtol=0.1)
+
+
+def test_many_features_are_still_kept_apart():
+    """A thousand features, more than samples: the promise holds, and a shift of all is caught."""
+    rng = np.random.default_rng(6)
+    mixing = rng.normal(size=(20, 1000))
+    x, held_out, new = (rng.normal(size=(200, 20)) @ mixing for _ in range(3))
+    conformal = fit_conformal(x, np.arange(200) % 4, held_out)
+    assert np.mean(conformal.p_values(new) <= PROMISED_RATE) < 0.12
+    assert (conformal.p_values(new + 10.0 * rng.normal(size=1000)) <= PROMISED_RATE).all()
 
 
 def test_too_few_held_out_samples_promise_nothing():

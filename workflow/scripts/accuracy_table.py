@@ -26,8 +26,7 @@ for (dataset, architecture), predictions, histories in zip(
     protocol = answers[first_of_each_state(answers.truth, answers.recording)]
     for seed, windows in protocol.groupby("seed"):
         predicted = windows.predicted.map(CLASSES.index).to_numpy()
-        signal = params.signals[dataset]
-        scored = score(windows.truth.to_numpy(), predicted, signal, severity)
+        scored = score(windows.truth.to_numpy(), predicted, params.signals[dataset], severity)
         rows.append(result_row(architecture, dataset, seed, scored, endings[seed]))
     unknown = answers[answers.truth == UNKNOWN]
     if len(unknown):
@@ -39,9 +38,9 @@ paper = pd.read_csv(paths.paper)
 page = f"""# Diagnostic accuracy on recordings, per cent
 
 The recordings are {params.recordings}, of each state the first; mean and standard deviation over
-{len(endings)} seeds, the paper's values in brackets. A recorded cylinder fault is right as
-{params.severity["pressure"]} for pressure and as {params.severity["flow"]} for flow, and as either
-in randomised datasets.
+{len(endings)} seeds, the paper's values in brackets. A cylinder fault is right as
+{params.severity["pressure"]} for pressure and {params.severity["flow"]} for flow; as either, where
+networks learnt a range of severities.
 
 {accuracy_table(results, paper, params.columns)}
 ## Either severity of a cylinder fault counts as right
