@@ -86,8 +86,8 @@ def signals_of(wildcards):
 def samples_per_class_of(wildcards):
     counts = config["samples_per_class"]
     count = counts["time" if wildcards.revolutions == "1" else "image"]
-    factor = counts["randomised"] if wildcards.dataset in RANDOMISED else 1
-    return count * factor
+    randomised = DATASETS[wildcards.dataset].randomised == "yes"
+    return count * counts["randomised"] if randomised else count
 
 
 def reference_of(wildcards):
