@@ -22,7 +22,7 @@ source = SignalSource(
     recorded.speed_hz,
     recorded.load_pressure,
 )
-report_progress(f"the twin leaves {source.misfit:.1%} of the healthy ripple")
+report_progress(f"the twin leaves {source.overall_misfit:.1%} of the healthy ripple")
 bins = severity_bins(params.severity, params.limit)
 is_flow = params.signal == "flow"
 for seed, path in enumerate(snakemake.output):
@@ -46,7 +46,7 @@ for seed, path in enumerate(snakemake.output):
                 "state": list(CLASSES),
                 "channel": ["outlet"] if is_flow else recorded.channel.values,
             },
-            attrs={"speed_hz": recorded.speed_hz, "misfit": source.misfit}
+            attrs={"speed_hz": recorded.speed_hz, "misfit": source.overall_misfit}
             | {"source": f"twins drawn from {snakemake.input.twin}"},
         ),
         path,

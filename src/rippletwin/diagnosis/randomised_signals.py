@@ -5,8 +5,8 @@ A signal is one revolution at the sensors, an inverse Fourier transform of
     response of the line x (flow of the healthy pump + change by a leak)
 
 whose line is drawn from the twin's posterior and drifts as between two recordings, whose leak is of
-a log-uniform area at a random piston, and whose error is a smooth random function of the frequency
-as large as the twin's own misfit of the healthy ripple. An anchored signal has the measured healthy
+a log-uniform area at a random piston, and whose error is a smooth random function of frequency,
+about each order as large as the twin's own misfit of the healthy ripple. An anchored signal has the measured healthy
 ripple in place of the twin's, so that the misfit concerns the change alone.
 """
 
@@ -34,12 +34,11 @@ WAVES, WAVES_HZ = 6, 4000.0  # cosines of the smooth error, and over which frequ
 @dataclass(frozen=True)
 class RandomisedSignals:
     """pressure (C, N, S, M), Pa, and source flow (C, N, 1, M), m3/s, of C classes; leak areas
-    (C, N), m2, 0 for a healthy pump. misfit is the twin's own of the healthy ripple, relative."""
+    (C, N), m2, 0 for a healthy pump."""
 
     pressure: np.ndarray
     flow: np.ndarray
     leak_area: np.ndarray
-    misfit: float
 
 
 def severity_bins(
@@ -95,6 +94,12 @@ class SignalSource:
             values, vectors = np.linalg.eigh(covariance[np.ix_(kept, kept)])
             self._root = vectors * np.sqrt(np.clip(values, 0.0, None))
 
+    @property
+    def overall_misfit(self) -> float:
+        """What the twin leaves of the whole healthy ripple, relative."""
+        ripple = np.abs(self._healthy)
+        return float(np.linalg.norm(self.misfit * ripple) / np.linalg.norm(ripple))
+
     def draw(
         self,
         bins: Mapping[str, tuple[float, float]],
@@ -132,7 +137,6 @@ class SignalSource:
             pressure=one_period(pressure, self._samples, self.orders),
             flow=one_period(flow, self._samples, self.orders),
             leak_area=areas,
-            misfit=self.misfit,
         )
 
     def _simulated(self, fixed, moved, change, rng) -> np.ndarray:
@@ -171,11 +175,12 @@ class SignalSource:
             drift[self._line.drifts.index("load")] += np.log1p(max(lost, -0.9)) / DRIFTS["load"]
         return drift
 
-    def _smooth(self, size: float, rows: int, rng) -> np.ndarray:
-        """Random factors (rows, F) about 1, smooth in frequency, of relative deviation `size`."""
+    def _smooth(self, size: float | np.ndarray, rows: int, rng) -> np.ndarray:
+        """Random factors (rows, F) about 1, smooth in frequency, of relative deviation `size`, a
+        number or one for each order (F,)."""
         weights = rng.standard_normal((2, rows, WAVES))
         weights[..., 0] /= np.sqrt(2.0)  # the constant cosine has twice the power of the others
-        return 1.0 + size * (weights[0] + 1j * weights[1]) @ self._waves
+        return 1.0 + size * ((weights[0] + 1j * weights[1]) @ self._waves)
 
 
 def _observation(healthy, orders, speed_hz, load_pressure) -> Observation:
