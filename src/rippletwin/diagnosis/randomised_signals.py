@@ -6,8 +6,8 @@ A signal is one revolution at the sensors, an inverse Fourier transform of
 
 whose line is drawn from the twin's posterior and drifts as between two recordings, whose leak is of
 a log-uniform area at a random piston, and whose error is a smooth random function of frequency,
-about each order as large as the twin's own misfit of the healthy ripple. An anchored signal has the measured healthy
-ripple in place of the twin's, so that the misfit concerns the change alone.
+about each order as large as the twin's own misfit of the healthy ripple. An anchored signal has the
+measured healthy ripple in place of the twin's, so that the misfit concerns the change alone.
 """
 
 from __future__ import annotations
