@@ -8,7 +8,9 @@ import pytest
 import torch
 
 import leaking_pump
+from case_folders import ripple, sheet, write_case, write_hdf5
 from rippletwin.case.model import Recording
+from rippletwin.cli import main
 from rippletwin.diagnosis.network_answers import ask_networks, find_networks, judge_windows
 from rippletwin.errors import InputError
 from rippletwin.learning.conformal import fit_conformal
@@ -123,3 +125,18 @@ def test_folders_without_usable_networks_are_named(tmp_path):
     path.write_text("nothing")
     with pytest.raises(InputError, match="holds no kept networks"):
         find_networks(tmp_path, rig)
+
+
+def test_a_folder_without_networks_ends_the_command_before_anything_is_fitted(tmp_path, capsys):
+    """Exit code 2 and one line that names the option, not after minutes of explaining."""
+    content = sheet()
+    second = content["recordings"][0] | {"file": "tomorrow.h5", "state": "unknown"}
+    content["recordings"].append(second)
+    case = tmp_path / "case"
+    case.mkdir()
+    write_case(case, content)
+    write_hdf5(case / "tomorrow.h5", ripple())
+    options = ["--out", str(tmp_path / "out"), "--networks", str(tmp_path)]
+    assert main(["diagnose", str(case), *options]) == 2
+    assert "--networks: there are no networks" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
