@@ -18,6 +18,7 @@ TESTED_AGAIN = {
     "plot_attention",
     "plot_ranks",
     "accuracy_table",
+    "recording_table",
     "report_compound",
     "report_cost",
     "plot_accuracy",
@@ -192,3 +193,12 @@ def test_unknown_key_is_named(workflow):
     said = result.stdout + result.stderr
     assert result.returncode != 0 and len(said.splitlines()) < 10
     assert "unknown key seeeds. Did you mean seeds?" in said
+
+
+def test_a_range_of_severities_reruns_no_dataset_of_one_severity(workflow):
+    """The range, its limit and the number of twins concern randomised datasets alone, of which none
+    is configured here."""
+    edit(workflow / "config/config.yaml", "S: [1.0e-7, 2.0e-6]", "S: [2.0e-7, 2.0e-6]")
+    edit(workflow / "config/config.yaml", "severity_limit: 3.464e-7", "severity_limit: 4.0e-7")
+    edit(workflow / "config/config.yaml", "draws: 400", "draws: 200")
+    assert planned(workflow)[0] == set()
