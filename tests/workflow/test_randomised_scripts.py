@@ -125,3 +125,28 @@ def test_networks_of_a_range_of_severities_are_kept_and_used(tmp_path):
     assert answers[1]["state"] == "slipper" and answers[1]["share"] == 1.0
     rates = pd.read_csv(outputs["rates"]).set_index("truth").unlike
     assert rates["?"] > 0.9 and rates["H"] < 0.2
+
+
+def test_all_recordings_are_in_the_table_and_unknown_ones_are_not(tmp_path):
+    """Two slippers of one state are two recordings, called after their files; an unknown recording
+    is not scored."""
+    said = {"seed": 0, "window": range(6), "recording": [0, 0, 1, 1, 2, 2]}
+    said |= {"truth": list("SSSS??"), "predicted": ["S", "S", "H", "H", "S", "S"]}
+    pd.DataFrame(said).to_csv(tmp_path / "said.csv", index=False)
+    names = {"source": "slipper_1.h5, slipper_2.h5, found.h5"}
+    store.save(xr.Dataset({"signal": ("window", [0.0])}, attrs=names), tmp_path / "w.zarr")
+    table, page = tmp_path / "recordings.csv", tmp_path / "recordings.md"
+    run_script(
+        "recording_table",
+        tmp_path,
+        {"table": table, "page": page},
+        {},
+        {"cells": [(DATASET, NETWORK)], "datasets": [DATASET]},
+        predictions=[tmp_path / "said.csv"],
+        recorded=tmp_path / "w.zarr",
+    )
+    rows = pd.read_csv(table)
+    assert rows.recording.tolist() == ["slipper_1", "slipper_2"]
+    assert rows.right.tolist() == [True, False]
+    text = page.read_text()
+    assert "All 2 recordings" in text and "| 50 ± 0 (1 of 2, 1 to 99) |" in text
