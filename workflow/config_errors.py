@@ -47,13 +47,26 @@ def check_names(key: str, names: Sequence[str], known: Sequence[str], remedy: st
 
 def check_datasets(table: pd.DataFrame) -> None:
     """Raise WorkflowError where two rows of config/datasets.tsv have one name or are the same."""
-    for columns in (["name"], ["signal", "line", "twin"]):
+    for columns in (["name"], ["signal", "line", "twin", "randomised", "anchored"]):
         twice = table[table.duplicated(columns, keep=False)]
         if len(twice):
             names = ", ".join(twice["name"])
             raise WorkflowError(f"config/datasets.tsv: {names}: the same {', '.join(columns)}")
     compared = [name for name in table["uncorrected"] if name != "none"]
     check_names("datasets.tsv: uncorrected", compared, list(table["name"]))
+
+
+def check_severity(faults: dict) -> None:
+    """Raise WorkflowError where a range of leak areas does not ascend, or the limit is outside."""
+    for key, (low, high) in faults["severity"].items():
+        if low >= high:
+            raise WorkflowError(f"config: faults.severity.{key}: {low} to {high} must ascend")
+    (low, high), limit = faults["severity"]["C"], faults["severity_limit"]
+    if not low < limit < high:
+        raise WorkflowError(
+            f"config: faults.severity_limit: {limit} must be between {low} and {high}, "
+            "the ends of faults.severity.C"
+        )
 
 
 def read_rig(case: str) -> tuple[str, dict]:

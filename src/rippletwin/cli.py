@@ -184,6 +184,11 @@ def diagnose(commands) -> None:
         "is not tried by default, by its name (valve_plate)",
     )
     parser.add_argument(
+        "--networks",
+        metavar="RESULTS",
+        help="also ask the networks that a workflow has trained on randomised datasets",
+    )
+    parser.add_argument(
         "--json", action="store_true", help="print the diagnosis as JSON and nothing else"
     )
     parser.add_argument("--processes", type=int, default=2, help="processes to explain with")
@@ -206,10 +211,11 @@ def diagnose(commands) -> None:
         case = load_case(arguments.case, states=states)
         _warn(case)
         recordings = select_recordings(case, arguments.recording)
+        networks = _networks_of(arguments, case)
         with _progress_bars(arguments.json) as progress:
             twin = _twin_of(arguments, case, recordings, progress)
             found = find(case, twin, recordings, faults, progress)
-        result = write_diagnosis(found, arguments.out)
+        result = write_diagnosis(found, arguments.out, _answers(networks, recordings, case))
         if not arguments.no_figures:
             from rippletwin.figures.fault_posterior import draw
 
@@ -221,6 +227,31 @@ def diagnose(commands) -> None:
         return 0
 
     parser.set_defaults(run=run)
+
+
+def _networks_of(arguments, case) -> dict:
+    """The networks in the folder that the command line names, none where it names none."""
+    if arguments.networks is None:
+        return {}
+    from rippletwin.diagnosis.network_answers import find_networks
+
+    return find_networks(arguments.networks, case.rig)
+
+
+def _answers(networks: dict, recordings, case) -> dict:
+    """What networks say of recordings, by label, with a warning where they are not asked."""
+    if not networks:
+        return {}
+    from rippletwin.diagnosis.network_answers import ask_networks
+
+    answers = ask_networks(networks, recordings, case.rig)
+    for label, said in answers.items():
+        if len(said) < len(networks):
+            print(
+                f"rippletwin: warning: {label}: not shown to networks of another operating point",
+                file=sys.stderr,
+            )
+    return answers
 
 
 def _twin_of(arguments, case, recordings, progress):

@@ -39,8 +39,17 @@ _HEALTHY = tuple(
     Point(f"healthy_{speed}_{bar}", float(speed), bar * 1e5, 4.8)
     for speed, bar in ((1200, 60), (800, 95), (1200, 95), (1000, 60), (1000, 120), (800, 60))
 )
-POINTS = {"full": _STATES + _HEALTHY, "smoke": _STATES + _HEALTHY[:1]}
-"""Operating points: each state at 1000 r/min and 9.5 MPa, the healthy pump at others too."""
+_SEVERITIES = tuple(
+    Point(f"{state}_{number}", 1000.0, 9.5e6, 9.6, state, area)
+    for state, areas in (
+        ("slipper", {1: 1.85e-7, 2: 3.33e-7, 4: 1.08e-6, 5: 1.94e-6}),
+        ("cylinder", {1: 1.54e-7, 2: 2.78e-7, 3: 5.0e-7, 5: 1.62e-6}),
+    )
+    for number, area in areas.items()
+)
+POINTS = {"full": _STATES + _HEALTHY + _SEVERITIES, "smoke": _STATES + _HEALTHY[:1]}
+"""Operating points: each state at 1000 r/min and 9.5 MPa, the healthy pump at others too, and four
+more severities of either fault, whose areas with the sealed one are a factor of 1.8 apart."""
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -1,7 +1,7 @@
 """Recordings of a rig by a data logger: wandering speed, sensors, noise, a constant rate."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -17,17 +17,28 @@ MARGIN_S = 0.05  # that a march runs before the first and after the last sample
 
 @dataclass(frozen=True)
 class Point:
-    """An operating point as the operator sets it; `faults` are keys of the rig's faults."""
+    """An operating point as the operator sets it; `faults` are keys of the rig's faults.
+
+    `leak_area`, m2, takes the place of the sealed one where it is given.
+    """
 
     label: str
     speed_rpm: float
     load_pressure: float
     seconds: float
     state: str = "healthy"
+    leak_area: float | None = None
 
     @property
     def faults(self) -> tuple[str, ...]:
         return () if self.state == "healthy" else (self.state,)
+
+    def rig_with_leak(self, rig: Rig) -> Rig:
+        """The rig whose fault of this state has this point's leak area."""
+        if self.leak_area is None or not self.faults:
+            return rig
+        fault = replace(rig.faults[self.state], leak_area=self.leak_area)
+        return replace(rig, faults=rig.faults | {self.state: fault})
 
 
 @dataclass(frozen=True)
@@ -59,7 +70,7 @@ def record(
     count = round(point.seconds * SAMPLING_RATE_HZ)
     speed = set_speed * (1 + draw_speed_wander(count, rig.wander, rig.correlation_s, rng))
     turns = rng.uniform() + np.concatenate([[0.0], np.cumsum(speed[:-1])]) / 60 / SAMPLING_RATE_HZ
-    bench = Bench(rig, point.faults, flow, step_divisor)
+    bench = Bench(point.rig_with_leak(rig), point.faults, flow, step_divisor)
     if marched and rig.wander > 0:
         pressure, orbit = march_recording(bench, speed, turns, set_pressure, tolerance)
     else:

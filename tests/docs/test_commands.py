@@ -63,6 +63,10 @@ NOT_RUN = {
         "it needs a finished trial",
         "rippletwin explain --help",
     ),
+    "rippletwin diagnose my_case --out my_case/diagnosed --networks results/my_case": (
+        "it needs a finished run",
+        "rippletwin diagnose --help",
+    ),
     "python benchmarks/run_costs.py results": (
         "it needs a finished run",
         "python -m py_compile benchmarks/run_costs.py",

@@ -169,3 +169,12 @@ def test_the_papers_table_is_complete():
     assert cell["cnn1d_341_100", "CFD-MOC-P"] == 100 and cell["cnn2d_3_1", "CFD-Q"] == 100
     assert cell["cnn2d_30_3", "CFD-Q"] == 82.8 and cell["cnn1d_150_50", "CFD-P"] == 0
     assert set(CLASSES) == {"H", "S", "C1", "C2"}
+
+
+def test_where_no_severity_is_asked_either_is_right():
+    """By hand: C1 and C2 are both right for C, and what is no cylinder fault is still wrong."""
+    truth = np.array(["C", "C", "C", "H", "S"])
+    said = np.array([CLASSES.index(name) for name in ("C1", "C2", "S", "H", "C1")])
+    scored = score(truth, said, "pressure", None)
+    assert scored["accuracy"] == scored["accuracy_either"] == 3 / 5
+    assert score(truth, said, "pressure")["accuracy"] == 2 / 5

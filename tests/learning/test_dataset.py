@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rippletwin.learning.dataset import augment, remove_mean, split_by_time
+from rippletwin.learning.dataset import augment, each_once, remove_mean, split_by_time
 
 
 @pytest.fixture
@@ -112,3 +112,35 @@ def test_split_by_time_can_leave_a_gap():
     train, test = split_by_time([50, 50], fraction=0.8, gap=1)
     of_one = abs(np.subtract.outer(train[train < 50], test[test < 50]))
     assert of_one.min() == 2 and len(train) + len(test) == 98
+
+
+def test_a_single_draw_takes_the_same_random_numbers(seed):
+    """Against the paper's augmentation written out: shifts first, then noise, nothing else; and one
+    draw a class is the same as none."""
+    x, _ = augment(seed, 6, np.ones(2), np.random.default_rng(4))
+    rng = np.random.default_rng(4)
+    shift = rng.integers(96, size=24)
+    expected = np.array([np.roll(seed[k // 6], -shift[k], axis=-1) for k in range(24)], np.float32)
+    expected += np.float32(0.15) * rng.standard_normal(expected.shape, dtype=np.float32)
+    np.testing.assert_array_equal(x, remove_mean(expected))
+    again, _ = augment(seed[:, None], 6, np.ones(2), np.random.default_rng(4))
+    np.testing.assert_array_equal(x, again)
+
+
+def test_many_draws_are_taken_at_random_from_the_right_class():
+    """Each sample is one of its class's revolutions, marked by its amplitude, and all occur."""
+    level = np.arange(1.0, 21.0).reshape(2, 10)
+    draws = level[:, :, None, None] * np.sin(2 * np.pi * np.arange(64) / 64)
+    x, y = augment(draws, 200, np.zeros(1), np.random.default_rng(0))
+    found = np.round(x.max(axis=(1, 2)))
+    for label in range(2):
+        assert set(found[y == label]) == set(level[label])
+
+
+def test_each_once_takes_every_revolution():
+    """As many samples as revolutions, in class order, none of them twice."""
+    level = np.arange(1.0, 9.0).reshape(2, 4)
+    draws = level[:, :, None, None] * np.sin(2 * np.pi * np.arange(64) / 64)
+    x, y = each_once(draws, np.zeros(1), np.random.default_rng(0))
+    assert y.tolist() == [0] * 4 + [1] * 4
+    np.testing.assert_allclose(x.max(axis=(1, 2)), level.ravel(), rtol=1e-2)

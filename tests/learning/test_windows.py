@@ -1,8 +1,16 @@
 """Windows put together: pairs of recorded ones, probes without noise, a few of a recording."""
 
 import numpy as np
+import pytest
 
-from rippletwin.learning.windows import noise_free_probes, pair_windows, spread_windows
+from rippletwin.errors import InputError
+from rippletwin.learning.windows import (
+    early_healthy,
+    first_of_each_state,
+    noise_free_probes,
+    pair_windows,
+    spread_windows,
+)
 
 
 def test_pairs_are_consecutive_and_of_one_recording():
@@ -35,3 +43,19 @@ def test_windows_are_spread_over_their_state():
     state = np.array(["H"] * 10 + ["S"] * 2)
     chosen = spread_windows(state, 3)
     assert chosen["H"].tolist() == [0, 4, 9] and chosen["S"].tolist() == [10, 11]
+
+
+def test_the_first_recording_of_each_state_is_the_papers_protocol():
+    """Of two slippers the first; recordings of other states keep theirs, whatever the order."""
+    state = np.array(["H", "H", "S", "S", "C", "S", "S", "H"])
+    recording = np.array([0, 0, 1, 1, 2, 3, 3, 4])
+    kept = first_of_each_state(state, recording)
+    assert kept.tolist() == [True, True, True, True, True, False, False, False]
+
+
+def test_early_healthy_windows_are_of_one_recording():
+    """The early half of the first healthy recording; InputError where there is none."""
+    state, recording = np.array(list("SHHHHHH")), np.array([0, 1, 1, 1, 1, 2, 2])
+    assert early_healthy(state, recording, 0.5).tolist() == [1, 2]
+    with pytest.raises(InputError, match="none is healthy"):
+        early_healthy(state[:1], recording[:1], 0.5)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from virtualrig.cli import main
+from virtualrig.cli import POINTS, main
 from virtualrig.orbit import Bench, Orbit
 from virtualrig.recorder import (
     SAMPLING_RATE_HZ,
@@ -254,3 +254,36 @@ def test_a_march_agrees_with_composed_orbits_where_transients_decay_fast(driven)
     ripple = composed.pressure.std()
     assert (march.pressure - composed.pressure).std() < 1e-3 * ripple
     assert (march.pressure - even.pressure).std() > 3e-3 * ripple
+
+
+def test_a_point_may_have_a_leak_of_its_own():
+    """The lost mean flow is that of the point's leak: twice the area, twice the loss within 3 %;
+    and of the sealed area where the point has none."""
+    rig = build(read_yaml(SHEET), QUICK | {"faults": {"slipper": {"leak_area": 2e-7}}})
+
+    def mean_flow(state="slipper", area=None):
+        point = Point("a", 3000.0, 8e6, 0.02, state, area)
+        return record(rig, point, np.random.default_rng(0)).orbit.outlet_flow.mean()
+
+    healthy = mean_flow("healthy")
+    lost = {area: healthy - mean_flow(area=area) for area in (None, 1e-7, 2e-7)}
+    assert lost[None] == lost[2e-7]
+    assert lost[2e-7] / lost[1e-7] == pytest.approx(2.0, rel=0.03) and lost[1e-7] > 0
+
+
+def test_severities_are_added_behind_the_other_points():
+    """Random numbers follow from a point's place in the list: the first nine are where they were.
+    Either fault is recorded with five leaks, the sealed one included, evenly in the logarithm."""
+    labels = [point.label for point in POINTS["full"]]
+    assert labels[:3] == ["healthy_1000_95", "slipper_1000_95", "cylinder_1000_95"]
+    assert all(label.startswith("healthy") for label in labels[3:9])
+    assert not any(label.startswith("healthy") for label in labels[9:])
+    _, rig = read_rig()
+    for state in ("slipper", "cylinder"):
+        areas = [
+            point.rig_with_leak(rig).faults[state].leak_area
+            for point in POINTS["full"]
+            if point.state == state
+        ]
+        ratios = np.diff(np.log(np.sort(areas)))
+        assert len(areas) == 5 and np.allclose(ratios, np.log(1.8), atol=0.02)

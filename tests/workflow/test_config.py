@@ -49,12 +49,12 @@ def test_readme_has_a_row_for_every_key_and_no_other():
     expected = []
     for key, description in leaves(SCHEMA).items():
         value = values(DEFAULTS)[key]
-        text = ", ".join(value) if isinstance(value, list) else value
+        text = ", ".join(map(str, value)) if isinstance(value, list) else value
         expected.append(f"| `{key}` | {text} | {description} |")
     assert shown == expected
 
 
-@pytest.mark.parametrize("overlay", ["", "smoke.yaml", "paper.yaml"])
+@pytest.mark.parametrize("overlay", ["", "smoke.yaml", "paper.yaml", "severity.yaml"])
 def test_configurations_are_valid(overlay):
     """The shipped overlays, laid over the defaults, satisfy the schema."""
     config = DEFAULTS

@@ -6,7 +6,13 @@ import yaml
 from snakemake.exceptions import WorkflowError
 from snakemake.utils import validate
 
-from config_errors import check_config, check_datasets, check_names, read_rig
+from config_errors import (
+    check_config,
+    check_datasets,
+    check_names,
+    check_severity,
+    read_rig,
+)
 from paths import ROOT
 from rippletwin.learning.architectures import ARCHITECTURES
 from workflow_copy import RIG
@@ -79,14 +85,19 @@ def test_an_unknown_name_is_named_with_its_neighbours():
         {"twin": "none", "signal": "flow"},
         {"twin": "none", "line": "twin"},
         {"twin": "calibrated", "line": "twin", "uncorrected": "CFD-P"},
+        {"randomised": "yes"},
+        {"twin": "calibrated", "line": "twin", "anchored": "yes"},
+        {"twin": "calibrated", "line": "twin", "randomised": "perhaps"},
         {"name": "a/b"},
         {"extra": "x"},
     ],
 )
 def test_the_schema_of_datasets_has_teeth(changes):
     """Each row is wrong in one way: an unknown word, a twin without use, a use without a twin, a
-    comparison that is none, a slash in a file's name, a column nobody reads."""
-    row = {"name": "a", "signal": "pressure", "line": "pipe", "twin": "none", "uncorrected": "none"}
+    comparison that is none, random twins of no twin, an anchor of a single revolution,
+    a slash in a file's name, a column nobody reads."""
+    row = {"name": "a", "signal": "pressure", "line": "pipe", "twin": "none"}
+    row |= {"randomised": "no", "anchored": "no", "uncorrected": "none"}
     good = pd.DataFrame([row])
     validate(good, SCHEMAS / "datasets.schema.yaml")
     with pytest.raises(WorkflowError):
@@ -154,3 +165,16 @@ def test_a_sheet_in_order_is_read(case):
     path, sheet = read_rig(f"{folder}/")
     assert path == str(folder / "rig.yaml") and read_rig(path) == (path, sheet)
     assert sheet["recordings"][0]["load_pressure"] == 9.5e6
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"severity_limit": 3e-6}, "faults.severity_limit: 3e-06 must be between 1e-07 and 2e-06"),
+        ({"severity": {"S": [2e-6, 1e-7], "C": [1e-7, 2e-6]}}, "faults.severity.S: 2e-06 to 1e-07"),
+    ],
+)
+def test_severities_that_cannot_be_are_named(changes, said):
+    """A limit that leaves a class empty, and a range that falls; the shipped ones are right."""
+    check_severity(DEFAULTS["faults"])
+    assert said in message(check_severity, DEFAULTS["faults"] | changes)

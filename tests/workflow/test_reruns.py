@@ -18,6 +18,7 @@ TESTED_AGAIN = {
     "plot_attention",
     "plot_ranks",
     "accuracy_table",
+    "recording_table",
     "report_compound",
     "report_cost",
     "plot_accuracy",
@@ -151,7 +152,7 @@ def test_a_row_of_datasets_that_nobody_uses_reruns_nothing(workflow):
     """Edited or added: the rows of the configured datasets decide, each for itself."""
     table = workflow / "config/datasets.tsv"
     edit(table, "experimental\tpressure\trig\tnone", "experimental\tflow\trig\tcalibrated")
-    edit(table, "CFD-P\t", "mine\tflow\ttwin\tcalibrated\tnone\nCFD-P\t")
+    edit(table, "CFD-P\t", "mine\tflow\ttwin\tcalibrated\tno\tno\tnone\nCFD-P\t")
     assert planned(workflow)[0] == set()
 
 
@@ -192,3 +193,12 @@ def test_unknown_key_is_named(workflow):
     said = result.stdout + result.stderr
     assert result.returncode != 0 and len(said.splitlines()) < 10
     assert "unknown key seeeds. Did you mean seeds?" in said
+
+
+def test_a_range_of_severities_reruns_no_dataset_of_one_severity(workflow):
+    """The range, its limit and the number of twins concern randomised datasets alone, of which none
+    is configured here."""
+    edit(workflow / "config/config.yaml", "S: [1.0e-7, 2.0e-6]", "S: [2.0e-7, 2.0e-6]")
+    edit(workflow / "config/config.yaml", "severity_limit: 3.464e-7", "severity_limit: 4.0e-7")
+    edit(workflow / "config/config.yaml", "draws: 400", "draws: 200")
+    assert planned(workflow)[0] == set()

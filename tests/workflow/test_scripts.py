@@ -86,6 +86,7 @@ def reported(folder, truth, said):
             "recordings": "made up",
             "columns": ["CFD-Q+"],
             "signals": {"CFD-Q+": "flow"},
+            "randomised": [],
         },
         predictions=[folder / "said.csv"],
         histories=[folder / "ended.json"],

@@ -26,6 +26,7 @@ rule claims:
     params:
         rig=rig_sections("pump"),
         samples_per_revolution=config["windows"]["samples_per_revolution"],
+        datasets=[name for name in CHOSEN if name not in RANDOMISED],
     script:
         "../scripts/claims.py"
 

@@ -11,12 +11,19 @@ from snakemake.utils import validate
 ROOT = Path(workflow.basedir)
 sys.path[:0] = [str(ROOT / "workflow"), str(ROOT / "src")]
 
-from config_errors import check_config, check_datasets, check_names, read_rig
+from config_errors import (
+    check_config,
+    check_datasets,
+    check_names,
+    check_severity,
+    read_rig,
+)
 from rippletwin.learning.architectures import ARCHITECTURES, CLASSES
 from rippletwin.learning.malloc_settings import MALLOC_ENVIRONMENT
 from source_files import package_files, source_files_of
 
 check_config(config, ROOT / "workflow/schemas/config.schema.yaml")
+check_severity(config["faults"])
 check_names("architectures", config["architectures"], list(ARCHITECTURES))
 
 RESULTS = config["results"]
@@ -72,6 +79,7 @@ DATASETS = {row.name: row for row in table.itertuples(index=False)}
 CHOSEN = [name for name in DATASETS if name in config["datasets"]]
 SIMULATED = [name for name in CHOSEN if DATASETS[name].line != "rig"]
 PRESSURES = [name for name in SIMULATED if DATASETS[name].signal == "pressure"]
+RANDOMISED = [name for name in CHOSEN if DATASETS[name].randomised == "yes"]
 STATES = {  # what a dataset's networks learn, and what they are shown besides
     "single": list(CLASSES),
     "compound": ["+".join(faults) for faults in config["faults"]["compound"]],

@@ -8,12 +8,15 @@ def get_final_output():
     """What a whole run makes with the configured datasets, networks and compound faults."""
     wanted = [
         rules.accuracy_table.output,
+        rules.recording_table.output,
         rules.claims.output,
         rules.plot_accuracy.output,
         rules.plot_calibration.output,
         expand(rules.plot_confusion.output, dataset=CHOSEN),
         expand(rules.plot_seeds.output, dataset=SIMULATED),
     ]
+    if RANDOMISED and of_domain("time"):
+        wanted.append(rules.unlike_table.output)
     if PRESSURES:
         wanted.append(rules.compare_sst.output)
     if corrected_pairs():
@@ -39,7 +42,7 @@ def leak_area_of(wildcards):
 
 
 def twin_of(wildcards):
-    """The calibrated twin, or the one that `explain` corrected."""
+    """The calibrated twin, or the one that `explain` corrected, of wildcards or of a dataset."""
     made_by = {"calibrated": rules.calibrate, "corrected": rules.explain}
     return made_by[wildcards.twin].output.twin
 
@@ -73,9 +76,18 @@ def recorded_signal_of(wildcards):
     return f"{RESULTS}/recordings/{kind}.zarr"
 
 
+def signals_of(wildcards):
+    """Noise-free revolutions that samples of a dataset are made from: many a class, or one."""
+    if wildcards.faults == "single" and DATASETS[wildcards.dataset].randomised == "yes":
+        return f"{RESULTS}/randomised/{wildcards.dataset}/learnt.zarr"
+    return f"{RESULTS}/seeds/{wildcards.dataset}/{wildcards.faults}.zarr"
+
+
 def samples_per_class_of(wildcards):
     counts = config["samples_per_class"]
-    return counts["time" if wildcards.revolutions == "1" else "image"]
+    count = counts["time" if wildcards.revolutions == "1" else "image"]
+    randomised = DATASETS[wildcards.dataset].randomised == "yes"
+    return count * counts["randomised"] if randomised else count
 
 
 def reference_of(wildcards):
@@ -136,8 +148,10 @@ def priority_of(wildcards):
 
 
 def learnt_share_of(wildcards):
-    """Early share of every recording that a network learns from: none of it from simulations."""
-    from_recordings = DATASETS[wildcards.dataset].line == "rig"
+    """Early share of every recording that is not tested, as a network learns from such recordings,
+    or from the healthy one: 0 where simulations do without."""
+    dataset = DATASETS[wildcards.dataset]
+    from_recordings = dataset.line == "rig" or dataset.anchored == "yes"
     return config["experimental"]["training_share"] if from_recordings else 0.0
 
 

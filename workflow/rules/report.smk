@@ -31,8 +31,36 @@ rule accuracy_table:
         cells=cells(CHOSEN),
         columns=table_columns(),
         signals={name: DATASETS[name].signal for name in CHOSEN},
+        randomised=RANDOMISED,
     script:
         "../scripts/accuracy_table.py"
+
+
+rule recording_table:
+    input:
+        predictions=expand(
+            rules.evaluate.output,
+            dataset=CHOSEN,
+            architecture=config["architectures"],
+        ),
+        recorded=rules.cut_windows.output.windows,
+        source=scripts_sources("recording_table.py"),
+    output:
+        table=report(
+            f"{RESULTS}/recordings.csv",
+            category="accuracy",
+            caption="../report/recordings.rst",
+        ),
+        page=f"{RESULTS}/recordings.md",
+    log:
+        f"{RESULTS}/logs/recording_table.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/recording_table.tsv"
+    params:
+        cells=cells(CHOSEN),
+        datasets=CHOSEN,
+    script:
+        "../scripts/recording_table.py"
 
 
 rule report_cost:

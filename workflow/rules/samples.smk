@@ -2,7 +2,7 @@
 # One job makes all seeds of a dataset: starting Python costs more than a seed does.
 rule augment:
     input:
-        signals=f"{RESULTS}/seeds/{{dataset}}/{{faults}}.zarr",
+        signals=signals_of,
         recorded=recorded_signal_of,
         source=scripts_sources("augment.py"),
     output:

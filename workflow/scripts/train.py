@@ -1,4 +1,4 @@
-"""One network trained on every seed's samples; of recordings, the early windows."""
+"""One network trained on every seed's samples; of recordings, the early windows of each first."""
 
 import json
 from dataclasses import asdict
@@ -13,6 +13,7 @@ from rippletwin.learning.architectures import CLASSES
 from rippletwin.learning.dataset import split_by_time
 from rippletwin.learning.networks import build
 from rippletwin.learning.training import TrainingSettings, train
+from rippletwin.learning.windows import first_of_each_state
 
 report_progress = open_log(snakemake)
 params, paths = snakemake.params, snakemake.input.samples
@@ -25,6 +26,7 @@ def samples(path):
     if "label" in data:
         return data.signal.values, data.label.values
     kept, _ = split_by_time(np.bincount(data.recording), params.learnt_share)
+    kept = kept[first_of_each_state(data.state.values, data.recording.values)[kept]]
     kept = kept[data.state.values[kept] != UNKNOWN]  # nothing to learn from an unknown state
     state = np.where(data.state == "C", params.cylinder, data.state)[kept]
     return data.signal.values[kept], np.array([CLASSES.index(s) for s in state])

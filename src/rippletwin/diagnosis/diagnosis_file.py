@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rippletwin.diagnosis.diagnosis import Diagnosis
 from rippletwin.diagnosis.sentence import sentence
 
 
-def diagnosis_dict(diagnoses: Sequence[Diagnosis]) -> dict:
-    """The diagnoses as plain data, with the keys of diagnosis.json."""
-    return {"recordings": [_recording(d) for d in diagnoses]}
+def diagnosis_dict(
+    diagnoses: Sequence[Diagnosis], networks: Mapping[str, dict] | None = None
+) -> dict:
+    """The diagnoses as plain data, with the keys of diagnosis.json; `networks` holds what networks
+    say, by the recording's label."""
+    answers = networks or {}
+    return {"recordings": [_recording(d, answers.get(d.label, {})) for d in diagnoses]}
 
 
-def _recording(d: Diagnosis) -> dict:
+def _recording(d: Diagnosis, networks: dict) -> dict:
     return {
         "label": d.label,
         "state": d.state,
@@ -30,16 +34,18 @@ def _recording(d: Diagnosis) -> dict:
             "p_value": d.unlikeness.p_value,
             "where": {"orders": list(d.unlikeness.orders), "element": d.unlikeness.element},
         },
-        "networks": {},
+        "networks": networks,
         "sentence": sentence(d),
     }
 
 
-def write_diagnosis(diagnoses: Sequence[Diagnosis], folder: str | Path) -> dict:
+def write_diagnosis(
+    diagnoses: Sequence[Diagnosis], folder: str | Path, networks: Mapping[str, dict] | None = None
+) -> dict:
     """Write diagnosis.json into `folder` (made if needed), whole or not at all; returns it."""
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    result = diagnosis_dict(diagnoses)
+    result = diagnosis_dict(diagnoses, networks)
     path = folder / "diagnosis.json"
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:

@@ -41,9 +41,12 @@ class DriftingLine:
         """What can drift on this line; `response` takes them in this order."""
         return tuple(name for name, indices in self._moved.items() if indices)
 
-    def response(self, drift: np.ndarray | None = None) -> np.ndarray:
-        """Readings (S, F), Pa s/m3, for unit flow; `drift` (D,) in standard deviations."""
-        return self._forward.unit_response(self._theta(drift))[0]
+    def response(
+        self, drift: np.ndarray | None = None, theta: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Readings (S, F), Pa s/m3, for unit flow; `drift` (D,) in standard deviations, from the
+        coordinates `theta` (P,), by default the twin's own."""
+        return self._forward.unit_response(self._theta(drift, theta))[0]
 
     def slopes(self, drift: np.ndarray) -> np.ndarray:
         """Derivatives (D, S, F) of `response` at `drift`."""
@@ -51,8 +54,8 @@ class DriftingLine:
         moved = [self.response(drift + STEP * e) for e in np.eye(len(drift))]
         return (np.array(moved).reshape(len(drift), *base.shape) - base) / STEP
 
-    def _theta(self, drift: np.ndarray | None) -> np.ndarray:
-        theta = self.twin.theta.copy()
+    def _theta(self, drift: np.ndarray | None, theta: np.ndarray | None = None) -> np.ndarray:
+        theta = (self.twin.theta if theta is None else theta).copy()
         for name, amount in zip(self.drifts, () if drift is None else drift):
             for k in self._moved[name]:
                 prior = self.twin.parameters[k].prior

@@ -22,13 +22,14 @@ def score(
     truth: np.ndarray,
     predicted: np.ndarray,
     signal: str,
-    severity: dict[str, str] = SEVERITY,
+    severity: dict[str, str] | None = SEVERITY,
 ) -> dict[str, float | np.ndarray]:
     """Accuracies (fractions) of predictions on recordings.
 
     truth : (n,) states of the recordings, of ``TRUE_STATES`` (C1 or C2 where severity is known).
         Windows of state ``UNKNOWN`` do not count.
-    predicted : (n,) indices into ``CLASSES``.  signal : a key of ``severity``.
+    predicted : (n,) indices into ``CLASSES``.  signal : a key of ``severity``; where that is None,
+        either severity is right: the rule for networks that learnt a range of severities.
 
     Returns ``accuracy`` (the paper's scoring), ``accuracy_either`` (C1 and C2 both right for a C),
     ``confusion`` (3, 4) counts and ``n``, the windows that count; the accuracies are NaN where
@@ -42,11 +43,13 @@ def score(
         nothing = np.zeros((len(TRUE_STATES), len(CLASSES)), dtype=int)
         return {"accuracy": np.nan, "accuracy_either": np.nan, "confusion": nothing, "n": 0}
     said = np.array(CLASSES)[predicted]
-    wanted = np.where(truth == "C", severity[signal], truth)
     cylinder = np.isin(truth, ("C", "C1", "C2"))
     either = np.where(cylinder, np.isin(said, ("C1", "C2")), said == truth)
+    strict = either
+    if severity is not None:
+        strict = said == np.where(truth == "C", severity[signal], truth)
     return {
-        "accuracy": float((said == wanted).mean()),
+        "accuracy": float(strict.mean()),
         "accuracy_either": float(either.mean()),
         "confusion": confusion(truth, predicted),
         "n": truth.size,

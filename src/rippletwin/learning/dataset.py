@@ -2,7 +2,8 @@
 
 The paper's augmentation: one simulated revolution for each class becomes many samples by a random
 cyclic shift (there is no tachometer: the crank angle of a window's first point is unknown) and
-Gaussian noise. Only the mean is removed: amplitude is the diagnosis, so nothing is normalised.
+Gaussian noise. Where many revolutions of a class have been simulated, each sample is one of them.
+Only the mean is removed: amplitude is the diagnosis, so nothing is normalised.
 """
 
 from __future__ import annotations
@@ -20,9 +21,10 @@ def augment(
     revolutions: int = 1,
     noise_fraction: float = NOISE_FRACTION,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Shifted, noisy, mean-free samples of one seed revolution for each class.
+    """Shifted, noisy, mean-free samples of the seed revolutions of each class.
 
-    seed : (classes, channels, M), one whole revolution, Pa or m3/s.
+    seed : (classes, channels, M), one whole revolution, or (classes, draws, channels, M), many of
+        which each sample takes one at random; Pa or m3/s.
     noise_std : (channels,) estimated standard deviation of the sensor noise, the seed's unit;
         ``noise_fraction`` of it is added.
     revolutions : length of a sample; the signal repeats, its noise does not.
@@ -32,23 +34,38 @@ def augment(
     for a seed that is not finite.
     """
     seed = np.asarray(seed, dtype=float)
-    if seed.ndim != 3:
-        raise ValueError(f"seed must be (classes, channels, M), got shape {seed.shape}")
-    classes, channels, points = seed.shape
+    if seed.ndim not in (3, 4):
+        raise ValueError(f"seed must be (classes, [draws,] channels, M), got shape {seed.shape}")
+    seed = seed if seed.ndim == 4 else seed[:, None]
+    classes, draws, channels, points = seed.shape
     noise_std = np.broadcast_to(np.asarray(noise_std, dtype=float), (channels,))
     if not (np.isfinite(seed).all() and np.isfinite(noise_std).all()):
         raise ValueError("seed and noise_std must be finite")
 
     y = np.repeat(np.arange(classes), samples_per_class)
     shift = rng.integers(points, size=y.size)
+    drawn = rng.integers(draws, size=y.size) if draws > 1 else np.zeros(y.size, int)
     at = (np.arange(points * revolutions) + shift[:, None]) % points
     x = np.empty((y.size, channels, points * revolutions), dtype=np.float32)
     for label in range(classes):
         of_class = y == label
-        x[of_class] = seed[label][:, at[of_class]].swapaxes(0, 1)
+        x[of_class] = np.take_along_axis(seed[label, drawn[of_class]], at[of_class, None], axis=-1)
     std = (noise_fraction * noise_std).astype(np.float32)
     x += std[:, None] * rng.standard_normal(x.shape, dtype=np.float32)
     return remove_mean(x), y
+
+
+def each_once(
+    signals: np.ndarray,
+    noise_std: np.ndarray,
+    rng: np.random.Generator,
+    noise_fraction: float = NOISE_FRACTION,
+) -> tuple[np.ndarray, np.ndarray]:
+    """One sample of every revolution of signals (classes, draws, channels, M), as ``augment`` makes
+    them: x (classes * draws, channels, M) and y (classes * draws,), in class order."""
+    classes, draws, *shape = signals.shape
+    x, y = augment(signals.reshape(classes * draws, *shape), 1, noise_std, rng, 1, noise_fraction)
+    return x, y // draws
 
 
 def remove_mean(x: np.ndarray) -> np.ndarray:

@@ -60,10 +60,24 @@ class Classifier(nn.Module):
     def feature_maps(self, x: torch.Tensor) -> torch.Tensor:
         """x (n, channels, M) or (n, channels, size, size) in the data's own unit -> the last maps
         (n, width, rows, columns), one row for time windows."""
+        return self.features(self._standardised(x))
+
+    def _standardised(self, x: torch.Tensor) -> torch.Tensor:
         if self.architecture.domain == "time":
             x = x.unsqueeze(-2)
         x = (x - self.architecture.silence) / self.scale
-        return self.features(x.contiguous(memory_format=torch.channels_last))
+        return x.contiguous(memory_format=torch.channels_last)
+
+    def activation_statistics(self, x: torch.Tensor) -> torch.Tensor:
+        """x as ``feature_maps`` takes it -> mean and standard deviation (n, 2 maps) of every map
+        behind every activation of ``features``"""
+        statistics = []
+        x = self._standardised(x)
+        for layer in self.features:
+            x = layer(x)
+            if isinstance(layer, nn.ReLU | BasicBlock):
+                statistics += [x.mean((2, 3)), x.std((2, 3))]
+        return torch.cat(statistics, 1)
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         """x as ``feature_maps`` takes it -> logits (n, classes)"""

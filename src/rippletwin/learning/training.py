@@ -156,6 +156,14 @@ def predict(
 
 
 @torch.no_grad()
+def activation_statistics(network: nn.Module, x: np.ndarray, batch_size: int = 64) -> np.ndarray:
+    """``Classifier.activation_statistics`` (n, D) of x."""
+    network.eval()
+    batches = torch.as_tensor(x, dtype=torch.float32).split(batch_size)
+    return torch.cat([network.activation_statistics(batch) for batch in batches]).numpy()
+
+
+@torch.no_grad()
 def _logits(network: nn.Module, x: torch.Tensor, batch_size: int = 64) -> torch.Tensor:
     network.eval()
     return torch.cat([network(batch) for batch in x.split(batch_size)])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rippletwin.errors import InputError
 from rippletwin.learning.dataset import remove_mean
 
 
@@ -37,6 +38,32 @@ def noise_free_probes(signal: np.ndarray, turns: int, revolutions: int) -> np.nd
         .reshape(-1, signal.shape[1], points * revolutions)
         .astype(np.float32)
     )
+
+
+def first_of_each_state(state: np.ndarray, recording: np.ndarray) -> np.ndarray:
+    """Mask (n,) of the windows of the first recording of every state: the paper's protocol.
+
+    state, recording : (n,) of each window.
+    """
+    recording = np.asarray(recording)
+    _, first, of_state = np.unique(np.asarray(state, str), return_index=True, return_inverse=True)
+    return recording == recording[first][of_state]
+
+
+def early_healthy(state: np.ndarray, recording: np.ndarray, share: float) -> np.ndarray:
+    """Indices of the early `share` of the windows of the first healthy recording.
+
+    Raises InputError where no recording is healthy.
+    """
+    healthy = np.flatnonzero((np.asarray(state) == "H") & first_of_each_state(state, recording))
+    if not len(healthy):
+        raise InputError(
+            "rig.yaml",
+            "recordings",
+            "none is healthy at the diagnosed operating point",
+            "Record one, or leave the randomised datasets out",
+        )
+    return healthy[: max(1, round(share * len(healthy)))]
 
 
 def spread_windows(state: np.ndarray, count: int) -> dict[str, np.ndarray]:

@@ -79,6 +79,12 @@ def twin_of(data: dict) -> Twin:
     return from_dict(data.get("twin", data))
 
 
+def load_covariance(path: str | Path) -> np.ndarray | None:
+    """Posterior covariance (P, P) of a twin.json's theta; None where the file has none."""
+    data = json.loads(Path(path).read_text())
+    return np.array(data["covariance"]) if "covariance" in data else None
+
+
 def load_twin(path: str | Path) -> Twin:
     """The twin of a twin.json, that of a calibration or the corrected one of `explain`.
 

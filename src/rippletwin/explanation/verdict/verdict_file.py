@@ -228,7 +228,8 @@ def write_verdict(explanation: Explanation, folder: str | Path) -> dict:
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     result = verdict_dict(explanation)
-    _write_json(folder / "twin.json", twin_file.to_dict(explanation.twin))
+    covariance = {"covariance": explanation.decision.accepted.covariance}
+    _write_json(folder / "twin.json", twin_file.to_dict(explanation.twin) | covariance)
     _write_json(folder / "verdict.json", result)
     return result
 

@@ -1,0 +1,92 @@
+"""What networks that the workflow has trained say of a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from rippletwin.case.model import Recording, Rig
+from rippletwin.diagnosis.anchor import distance
+from rippletwin.errors import InputError
+from rippletwin.learning.conformal import PROMISED_RATE
+from rippletwin.learning.dataset import remove_mean
+from rippletwin.learning.kept_networks import KeptNetworks, load_networks
+from rippletwin.spectra.observation import revolutions_of
+
+STATE_OF = {"H": "healthy", "S": "slipper", "C1": "cylinder", "C2": "cylinder"}
+
+
+def find_networks(results: str | Path, rig: Rig) -> dict[str, KeptNetworks]:
+    """The networks that judge pressure in RESULTS/networks/DATASET/ARCHITECTURE.pt.
+
+    They are called after their architecture; where several datasets have been learnt, after both,
+    as in "cnn1d_341_100@CFD-MOC-PR". Raises InputError where there are none, and where they have
+    learnt from another number of sensors than the rig has.
+    """
+    folder = Path(results) / "networks"
+    found = [load_networks(path) for path in sorted(folder.glob("*/*.pt"))]
+    found = [kept for kept in found if kept.signal == "pressure"]
+    if not found:
+        raise InputError(
+            folder,
+            "--networks",
+            "there are no networks that judge pressure",
+            "Give the results folder of a workflow with a randomised dataset, as CFD-MOC-PR",
+        )
+    for kept in found:
+        if len(kept.channels) != len(rig.sensors):
+            raise InputError(
+                folder / kept.dataset / f"{kept.architecture}.pt",
+                "--networks",
+                f"they have learnt from {len(kept.channels)} sensors, and the case has "
+                f"{len(rig.sensors)}",
+                "Give the results of a workflow that ran on this rig",
+            )
+    several = len({kept.dataset for kept in found}) > 1
+    return {
+        f"{kept.architecture}@{kept.dataset}" if several else kept.architecture: kept
+        for kept in found
+    }
+
+
+def ask_networks(
+    networks: dict[str, KeptNetworks], recordings: Sequence[Recording], rig: Rig
+) -> dict[str, dict]:
+    """Recording's label -> what each network says of its windows, in the words of diagnosis.json.
+
+    Networks are not asked about a recording of another operating point than theirs.
+    """
+    return {
+        recording.label: {
+            name: judge_windows(kept, _windows(recording, rig, kept.samples_per_revolution))
+            for name, kept in networks.items()
+            if not _apart(recording, kept)
+        }
+        for recording in recordings
+    }
+
+
+def judge_windows(kept: KeptNetworks, windows: np.ndarray) -> dict:
+    """`state`, the `share` of windows and seeds that say it, and the share that is `unlike` all
+    that has been simulated; the state is "unlike" where most are."""
+    said, p_values = kept.answers(windows)
+    unlike = float(np.mean(p_values <= PROMISED_RATE))
+    states = np.array([STATE_OF[name] for name in kept.classes])[said]
+    names, counts = np.unique(states, return_counts=True)
+    state, share = str(names[np.argmax(counts)]), float(counts.max() / states.size)
+    if unlike > 0.5:
+        state, share = "unlike", unlike
+    return {"state": state, "share": share, "unlike": unlike}
+
+
+def _windows(recording: Recording, rig: Rig, samples: int) -> np.ndarray:
+    """Windows (R, S, M) of one revolution each, without their means."""
+    return remove_mean(revolutions_of(recording, rig, samples).windows)
+
+
+def _apart(recording: Recording, kept: KeptNetworks) -> float:
+    """Distance of the operating points of a recording and of networks."""
+    speed_hz = recording.speed_rpm / 60.0
+    return distance(speed_hz, kept.speed_hz, recording.load_pressure, kept.load_pressure)

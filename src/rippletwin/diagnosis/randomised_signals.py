@@ -1,0 +1,204 @@
+"""Training signals that allow for what is not known: severity, twin, piston and shaft angle.
+
+A signal is one revolution at the sensors, an inverse Fourier transform of
+
+    response of the line x (flow of the healthy pump + change by a leak)
+
+whose line is drawn from the twin's posterior and drifts as between two recordings, whose leak is of
+a log-uniform area at a random piston, and whose error is a smooth random function of frequency,
+about each order as large as the twin's own misfit of the healthy ripple. An anchored signal has the
+measured healthy ripple in place of the twin's, so that the misfit concerns the change alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rippletwin.diagnosis.anchor import make_anchor
+from rippletwin.diagnosis.drifting_line import DRIFTS, DriftingLine
+from rippletwin.diagnosis.faults.library import FAULTS
+from rippletwin.diagnosis.observation_model import SOURCE_DRIFT, TURN_SD
+from rippletwin.diagnosis.pump_flow import ORDERS, healthy_flow, leak_flow, with_fitted_pump
+from rippletwin.harmonics import flow_harmonics, one_period, peak_amplitudes
+from rippletwin.spectra.observation import Observation
+from rippletwin.twin.twin import Twin
+
+FAULT_OF = {"S": "slipper", "C1": "cylinder", "C2": "cylinder"}
+"""Class of the networks -> fault; the healthy class H has none."""
+WAVES, WAVES_HZ = 6, 4000.0  # cosines of the smooth error, and over which frequency
+
+
+@dataclass(frozen=True)
+class RandomisedSignals:
+    """pressure (C, N, S, M), Pa, and source flow (C, N, 1, M), m3/s, of C classes; leak areas
+    (C, N), m2, 0 for a healthy pump."""
+
+    pressure: np.ndarray
+    flow: np.ndarray
+    leak_area: np.ndarray
+
+
+def severity_bins(
+    severity: Mapping[str, Sequence[float]], limit: float
+) -> dict[str, tuple[float, float]]:
+    """Range of leak areas, m2, of each faulty class, from those of S and C; `limit` divides the
+    cylinder's. Raises ValueError where a range is empty or the limit is not inside."""
+    (low, high), slipper = severity["C"], tuple(severity["S"])
+    if not 0.0 < low < limit < high:
+        raise ValueError(f"severity_limit {limit} must be between {low} and {high}")
+    if not 0.0 < slipper[0] < slipper[1]:
+        raise ValueError(f"severity.S {slipper} must ascend from a positive area")
+    return {"S": slipper, "C1": (low, limit), "C2": (limit, high)}
+
+
+class SignalSource:
+    """A twin and a healthy recording at one operating point, from which signals are drawn.
+
+    twin, covariance : the twin and the posterior covariance of its theta, None where it is not
+        known; then only the drift of the line is drawn.
+    healthy : (R, S, M) consecutive revolutions of one healthy recording, Pa, M even shaft angles.
+    speed_hz, load_pressure : rev/s, Pa.
+    """
+
+    def __init__(
+        self,
+        twin: Twin,
+        covariance: np.ndarray | None,
+        healthy: np.ndarray,
+        speed_hz: float,
+        load_pressure: float,
+    ):
+        fitted = with_fitted_pump(twin)
+        self._samples = healthy.shape[-1]
+        self.orders = np.arange(1, min(ORDERS, (self._samples - 1) // 2) + 1)
+        self._pistons = fitted.rig.pump["pistons"]
+        self._point = 60.0 * speed_hz, load_pressure
+        self._pump, self._fluid = fitted.rig.pump, fitted.rig.fluid
+        observed = _observation(healthy, self.orders, speed_hz, load_pressure)
+        ripple = healthy_flow(self._pump, self._fluid, *self._point)
+        self._line = DriftingLine(fitted, observed, ripple)
+        self._healthy = observed.values
+        anchor = make_anchor(fitted, observed, observed, self._line, *self._point)
+        self._angle, self.misfit = anchor.angle, anchor.misfit
+        even = self.orders % self._pistons == 0
+        self._flow = np.where(even, flow_harmonics(ripple, self.orders), 0.0)
+        self._waves = np.cos(
+            np.pi * np.outer(np.arange(WAVES), observed.frequency_hz / WAVES_HZ)
+        ) / np.sqrt(WAVES)
+        self._root = None
+        if covariance is not None:
+            kept = [twin.index[p.name] for p in fitted.parameters]
+            values, vectors = np.linalg.eigh(covariance[np.ix_(kept, kept)])
+            self._root = vectors * np.sqrt(np.clip(values, 0.0, None))
+
+    @property
+    def overall_misfit(self) -> float:
+        """What the twin leaves of the whole healthy ripple, relative."""
+        ripple = np.abs(self._healthy)
+        return float(np.linalg.norm(self.misfit * ripple) / np.linalg.norm(ripple))
+
+    def draw(
+        self,
+        bins: Mapping[str, tuple[float, float]],
+        classes: Sequence[str],
+        count: int,
+        rng: np.random.Generator,
+        anchored: bool = False,
+    ) -> RandomisedSignals:
+        """`count` signals of each class, each class with the same twins. Leak areas are log-uniform
+        in `bins`; a class without a bin is healthy."""
+        leaks = {
+            name: leak_flow(self._pump, self._fluid, *self._point, FAULTS[FAULT_OF[name]])
+            for name in classes
+            if name in bins
+        }
+        areas = np.array(
+            [
+                np.exp(rng.uniform(*np.log(bins[name]), count)) if name in bins else np.zeros(count)
+                for name in classes
+            ]
+        )
+        sensors = len(self._healthy)
+        pressure = np.empty((len(classes), count, sensors, len(self.orders)), complex)
+        flow = np.empty((len(classes), count, 1, len(self.orders)), complex)
+        for k in range(count):
+            theta = self._draw_theta(rng)
+            fixed = self._line.response(theta=theta)
+            for c, name in enumerate(classes):
+                change, lost = self._leak(leaks.get(name), areas[c, k], rng)
+                moved = self._line.response(self._draw_drift(lost, rng), theta)
+                read = self._anchored if anchored else self._simulated
+                pressure[c, k] = read(fixed, moved, change, rng)
+                flow[c, k] = self._smooth(self.misfit, 1, rng) * (self._flow + change)
+        return RandomisedSignals(
+            pressure=one_period(pressure, self._samples, self.orders),
+            flow=one_period(flow, self._samples, self.orders),
+            leak_area=areas,
+        )
+
+    def _simulated(self, fixed, moved, change, rng) -> np.ndarray:
+        """Readings (S, F): all of the ripple is the twin's."""
+        return self._smooth(self.misfit, len(moved), rng) * moved * (self._flow + change)
+
+    def _anchored(self, fixed, moved, change, rng) -> np.ndarray:
+        """Readings (S, F): the measured healthy ripple through the drifted line, as the shaft stood
+        when it was recorded, and the twin's change."""
+        flow = np.sum(np.conj(fixed) * self._healthy, 0) / np.sum(np.abs(fixed) ** 2, 0)
+        rest = self._healthy - fixed * flow
+        angle = self._angle + TURN_SD * rng.standard_normal()
+        changed = moved * change * np.exp(1j * self.orders * angle)
+        own = self._smooth(SOURCE_DRIFT, 1, rng) * moved * flow + rest
+        return own + self._smooth(self.misfit, len(moved), rng) * changed
+
+    def _leak(self, leak, area: float, rng) -> tuple[np.ndarray | float, float]:
+        """Change (F,) of the flow at a random piston, and the share of the mean flow it loses."""
+        piston = rng.integers(self._pistons)
+        if leak is None:
+            return 0.0, 0.0
+        harmonics = leak.harmonics(area)
+        turn = np.exp(2j * np.pi * self.orders * piston / self._pistons)
+        return harmonics[self.orders] * turn, harmonics[0].real / leak.mean
+
+    def _draw_theta(self, rng) -> np.ndarray:
+        theta = self._line.twin.theta
+        if self._root is None:
+            return theta
+        return theta + self._root @ rng.standard_normal(len(theta))
+
+    def _draw_drift(self, lost: float, rng) -> np.ndarray:
+        """Drift (D,) of the line; an orifice is set anew, so that the load pressure is held."""
+        drift = rng.standard_normal(len(self._line.drifts))
+        if "load" in self._line.drifts and self._line.twin.rig.load.passes_flow:
+            drift[self._line.drifts.index("load")] += np.log1p(max(lost, -0.9)) / DRIFTS["load"]
+        return drift
+
+    def _smooth(self, size: float | np.ndarray, rows: int, rng) -> np.ndarray:
+        """Random factors (rows, F) about 1, smooth in frequency, of relative deviation `size`, a
+        number or one for each order (F,)."""
+        weights = rng.standard_normal((2, rows, WAVES))
+        weights[..., 0] /= np.sqrt(2.0)  # the constant cosine has twice the power of the others
+        return 1.0 + size * ((weights[0] + 1j * weights[1]) @ self._waves)
+
+
+def _observation(healthy, orders, speed_hz, load_pressure) -> Observation:
+    """The mean revolution of a healthy recording as an observation at all shaft orders."""
+    spectra = peak_amplitudes(healthy)[..., orders]
+    sensors = spectra.shape[1]
+    scatter = np.var(spectra, axis=0).T[:, :, None] * np.eye(sensors) / len(spectra)
+    return Observation(
+        kind="periodic",
+        label="healthy",
+        frequency_hz=orders * speed_hz,
+        orders=orders,
+        values=spectra.mean(axis=0),
+        covariance=scatter.astype(complex),
+        mean=None,
+        speed_hz=speed_hz,
+        load_pressure=load_pressure,
+        source="nominal",
+        flow_ripple=None,
+        sensors=None,
+    )

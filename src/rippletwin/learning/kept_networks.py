@@ -1,0 +1,76 @@
+"""Trained networks kept with all that tomorrow's recording needs: one file an architecture."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from rippletwin.errors import InputError
+from rippletwin.learning.architectures import CLASSES
+from rippletwin.learning.conformal import Conformal
+from rippletwin.learning.networks import restore_networks
+from rippletwin.learning.training import activation_statistics, predict
+
+
+@dataclass(frozen=True)
+class KeptNetworks:
+    """The networks of all seeds of one architecture and dataset.
+
+    signal, channels        "pressure" or "flow", and the names of its channels
+    samples_per_revolution  of a window, which is one revolution
+    speed_hz, load_pressure operating point, rev/s and Pa, at which they have learnt
+    noise_std               (channels,) of the sensors, in the signal's unit
+    weights, conformal      a state dictionary and a `Conformal` each seed
+    """
+
+    architecture: str
+    dataset: str
+    signal: str
+    channels: list[str]
+    samples_per_revolution: int
+    speed_hz: float
+    load_pressure: float | None
+    noise_std: list[float]
+    weights: list[dict]
+    conformal: list[Conformal]
+    classes: tuple[str, ...] = CLASSES
+
+    def answers(self, windows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Class indices and conformal p-values (seeds, n) of windows (n, channels, M)."""
+        networks = restore_networks(self.architecture, len(self.channels), self.weights)
+        said, p_values = [], []
+        for network, conformal in zip(networks, self.conformal, strict=True):
+            said.append(predict(network, windows)[0])
+            p_values.append(conformal.p_values(activation_statistics(network, windows)))
+        return np.array(said), np.array(p_values)
+
+    def save(self, path: str | Path) -> None:
+        """Write them to `path`: tensors, lists, text and numbers only."""
+        data = vars(self) | {"classes": list(self.classes)}
+        data["conformal"] = [
+            {name: torch.as_tensor(values) for name, values in asdict(each).items()}
+            for each in self.conformal
+        ]
+        torch.save(data, path)
+
+
+def load_networks(path: str | Path) -> KeptNetworks:
+    """The networks of a file that `KeptNetworks.save` wrote.
+
+    Raises InputError where the file holds something else.
+    """
+    try:
+        data = torch.load(path, weights_only=True)
+        conformal = [
+            Conformal(**{name: values.numpy() for name, values in each.items()})
+            for each in data.pop("conformal")
+        ]
+        return KeptNetworks(**data | {"conformal": conformal, "classes": tuple(data["classes"])})
+    except (OSError, RuntimeError, pickle.UnpicklingError, KeyError, TypeError, AttributeError):
+        raise InputError(
+            path, "networks", "holds no kept networks", "Let the workflow make it anew"
+        ) from None

@@ -1,0 +1,103 @@
+"""Accuracy with the recording as the unit: windows of one recording are no independent samples.
+
+A recording is right where most of its windows are, either severity of a cylinder fault counting as
+right. The interval of a share of recordings is exact (Clopper & Pearson 1934, Biometrika 26, 404).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pandas as pd
+from scipy.stats import binomtest
+
+from rippletwin.learning.accuracy import UNKNOWN
+from rippletwin.learning.architectures import ARCHITECTURES, CLASSES
+
+CELL = ["architecture", "dataset"]
+
+
+def recording_rows(answers: pd.DataFrame) -> pd.DataFrame:
+    """A row a seed and recording of known state, from a row a seed and window.
+
+    answers : columns seed, recording, truth and predicted (of ``CLASSES``).
+    Columns seed, recording, truth, windows; share of the windows that are right; whether most are,
+    ``right``; and the share that says each class, ``said_H`` and so on.
+    """
+    known = answers[answers.truth != UNKNOWN]
+    said = {f"said_{name}": known.predicted == name for name in CLASSES}
+    kind = known.truth.str[0] == known.predicted.str[0]
+    rows = known.assign(share=kind, windows=1, **said)
+    columns = {"windows": "sum", "share": "mean"} | dict.fromkeys(said, "mean")
+    table = rows.groupby(["seed", "recording", "truth"], sort=False).agg(columns).reset_index()
+    return table.assign(right=table.share > 0.5)
+
+
+def exact_interval(right: int, count: int) -> tuple[float, float]:
+    """95 % interval of a probability of which `right` of `count` trials came true."""
+    interval = binomtest(right, count).proportion_ci(0.95, "exact")
+    return float(interval.low), float(interval.high)
+
+
+def recording_cells(rows: pd.DataFrame) -> pd.DataFrame:
+    """A row a network and dataset: mean and standard deviation over seeds of the share of
+    recordings that are right, per cent; and the recordings that all seeds' windows together get
+    right, with their number and the 95 % interval of the share, per cent.
+
+    rows : ``recording_rows`` with columns architecture and dataset.
+    """
+    table = []
+    for (architecture, dataset), cell in rows.groupby(CELL, sort=False):
+        shares = 100.0 * cell.groupby("seed").right.mean()
+        together = cell.groupby("recording").share.mean() > 0.5
+        low, high = exact_interval(int(together.sum()), len(together))
+        table.append(
+            {
+                "architecture": architecture,
+                "dataset": dataset,
+                "mean": shares.mean(),
+                "std": shares.std() if len(shares) > 1 else 0.0,
+                "right": int(together.sum()),
+                "recordings": len(together),
+                "low": 100.0 * low,
+                "high": 100.0 * high,
+            }
+        )
+    return pd.DataFrame(table)
+
+
+def recording_table(rows: pd.DataFrame, datasets: Sequence[str]) -> str:
+    """Markdown of ``recording_cells``, a row a network and a column for each of `datasets`."""
+    cells = {
+        (c.architecture, c.dataset): f"{c.mean:.0f} ± {c.std:.0f} ({c.right} of {c.recordings}, "
+        f"{c.low:.0f} to {c.high:.0f})"
+        for c in recording_cells(rows).itertuples()
+    }
+    named = [name for name in ARCHITECTURES if name in set(rows.architecture)]
+    lines = [[ARCHITECTURES[name].title, *(cells.get((name, d), "–") for d in datasets)]
+             for name in named]  # fmt: skip
+    return _markdown(["Architecture", *datasets], lines)
+
+
+def severity_table(rows: pd.DataFrame, datasets: Sequence[str], names: Sequence[str]) -> str:
+    """Markdown of what is said of each recording: for each dataset the share of windows that are
+    right and, of a cylinder fault, the share called C2, per cent over networks and seeds.
+
+    names : the recordings' names by their number in `rows`.
+    """
+    lines = []
+    for (recording, truth), of_one in rows.groupby(["recording", "truth"], sort=True):
+        line = [names[recording], truth]
+        for dataset in datasets:
+            seen = of_one[of_one.dataset == dataset]
+            text = f"{100 * seen.share.mean():.0f}" if len(seen) else "–"
+            if truth.startswith("C") and len(seen):
+                text += f" ({100 * seen.said_C2.mean():.0f})"
+            line.append(text)
+        lines.append(line)
+    return _markdown(["Recording", "state", *datasets], lines)
+
+
+def _markdown(head: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
+    rows = [head, ["---"] * len(head), *lines]
+    return "".join("| " + " | ".join(map(str, row)) + " |\n" for row in rows)

@@ -1,0 +1,142 @@
+"""Networks that the workflow keeps, and what they say of a recording."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import torch
+
+import leaking_pump
+from case_folders import ripple, sheet, write_case, write_hdf5
+from rippletwin.case.model import Recording
+from rippletwin.cli import main
+from rippletwin.diagnosis.network_answers import ask_networks, find_networks, judge_windows
+from rippletwin.errors import InputError
+from rippletwin.learning.conformal import fit_conformal
+from rippletwin.learning.kept_networks import KeptNetworks, load_networks
+from rippletwin.learning.networks import build
+from rippletwin.learning.training import activation_statistics
+
+SAMPLES, RATE = 3072, 51200.0
+
+
+def kept(seed=0, dataset="CFD-MOC-PR", architecture="cnn1d_341_100", **changes):
+    """Untrained networks of two seeds whose p-values are those of white noise of 1 Pa."""
+    rng = np.random.default_rng(seed)
+    x, held_out = rng.standard_normal((2, 60, 2, SAMPLES)).astype(np.float32)
+    networks = [build(architecture, 2).eval() for _ in range(2)]
+    conformal = [
+        fit_conformal(
+            activation_statistics(network, x),
+            np.arange(60) % 4,
+            activation_statistics(network, held_out),
+        )
+        for network in networks
+    ]
+    fields = {
+        "architecture": architecture,
+        "dataset": dataset,
+        "signal": "pressure",
+        "channels": ["p1", "p2"],
+        "samples_per_revolution": SAMPLES,
+        "speed_hz": 1000 / 60,
+        "load_pressure": 9.5e6,
+        "noise_std": [1.0, 1.0],
+        "weights": [network.state_dict() for network in networks],
+        "conformal": conformal,
+    }
+    return KeptNetworks(**fields | changes)
+
+
+def saved(folder, networks) -> Path:
+    path = folder / "networks" / networks.dataset / f"{networks.architecture}.pt"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    networks.save(path)
+    return path
+
+
+def test_kept_networks_answer_as_before(tmp_path):
+    """Classes and p-values are the same after a file that holds tensors and plain data only."""
+    before = kept()
+    after = load_networks(saved(tmp_path, before))
+    windows = np.random.default_rng(5).standard_normal((7, 2, SAMPLES))
+    for one, other in zip(before.answers(windows), after.answers(windows), strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert after.classes == ("H", "S", "C1", "C2") and after.channels == ["p1", "p2"]
+
+
+def test_either_severity_is_a_cylinder_and_shares_are_counted(monkeypatch):
+    """By hand: of eight answers five are C1 or C2, three S; one in eight is unlike."""
+    said = np.array([[2, 3, 2, 1], [1, 1, 3, 2]])
+    p_values = np.array([[0.5, 0.5, 0.04, 0.5], [0.9] * 4])
+    networks = SimpleNamespace(
+        classes=("H", "S", "C1", "C2"), answers=lambda windows: (said, p_values)
+    )
+    found = judge_windows(networks, None)
+    assert found == {"state": "cylinder", "share": 5 / 8, "unlike": 1 / 8}
+    p_values[:] = 0.01
+    p_values[0, :2] = 0.9
+    assert judge_windows(networks, None) == {"state": "unlike", "share": 0.75, "unlike": 0.75}
+
+
+def recording(label, speed_rpm=1000.0, amplitude=1e4):
+    """Half a second of a ripple of nine pistons."""
+    time = np.arange(int(0.5 * RATE)) / RATE
+    wave = amplitude * np.sin(2 * np.pi * 9 * speed_rpm / 60 * time)
+    return Recording(
+        Path("a.h5"), "periodic", "unknown", label, speed_rpm, 9.5e6, RATE, np.array([wave, wave])
+    )
+
+
+def test_each_recording_is_asked_at_the_networks_operating_point(tmp_path):
+    """A ripple that noise has never shown is unlike it; at another speed nobody is asked."""
+    saved(tmp_path, kept())
+    rig = leaking_pump.rig()
+    networks = find_networks(tmp_path, rig)
+    assert list(networks) == ["cnn1d_341_100"]
+    answers = ask_networks(networks, [recording("here"), recording("there", 1200.0)], rig)
+    assert answers["there"] == {}
+    assert answers["here"]["cnn1d_341_100"]["state"] == "unlike"
+
+
+def test_networks_of_several_datasets_are_called_after_both(tmp_path):
+    """Otherwise one would hide the other."""
+    saved(tmp_path, kept())
+    saved(tmp_path, kept(dataset="CFD-MOC-PRA"))
+    names = find_networks(tmp_path, leaking_pump.rig())
+    assert set(names) == {"cnn1d_341_100@CFD-MOC-PR", "cnn1d_341_100@CFD-MOC-PRA"}
+
+
+def test_folders_without_usable_networks_are_named(tmp_path):
+    """None at all, networks of flow only, of one sensor, and a file that is something else."""
+    rig = leaking_pump.rig()
+    with pytest.raises(InputError, match="no networks that judge pressure"):
+        find_networks(tmp_path, rig)
+    path = saved(tmp_path, kept(signal="flow"))
+    with pytest.raises(InputError, match="no networks that judge pressure"):
+        find_networks(tmp_path, rig)
+    saved(tmp_path, kept(channels=["p1"]))
+    with pytest.raises(InputError, match="from 1 sensors, and the case has 2"):
+        find_networks(tmp_path, rig)
+    torch.save({"weights": []}, path)
+    with pytest.raises(InputError, match="holds no kept networks"):
+        find_networks(tmp_path, rig)
+    path.write_text("nothing")
+    with pytest.raises(InputError, match="holds no kept networks"):
+        find_networks(tmp_path, rig)
+
+
+def test_a_folder_without_networks_ends_the_command_before_anything_is_fitted(tmp_path, capsys):
+    """Exit code 2 and one line that names the option, not after minutes of explaining."""
+    content = sheet()
+    second = content["recordings"][0] | {"file": "tomorrow.h5", "state": "unknown"}
+    content["recordings"].append(second)
+    case = tmp_path / "case"
+    case.mkdir()
+    write_case(case, content)
+    write_hdf5(case / "tomorrow.h5", ripple())
+    options = ["--out", str(tmp_path / "out"), "--networks", str(tmp_path)]
+    assert main(["diagnose", str(case), *options]) == 2
+    assert "--networks: there are no networks" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

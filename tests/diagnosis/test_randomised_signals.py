@@ -1,0 +1,129 @@
+"""Randomised training signals against a leaking pump coupled to its pipe step by step in time."""
+
+import numpy as np
+import pytest
+
+import leaking_pump
+from rippletwin.diagnosis import randomised_signals
+from rippletwin.diagnosis.anchor import alignment
+from rippletwin.diagnosis.randomised_signals import SignalSource, severity_bins
+from rippletwin.harmonics import one_period, peak_amplitudes
+from rippletwin.pump.faults import Cylinder, Slipper
+from rippletwin.twin.twin import Twin
+
+SAMPLES, AREA, PITCH = 1024, 4e-7, 2 * np.pi / leaking_pump.PISTONS
+RANGES = {"S": [1e-7, 2e-6], "C": [1e-7, 2e-6]}
+
+
+def recorded(fault=None, turn=0.3):
+    """One noise-free mean revolution (S, M) of the true pump."""
+    observation = leaking_pump.record("a", fault, turn)
+    return one_period(observation.values, SAMPLES, observation.orders)
+
+
+def source(covariance=None):
+    healthy = recorded()[None] + np.zeros((2, 1, 1))
+    twin = Twin(leaking_pump.rig())
+    return SignalSource(twin, covariance, healthy, leaking_pump.SPEED / 60, leaking_pump.LOAD)
+
+
+@pytest.fixture(scope="module")
+def nominal():
+    return source()
+
+
+@pytest.fixture
+def certain(nominal, monkeypatch):
+    """The source with nothing left to chance but the piston."""
+    monkeypatch.setattr(randomised_signals, "TURN_SD", 0.0)
+    monkeypatch.setattr(randomised_signals, "SOURCE_DRIFT", 0.0)
+    monkeypatch.setattr(nominal, "misfit", 0.0)
+    monkeypatch.setattr(nominal, "_draw_drift", lambda lost, rng: np.zeros(3))
+    return nominal
+
+
+def distance_at_best_angle(signal, truth):
+    """Relative distance of two revolutions (S, M), the shaft angle being free."""
+    orders = np.arange(1, 181)
+    one, other = peak_amplitudes(signal)[:, orders], peak_amplitudes(truth)[:, orders]
+    turn = np.exp(1j * orders * alignment(one, other, orders, 2 * np.pi))
+    return np.linalg.norm(one * turn - other) / np.linalg.norm(other)
+
+
+def test_an_anchored_healthy_signal_without_errors_is_the_recording(certain):
+    """What the twin gets wrong about the healthy pump is not paid for again."""
+    drawn = certain.draw({}, ("H",), 2, np.random.default_rng(0), anchored=True)
+    np.testing.assert_allclose(drawn.pressure[0, 0], recorded(), atol=60)  # orders beyond 180 none
+
+
+@pytest.mark.parametrize(("name", "fault"), [("S", Slipper(AREA, 3)), ("C1", Cylinder(AREA, 3))])
+def test_a_signal_of_a_known_leak_is_what_the_pump_in_time_makes(certain, name, fault):
+    """Anchored, one of the nine pistons agrees within 6 % of the ripple, and the healthy ripple is
+    several times further off; by the twin alone no better than the twin's misfit allows."""
+    bins = {name: (AREA, AREA * (1 + 1e-9))}
+    truth, rng = recorded(fault), np.random.default_rng(0)
+    best = {}
+    for anchored in (True, False):
+        drawn = certain.draw(bins, (name,), 40, rng, anchored).pressure[0]
+        best[anchored] = min(distance_at_best_angle(signal, truth) for signal in drawn)
+    assert best[True] < 0.06 and best[True] < best[False]
+    assert distance_at_best_angle(recorded(), truth) > 4 * best[True]
+
+
+def test_leak_areas_are_log_uniform_in_their_bins(nominal):
+    """Each class has its range, and the mean logarithm is the middle's within four deviations."""
+    bins = severity_bins(RANGES, 3.5e-7)
+    drawn = nominal.draw(bins, ("H", "S", "C1", "C2"), 300, np.random.default_rng(1))
+    assert (drawn.leak_area[0] == 0).all()
+    for areas, name in zip(drawn.leak_area[1:], ("S", "C1", "C2")):
+        low, high = np.log(bins[name])
+        assert low <= np.log(areas).min() and np.log(areas).max() <= high
+        middle = (np.log(areas).mean() - (low + high) / 2) / (high - low)
+        assert abs(middle) < 4 / np.sqrt(12 * len(areas))
+    assert bins["C1"][1] == bins["C2"][0] == 3.5e-7
+
+
+def test_flow_is_the_pumps_and_needs_no_line(certain):
+    """Against the simulated pump: the healthy source flow repeats with each piston, and a leak
+    takes away what its area says: twice the area, about twice the missing ripple at the shaft."""
+    drawn = certain.draw({}, ("H",), 1, np.random.default_rng(0))
+    spectrum = abs(np.fft.rfft(drawn.flow[0, 0, 0]))
+    assert spectrum[np.arange(len(spectrum)) % 9 != 0].max() < 1e-9 * spectrum.max()
+    shaft = []
+    for area in (1e-7, 2e-7):
+        bins = {"S": (area, area * (1 + 1e-9))}
+        flow = certain.draw(bins, ("S",), 1, np.random.default_rng(0)).flow[0, 0, 0]
+        shaft.append(abs(np.fft.rfft(flow))[1])
+    assert shaft[1] / shaft[0] == pytest.approx(2.0, rel=0.05)
+
+
+def test_model_errors_are_as_large_as_stated_and_smooth(nominal):
+    """The factors' root mean square distance from 1 is the stated size at most frequencies, and
+    neighbouring orders have nearly the same."""
+    rng = np.random.default_rng(2)
+    errors = np.array([nominal._smooth(0.2, 2, rng) - 1 for _ in range(400)])
+    size = np.sqrt(np.mean(np.abs(errors) ** 2, axis=(0, 1)))
+    assert np.sqrt(np.mean(size**2)) == pytest.approx(0.2, rel=0.05)
+    assert np.abs(np.diff(errors, axis=-1)).max() < 0.1 * np.abs(errors).max()
+
+
+def test_twins_are_drawn_from_the_posterior():
+    """Coordinates that are drawn have the covariance given, correlations included."""
+    twin = Twin(leaking_pump.rig())
+    count = len(twin.theta)
+    root = np.eye(count)
+    root[0, 1] = 0.8
+    drawn = source(covariance=root @ root.T)
+    rng = np.random.default_rng(0)
+    thetas = np.array([drawn._draw_theta(rng) for _ in range(4000)])
+    assert np.abs(np.cov(thetas.T) - root @ root.T).max() < 0.15
+
+
+@pytest.mark.parametrize(
+    ("ranges", "limit"),
+    [(RANGES, 3e-6), (RANGES, 5e-8), ({"S": [2e-6, 1e-7], "C": [1e-7, 2e-6]}, 4e-7)],
+)
+def test_wrong_ranges_are_refused(ranges, limit):
+    """A limit outside the cylinder's range, and a range that falls."""
+    with pytest.raises(ValueError, match="must"):
+        severity_bins(ranges, limit)

@@ -1,0 +1,49 @@
+# Networks of randomised datasets -> files that `rippletwin diagnose --networks` reads.
+rule keep_networks:
+    input:
+        learnt=rules.randomised_signals.output.learnt,
+        held_out=rules.randomised_signals.output.held_out,
+        recorded=recorded_signal_of,
+        weights=rules.train.output.weights,
+        source=scripts_sources("keep_networks.py"),
+    output:
+        networks=f"{RESULTS}/networks/{{dataset}}/{{architecture}}.pt",
+        rates=f"{RESULTS}/networks/{{dataset}}/{{architecture}}.csv",
+    log:
+        f"{RESULTS}/logs/keep_networks/{{dataset}}/{{architecture}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/keep_networks/{{dataset}}/{{architecture}}.tsv"
+    priority: 30
+    resources:
+        mem_mb=2000,
+    params:
+        signal=lambda wildcards: DATASETS[wildcards.dataset].signal,
+        noise=config["noise"]["factor"],
+        learnt_share=learnt_share_of,
+    script:
+        "../scripts/keep_networks.py"
+
+
+rule unlike_table:
+    input:
+        rates=expand(
+            rules.keep_networks.output.rates,
+            dataset=RANDOMISED,
+            architecture=of_domain("time"),
+        ),
+        recorded=rules.cut_windows.output.windows,
+        source=scripts_sources("unlike_table.py"),
+    output:
+        page=report(
+            f"{RESULTS}/unlike.md",
+            category="accuracy",
+            caption="../report/unlike.rst",
+        ),
+    log:
+        f"{RESULTS}/logs/unlike_table.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/unlike_table.tsv"
+    params:
+        cells=[(name, network) for name in RANDOMISED for network in of_domain("time")],
+    script:
+        "../scripts/unlike_table.py"

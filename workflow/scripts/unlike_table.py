@@ -1,0 +1,34 @@
+"""How many recorded windows each network calls unlike everything simulated."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from job import open_log
+from rippletwin import store
+from rippletwin.learning.architectures import ARCHITECTURES
+from rippletwin.learning.conformal import PROMISED_RATE
+
+report_progress = open_log(snakemake)
+names = [Path(name).stem for name in store.load(snakemake.input.recorded).source.split(", ")]
+cells = pd.concat(
+    pd.read_csv(path).assign(network=f"{dataset}, {ARCHITECTURES[architecture].title}")
+    for (dataset, architecture), path in zip(
+        snakemake.params.cells, snakemake.input.rates, strict=True
+    )
+)
+table = 100 * cells.pivot_table(index="network", columns="recording", values="unlike", sort=False)
+table.columns = [names[k] for k in table.columns]
+head = ["Network", *table.columns]
+lines = [head, ["---"] * len(head)]
+lines += [[network, *(f"{share:.0f}" for share in row)] for network, *row in table.itertuples()]
+Path(snakemake.output.page).write_text(
+    f"""# Windows that are unlike everything simulated
+
+Share of the windows of each recording that networks call unlike, per cent over seeds. Of simulated
+windows {100 * PROMISED_RATE:.0f} % are called so; this is promised by their conformal p-values.
+
+"""
+    + "".join("| " + " | ".join(line) + " |\n" for line in lines)
+)
+report_progress(f"{len(table)} networks")
