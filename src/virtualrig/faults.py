@@ -1,0 +1,80 @@
+"""Faults of the virtual rig's pump: each changes the tables of a healthy pump.
+
+Leaks are at chamber 0 (its piston is the one at crank angle zero). Faults of one plate or of the
+suction line act on all chambers alike.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from virtualrig import pump as tables
+
+
+@dataclass(frozen=True)
+class Leak:
+    """A leakage path: `slipper` from chamber 0 to the case, `cylinder` from chamber 0 to 1.
+
+    At the pressure drop `reference`, Pa, it passes the flow of a sharp-edged orifice of `leak_area`,
+    m2, with the pump's discharge coefficient. The share `laminar` of it is proportional to the drop,
+    as flow through a sealing gap is, the rest to the drop's square root (Bergada, Watton, Haynes,
+    Davies, Meccanica 45, 2010: a slipper's lands are laminar, its feeding hole is an orifice).
+    """
+
+    kind: str
+    leak_area: float
+    laminar: float = 0.0
+    reference: float = 1e7
+
+    def apply(self, chambers: np.ndarray, ports: np.ndarray) -> None:
+        hole, gap = {
+            "slipper": (tables.SLIPPER, tables.CASE_LEAK),
+            "cylinder": (tables.NEIGHBOUR, tables.NEIGHBOUR_GAP),
+        }[self.kind]
+        coefficient = ports[tables.ORIFICE] * self.leak_area
+        chambers[0, hole] += (1 - self.laminar) * coefficient
+        if self.laminar > 0:
+            chambers[0, gap] += self.laminar * coefficient / np.sqrt(self.reference)
+
+
+@dataclass(frozen=True)
+class WornValvePlate:
+    """Sealing lands worn about both dead centres: a chamber there is open to both ports.
+
+    Delivery then leaks to suction by way of the chambers that pass, once a piston. `leak_area`, m2,
+    is the greatest area of either side; it vanishes 15 degrees from the dead centre. Wear and scores
+    of the lands between the kidneys: Keller, Sciancalepore, Vacca, Int. J. Fluid Power 2022.
+    """
+
+    leak_area: float
+
+    def apply(self, chambers: np.ndarray, ports: np.ndarray) -> None:
+        ports[tables.WEAR] += ports[tables.ORIFICE] * self.leak_area
+
+
+@dataclass(frozen=True)
+class BlockedPort:
+    """Debris in the suction passage of chamber 0: the share `open_share` of its area is left.
+
+    The chamber fills late, cavitates where it cannot follow, and delivers late. Source of the
+    mechanism: Casoli, Pastori, Scolari, Rundo, Energies 12, 2019 (incomplete filling).
+    """
+
+    open_share: float
+
+    def apply(self, chambers: np.ndarray, ports: np.ndarray) -> None:
+        chambers[0, tables.INLET] *= self.open_share
+
+
+@dataclass(frozen=True)
+class CavitatingSuction:
+    """A clogged suction line: `suction_pressure`, Pa gauge, at the pump's inlet.
+
+    Free air expands in every chamber, which is then compressed late (the softness of
+    `virtualrig.pump.compression`). Merritt, Hydraulic Control Systems, 1967, section 2.4.
+    """
+
+    suction_pressure: float
+
+    def apply(self, chambers: np.ndarray, ports: np.ndarray) -> None:
+        ports[tables.SUCTION] = self.suction_pressure
