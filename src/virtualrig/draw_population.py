@@ -27,9 +27,10 @@ SECONDS = 1.6
 LEAK_SHARE = (3e-4, 0.1)
 """Flow through a leak at the operating pressure over the pump's: from one that hardly anyone could
 see to a pump that is beyond its service limit of 90 % (ISO 4409 states volumetric efficiency)."""
-WEAR_SHARE = (3e-3, 0.3)  # the same of the leak across the valve plate, while a land is passed
-OPEN_SHARE = (0.5, 0.02)  # of a blocked suction port, slight to severe
-SUCTION = (1.2e5, 2e4)  # absolute pressure, Pa, at a cavitating pump's inlet, slight to severe
+COMPOUND_RATIO = 4.0  # of two leaks at most: one that drowns in the other cannot be told
+WEAR_SHARE = (5e-4, 0.1)  # the same of the leak across the valve plate, while a land is passed
+OPEN_SHARE = (0.8, 0.1)  # of a blocked suction port, slight to severe
+SUCTION = (2.7e5, 3e4)  # absolute pressure, Pa, at a cavitating pump's inlet, slight to severe
 LINE_CHANGE = (3e-3, 0.3)  # relative, of a length or a wave speed
 CLEARANCE = 0.2  # m between sensors and joints: short pipes need small time steps
 
@@ -133,9 +134,10 @@ def _draw_state(
     flow = pump.displacement * point.speed_rpm / 60
     hole = flow / (0.65 * np.sqrt(2 * point.load_pressure / density))  # that would pass all of it
 
-    def leak(kind: str) -> Leak:
-        area = _log_uniform(*LEAK_SHARE, rng) * hole
-        return Leak(kind, area, NUISANCE["laminar"].draw(rng), point.load_pressure)
+    def leak(kind: str, share: float) -> Leak:
+        area = share * hole
+        chamber = int(rng.integers(pump.pistons))
+        return Leak(kind, area, NUISANCE["laminar"].draw(rng), point.load_pressure, chamber)
 
     faults, line = (), None
     if state == "valve_plate":
@@ -147,7 +149,10 @@ def _draw_state(
     elif state == "changed_line":
         line = _change_line(true, rng)
     elif state != "healthy":
-        faults = tuple(leak(kind) for kind in state.split("+"))
+        share, ratio = _log_uniform(*LEAK_SHARE, rng), COMPOUND_RATIO ** rng.uniform(-0.5, 0.5)
+        kinds = state.split("+")
+        shares = (share,) if len(kinds) == 1 else (share * ratio, share / ratio)
+        faults = tuple(map(leak, kinds, shares))
     kelvin = session + RECORDING_KELVIN * rng.standard_normal()
     return PlannedRecording(point, state, faults, line, float(kelvin))
 

@@ -1,7 +1,7 @@
 """Faults of the virtual rig's pump: each changes the tables of a healthy pump.
 
-Leaks are at chamber 0 (its piston is the one at crank angle zero). Faults of one plate or of the
-suction line act on all chambers alike.
+Chamber 0 is the one whose piston is furthest out at crank angle zero; chamber k is k pitches of the
+pistons ahead of it. Faults of a plate or of the suction line act on all chambers alike.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from virtualrig import pump as tables
 
 @dataclass(frozen=True)
 class Leak:
-    """A leakage path: `slipper` from chamber 0 to the case, `cylinder` from chamber 0 to 1.
+    """A leakage path of a `chamber`: `slipper` to the case, `cylinder` to the next chamber.
 
     At the pressure drop `reference`, Pa, it passes the flow of a sharp-edged orifice of `leak_area`,
     m2, with the pump's discharge coefficient. The share `laminar` of it is proportional to the drop,
@@ -25,6 +25,7 @@ class Leak:
     leak_area: float
     laminar: float = 0.0
     reference: float = 1e7
+    chamber: int = 0
 
     def apply(self, chambers: np.ndarray, ports: np.ndarray) -> None:
         hole, gap = {
@@ -32,9 +33,9 @@ class Leak:
             "cylinder": (tables.NEIGHBOUR, tables.NEIGHBOUR_GAP),
         }[self.kind]
         coefficient = ports[tables.ORIFICE] * self.leak_area
-        chambers[0, hole] += (1 - self.laminar) * coefficient
+        chambers[self.chamber, hole] += (1 - self.laminar) * coefficient
         if self.laminar > 0:
-            chambers[0, gap] += self.laminar * coefficient / np.sqrt(self.reference)
+            chambers[self.chamber, gap] += self.laminar * coefficient / np.sqrt(self.reference)
 
 
 @dataclass(frozen=True)

@@ -37,24 +37,28 @@ def record_rig(
 
     The truth is {"recordings": {label: row}, "rig": the drawn rig}. Rows have `state`, `point`,
     `change` (norm of the ripple's change over that of the healthy ripple, of two runs of the rig in
-    one state), `areas` (name of the fault -> area, m2, of the sharp-edged orifice that passes the
-    leak's flow at the operating pressure with the data sheet's discharge coefficient), and
-    `turn`, the crank turn of the first sample, from where the leaking chamber is furthest out.
+    one state), `weakest` (where there are two faults, the change that the lesser one makes beside
+    the other; else `change`), `areas` (name of the fault -> area, m2, of the sharp-edged orifice that passes the
+    leak's flow at the operating pressure with the data sheet's discharge coefficient), `pistons`
+    (name of the fault -> see `delivering_piston`), and the plan.
     """
     prepare_folder(folder, None)
     entries, rows = [], {}
     for plan in drawn.recordings:
-        take, change = record_planned(drawn, plan, rng)
+        take, changes = record_planned(drawn, plan, rng)
         label = plan.point.label
         write_recording(folder / "recordings" / f"{label}.h5", take)
         entry = recording_entry(plan.point, with_ripple=False)
         entries.append(entry | {"state": "unknown" if label.startswith("unknown") else "healthy"})
-        rows[label] = {
+        rows[label] = changes | {
             "state": plan.state,
             "point": [plan.point.speed_rpm, plan.point.load_pressure],
-            "change": change,
             "areas": equivalent_areas(drawn, plan),
-            "turn": float(take.turns[0] % 1.0),
+            "pistons": {
+                fault.kind: delivering_piston(fault, drawn.sheet["pump"]["pistons"], take.turns[0])
+                for fault in plan.faults
+                if isinstance(fault, Leak)
+            },
             "plan": asdict(plan),
         }
         progress(label)
@@ -65,28 +69,43 @@ def record_rig(
 
 def record_planned(
     drawn: DrawnRig, plan: PlannedRecording, rng: np.random.Generator
-) -> tuple[Take, float]:
-    """One recording, and the change of the ripple that its state makes."""
+) -> tuple[Take, dict[str, float]]:
+    """One recording, and `change` and `weakest` of its state (see `record_rig`)."""
     nuisance, point = drawn.nuisance, plan.point
     pressure = point.load_pressure * (1 + LOAD_ERROR * rng.standard_normal())
     mean = point.speed_rpm * (1 + SPEED_ERROR * rng.standard_normal())
     count = round(point.seconds * SAMPLING_RATE_HZ)
     speed = mean * (1 + draw_speed_wander(count, nuisance["wander"], CORRELATION_S, rng))
     turns = rng.uniform() + np.concatenate([[0.0], np.cumsum(speed[:-1])]) / 60 / SAMPLING_RATE_HZ
-    healthy = make_bench(drawn, drawn.true, plan.kelvin)
-    bench = healthy
-    before = None
-    if plan.state != "healthy":
-        before = healthy.settle(speed.mean(), pressure, tolerance=TOLERANCE)
-    if plan.line is not None:
-        bench = make_bench(drawn, plan.line, plan.kelvin)
+    bench = make_bench(drawn, plan.line or drawn.true, plan.kelvin)
     bench.set_faults(plan.faults)
     orbits = settle_orbits(bench, speed, pressure, TOLERANCE)
     middle = orbits[len(orbits) // 2]
-    change = 0.0 if before is None else ripple_change(before, middle, bench.rig.sensing)
     clean = compose_from_orbits(orbits, bench.rig.sensing, speed, turns)
     read = measure(clean, turns, instrument_of(nuisance), rng)
-    return Take(read, turns, middle), change
+    return Take(read, turns, middle), change_of_state(drawn, plan, bench, middle, pressure)
+
+
+def change_of_state(
+    drawn: DrawnRig, plan: PlannedRecording, bench: Bench, orbit: Orbit, pressure: float
+) -> dict[str, float]:
+    """`change` and `weakest` of the state whose orbit on `bench` at load `pressure` is given."""
+    if plan.state == "healthy":
+        return {"change": 0.0, "weakest": 0.0}
+
+    def settle(bench: Bench, faults: tuple) -> Orbit:
+        bench.set_faults(faults)
+        return bench.settle(orbit.speed_rpm, pressure, tolerance=TOLERANCE)
+
+    sensing = bench.rig.sensing
+    changed = plan.line is not None
+    healthy = settle(make_bench(drawn, drawn.true, plan.kelvin) if changed else bench, ())
+    change = weakest = ripple_change(healthy, orbit, sensing)
+    if len(plan.faults) > 1:
+        alone = [settle(bench, (fault,)) for fault in plan.faults]
+        scale = ripple_norm(healthy, sensing)
+        weakest = min(ripple_norm(orbit, sensing, other) for other in alone) / scale
+    return {"change": change, "weakest": weakest}
 
 
 def make_bench(drawn: DrawnRig, true: dict, kelvin: float) -> Bench:
@@ -102,9 +121,15 @@ def instrument_of(nuisance: dict) -> Instrument:
 
 def ripple_change(before: Orbit, after: Orbit, sensing: tuple) -> float:
     """Norm of the change of the sensed ripple over that of the ripple before."""
-    ripples = [sensed_pressure(orbit, sensing) for orbit in (before, after)]
-    old, new = (ripple - ripple.mean(axis=1, keepdims=True) for ripple in ripples)
-    return float(np.linalg.norm(new - old) / np.linalg.norm(old))
+    return ripple_norm(after, sensing, before) / ripple_norm(before, sensing)
+
+
+def ripple_norm(orbit: Orbit, sensing: tuple, less: Orbit | None = None) -> float:
+    """Norm of the sensed ripple of an orbit, `less` that of another one."""
+    pressure = sensed_pressure(orbit, sensing)
+    if less is not None:
+        pressure = pressure - sensed_pressure(less, sensing)
+    return float(np.linalg.norm(pressure - pressure.mean(axis=1, keepdims=True)))
 
 
 def equivalent_areas(drawn: DrawnRig, plan: PlannedRecording) -> dict[str, float]:
@@ -112,3 +137,12 @@ def equivalent_areas(drawn: DrawnRig, plan: PlannedRecording) -> dict[str, float
     true = true_pump(drawn.sheet["pump"], drawn.nuisance)["discharge_coefficient"]
     ratio = true / drawn.sheet["pump"]["discharge_coefficient"]
     return {f.kind: f.leak_area * ratio for f in plan.faults if isinstance(f, Leak)}
+
+
+def delivering_piston(leak: Leak, pistons: int, turn: float) -> int:
+    """How many pistons begin their delivery after crank `turn` before the leaking one does.
+
+    Of the two pistons of a scratched cylinder block it is the one that delivers first.
+    """
+    chamber = leak.chamber + (leak.kind == "cylinder")
+    return int(np.ceil(pistons * (1 - turn % 1.0)) - 1 - chamber) % pistons
