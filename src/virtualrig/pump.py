@@ -153,7 +153,7 @@ def _grooved_opening(beyond, ports):
     """
     groove = min(max(beyond / ports[GROOVE] + 1.0, 0.0), 1.0)
     x = min(max(beyond / ports[OPENING], 0.0), 1.0)
-    lens = (np.arccos(1 - 2 * x) - 2 * (1 - 2 * x) * np.sqrt(x * (1 - x))) / np.pi
+    lens = 2 * (np.arccos(1 - x) - (1 - x) * np.sqrt(x * (2 - x))) / np.pi
     return max(ports[GROOVE_SHARE] * groove * groove, lens)
 
 
