@@ -80,7 +80,7 @@ def _origin(rows: list[dict], origin: dict) -> list[str]:
     return [
         *lines,
         "",
-        "* Shares are followed by their exact 95 % confidence interval (Clopper and Pearson), which "
+        "* Shares are followed by their exact 95 % confidence interval (Clopper and Pearson). It "
         "takes recordings as independent.",
         "* *Change*: norm of the change that the state makes in the sensors' ripple, over that of "
         "the healthy ripple, from two runs of the rig.",

@@ -126,7 +126,9 @@ def severity_table(rows: list[dict]) -> list[SeverityErrors]:
     """Of recordings whose state is right."""
     table = []
     for fault in SINGLE:
-        found = [s for row in rows if row["right"] for s in row["severities"] if s["fault"] == fault]
+        found = [
+            s for row in rows if row["right"] for s in row["severities"] if s["fault"] == fault
+        ]
         if found:
             ratio = np.quantile([s["value"] / s["true"] for s in found], [0.5, 0.05, 0.95])
             table.append(SeverityErrors(fault, *map(float, ratio), rate_of(map(covers, found))))

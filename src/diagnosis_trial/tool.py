@@ -24,7 +24,7 @@ from rippletwin.twin.twin import Twin
 
 
 def main(case_folder: str, out: str, twin_kind: str) -> None:
-    """Diagnose one rig; an error of the tool gives the state `crashed` to each of its recordings."""
+    """Diagnose one rig; an error of the tool gives each of its recordings the state `crashed`."""
     out = Path(out)
     case = load_case(case_folder, states={"healthy", "unknown"})
     recordings = select_recordings(case)

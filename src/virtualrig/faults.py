@@ -15,10 +15,11 @@ from virtualrig import pump as tables
 class Leak:
     """A leakage path of a `chamber`: `slipper` to the case, `cylinder` to the next chamber.
 
-    At the pressure drop `reference`, Pa, it passes the flow of a sharp-edged orifice of `leak_area`,
-    m2, with the pump's discharge coefficient. The share `laminar` of it is proportional to the drop,
-    as flow through a sealing gap is, the rest to the drop's square root (Bergada, Watton, Haynes,
-    Davies, Meccanica 45, 2010: a slipper's lands are laminar, its feeding hole is an orifice).
+    At the pressure drop `reference`, Pa, it passes the flow of a sharp-edged orifice of
+    `leak_area`, m2, with the pump's discharge coefficient. The share `laminar` of it is
+    proportional to the drop, as flow through a sealing gap is, the rest to the drop's square root
+    (Bergada, Watton, Haynes, Davies, Meccanica 45, 2010: a slipper's lands are laminar, its feeding
+    hole is an orifice).
     """
 
     kind: str
@@ -43,8 +44,10 @@ class WornValvePlate:
     """Sealing lands worn about both dead centres: a chamber there is open to both ports.
 
     Delivery then leaks to suction by way of the chambers that pass, once a piston. `leak_area`, m2,
-    is the greatest area of either side; it vanishes 15 degrees from the dead centre. Wear and scores
-    of the lands between the kidneys: Keller, Sciancalepore, Vacca, Int. J. Fluid Power 2022.
+    is the greatest area of either side; it vanishes 15 degrees from the dead centre. Worn and
+    scored valve plates are measured by Keller, Sciancalepore and Vacca (condition monitoring of an
+    axial piston pump on a mini excavator), erosion that joins the ports is modelled in Mathematics
+    10, 2461, 2022.
     """
 
     leak_area: float
@@ -58,7 +61,7 @@ class BlockedPort:
     """Debris in the suction passage of chamber 0: the share `open_share` of its area is left.
 
     The chamber fills late, cavitates where it cannot follow, and delivers late. Source of the
-    mechanism: Casoli, Pastori, Scolari, Rundo, Energies 12, 2019 (incomplete filling).
+    mechanism, incomplete filling: Ivantysyn and Ivantysynova, Hydrostatic Pumps and Motors, 2001.
     """
 
     open_share: float

@@ -32,9 +32,7 @@ def measure(
     return read + np.asarray(instrument.offset)[:, None] + slope * np.linspace(-0.5, 0.5, count)
 
 
-def revolution_scatter(
-    turns: np.ndarray, deviation: float, rng: np.random.Generator
-) -> np.ndarray:
+def revolution_scatter(turns: np.ndarray, deviation: float, rng: np.random.Generator) -> np.ndarray:
     """Factor (samples,) of the ripple: normal at each whole turn, linear between."""
     knots = np.arange(np.floor(turns[0]), np.ceil(turns[-1]) + 1)
     return np.interp(turns, knots, 1 + deviation * rng.standard_normal(len(knots)))

@@ -4,6 +4,8 @@ A rig has a state: how many kelvin it is warmer than on average. Wave speeds, vi
 modulus in the pump follow from it.
 """
 
+from itertools import pairwise
+
 import numpy as np
 
 WAVE_SPEED_PER_KELVIN = -0.003  # relative; Gholizadeh, Burton, Schoenau, Int. J. Fluid Power 2011
@@ -97,10 +99,10 @@ def cut_with_gradient(
     for k, segment in enumerate(segments):
         inside = [x for x in sensors if ends[k] < x < ends[k + 1]]
         joints = [ends[k], *inside, ends[k + 1]]
-        for start, stop in zip(joints[:-1], joints[1:], strict=True):
+        for start, stop in pairwise(joints):
             count = int(np.ceil((stop - start) / LONGEST_PIECE))
             edges = np.linspace(start, stop, count + 1)
-            for a, b in zip(edges[:-1], edges[1:], strict=True):
+            for a, b in pairwise(edges):
                 warmer = kelvin + drop * (0.5 - 0.5 * (a + b) / ends[-1])
                 speed = segment["wave_speed"] * (1 + WAVE_SPEED_PER_KELVIN * warmer)
                 thickness = viscosity * float(np.exp(VISCOSITY_PER_KELVIN * warmer))

@@ -35,12 +35,17 @@ def record_rig(
 ) -> dict:
     """Record all that is planned into `folder` (new or empty); returns the truth.
 
-    The truth is {"recordings": {label: row}, "rig": the drawn rig}. Rows have `state`, `point`,
-    `change` (norm of the ripple's change over that of the healthy ripple, of two runs of the rig in
-    one state), `weakest` (where there are two faults, the change that the lesser one makes beside
-    the other; else `change`), `areas` (name of the fault -> area, m2, of the sharp-edged orifice that passes the
-    leak's flow at the operating pressure with the data sheet's discharge coefficient), `pistons`
-    (name of the fault -> see `delivering_piston`), and the plan.
+    The truth is {"recordings": {label: row}, "rig": the drawn rig}. Keys of a row:
+        state     as planned
+        point     speed, r/min, and load pressure, Pa, as the operator sets them
+        change    norm of the ripple's change over that of the healthy ripple, of two runs of the
+                  rig in one state of temperature
+        weakest   where there are two faults, the change that the lesser one makes beside the other;
+                  else `change`
+        areas     fault -> area, m2, of the sharp-edged orifice that passes the leak's flow at the
+                  operating pressure with the data sheet's discharge coefficient
+        pistons   fault -> see `delivering_piston`
+        plan      all that was planned
     """
     prepare_folder(folder, None)
     entries, rows = [], {}

@@ -5,8 +5,9 @@ turn. Around both dead centres a chamber is shut off for `port_overlap_deg`; fro
 question opens to its whole area over `port_opening_deg`, and closes the same way.
 
 Free air makes the chambers' liquid softer at low pressure. A chamber's state is its compression
-e(p) = p + B f (1 - (p0/p)^(1/n)), absolute p, that of a liquid of modulus B with a volume fraction f
-of gas at the pressure p0 of the atmosphere (Merritt, Hydraulic Control Systems, 1967, section 2.4).
+e(p) = p + B f (1 - (p0/p)^(1/n)), absolute p, that of a liquid of modulus B with a volume fraction
+f of gas at the pressure p0 of the atmosphere (Merritt, Hydraulic Control Systems, 1967, section
+2.4).
 """
 
 from dataclasses import dataclass, field, replace
@@ -159,7 +160,7 @@ def _grooved_opening(beyond, ports):
 
 @njit(cache=True)
 def _worn_opening(angle, ports):
-    """Orifice coefficient by which a worn land connects a chamber to either port at `angle`, rad."""
+    """Orifice coefficient from a chamber to either port over a worn land, at `angle`, rad."""
     off = abs((angle - ports[TIMING] + 0.5 * np.pi) % np.pi - 0.5 * np.pi) / WORN_ANGLE
     return ports[WEAR] * (1 - off * off) if off < 1 else 0.0
 

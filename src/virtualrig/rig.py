@@ -108,9 +108,7 @@ def build(known: dict, true: dict) -> Rig:
         pump=draft.pump,
         network=network,
         load_node=load_node,
-        faults={
-            kind: Leak(kind, **fault) for kind, fault in true.get("faults", {}).items()
-        },
+        faults={kind: Leak(kind, **fault) for kind, fault in true.get("faults", {}).items()},
         sensing=tuple(Sensing(**chain) for chain in draft.sensing),
         noise=true.get("noise", 0.0),
         speed_error=speed.get("error", 0.0),
