@@ -18,11 +18,10 @@ def row(state: str, change: float, areas: dict | None = None) -> dict:
 def said(
     label: str, state: str, healthy: float, intervals: dict | None = None, piston=None
 ) -> dict:
-    """What the tool says: `healthy` is its probability of that, `intervals` fault -> (low, high)."""
+    """What the tool says; `healthy` is the probability of that, `intervals` fault -> its ends."""
     probabilities = {"healthy": healthy, "slipper": 0.0, "cylinder": 0.0, "slipper+cylinder": 0.0}
-    probabilities[state if state in probabilities and state != "healthy" else "slipper"] = (
-        1 - healthy
-    )
+    named = state if state in probabilities and state != "healthy" else "slipper"
+    probabilities[named] = 1 - healthy
     severity = {
         name: {"value": (low * high) ** 0.5, "ci95": [low, high], "unit": "m2"}
         for name, (low, high) in (intervals or {}).items()
