@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from rippletwin.diagnosis.drifting_line import DriftingLine
 from rippletwin.diagnosis.pump_flow import healthy_flow
@@ -18,6 +19,7 @@ from rippletwin.twin.twin import Twin
 
 SAME_SPEED, SAME_PRESSURE = 0.01, 0.03  # relative: the same operating point, set twice
 FAR = 0.3  # relative change of the operating point over which the anchor's own part is lost
+ABOUT = 5  # orders of the pistons over which a misfit is averaged
 ANGLES = 8192  # of a revolution, over which two spectra are aligned
 
 
@@ -28,8 +30,8 @@ class Anchor:
     flow (F,) at the pump, m3/s, and rest (S, F), Pa, that no flow explains, at shaft orders (F,).
     variance (S, F) is that of the readings: noise, and what another operating point makes unsure.
     angle, rad, is how far the recording's shaft is ahead of the simulated pump's, but for whole
-    pitches of the pistons. misfit is the twin's own of the healthy ripple, relative. distance is
-    that of the operating points, 0 where they are the same.
+    pitches of the pistons. misfit (F,) is the twin's own of the healthy ripple, relative, as it is
+    about each order. distance is that of the operating points, 0 where they are the same.
     """
 
     label: str
@@ -38,7 +40,7 @@ class Anchor:
     rest: np.ndarray
     variance: np.ndarray
     angle: float
-    misfit: float
+    misfit: np.ndarray
     distance: float
 
 
@@ -77,8 +79,8 @@ def make_anchor(
     pitch = 2 * np.pi / pump["pistons"]
     angle = alignment(response * simulated, healthy.values, orders, pitch)
     turned = simulated * np.exp(1j * orders * angle)
-    left = np.linalg.norm(healthy.values - response * turned, axis=0)[orders % pump["pistons"] == 0]
-    misfit = float(np.linalg.norm(left) / np.linalg.norm(healthy.values))
+    left = healthy.values - response * turned
+    misfit = _relative_misfit(left, healthy.values, orders, pump["pistons"])
     variance = _noise(healthy)
     if apart:
         now = _even(flow_harmonics(here, orders), orders, pump["pistons"])
@@ -119,6 +121,17 @@ def at_orders(observation, count: int):
 def _even(flow: np.ndarray, orders: np.ndarray, pistons: int) -> np.ndarray:
     """A simulated flow at the orders that equal pistons make: there is nothing at the others."""
     return np.where(orders % pistons == 0, flow, 0.0)
+
+
+def _relative_misfit(left, readings, orders: np.ndarray, pistons: int) -> np.ndarray:
+    """What a twin leaves (S, F) of `readings`, relative (F,), about each order. The pistons' orders
+    tell; below the first of them the twin is as good as there. Orders of next to no power count
+    with their neighbours."""
+    own = np.flatnonzero(orders % pistons == 0)
+    powers = [np.mean(np.abs(x[:, own]) ** 2, axis=0) for x in (left, readings)]
+    about = [uniform_filter1d(power, min(ABOUT, len(own)), mode="nearest") for power in powers]
+    relative = np.minimum(np.sqrt(about[0] / np.maximum(about[1], 1e-300)), 1.0)
+    return np.interp(orders, orders[own], relative)
 
 
 def _noise(observation) -> np.ndarray:

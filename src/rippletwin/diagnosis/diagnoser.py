@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import logsumexp
 
-from rippletwin.diagnosis.anchor import Anchor, distance, make_anchor
+from rippletwin.diagnosis.anchor import distance, make_anchor
 from rippletwin.diagnosis.diagnosis import Diagnosis
 from rippletwin.diagnosis.drifting_line import DriftingLine
 from rippletwin.diagnosis.evidence import ErrorPrior, StateEvidence, scatter_of, weigh_states
@@ -20,9 +20,6 @@ from rippletwin.diagnosis.unlike import judge_residual
 from rippletwin.twin.twin import Twin
 
 MOST_REPEATS = 2  # healthy recordings beside the anchor whose scatter is looked at
-MIN_CHANGE_ERROR = 0.04  # relative, of the change by a leak behind the best of twins
-CHANGE_ERROR_SHARE = 0.8  # of the twin's misfit of the healthy ripple
-MAX_CHANGE_ERROR = 0.5
 DIGITS = 3  # of speed and load pressure at which the pump is simulated
 PRIOR = (0.5, 0.4, 0.1)
 """Prior probabilities of no fault, of one and of two; states of a kind share theirs evenly."""
@@ -39,7 +36,7 @@ class Diagnoser:
         tell how far healthy recordings of one operating point scatter. `start` as in
         `ObservationModel`."""
         model = self.model(observation, healthy[0], start)
-        prior = self._error_prior(model.anchor, healthy)
+        prior = self._error_prior(healthy)
         weighed = weigh_states(model, states_of(self.faults), prior)
         probabilities = _probabilities(weighed)
         best = max(weighed, key=lambda w: probabilities[state_name(w.state)])
@@ -68,10 +65,9 @@ class Diagnoser:
         }
         return ObservationModel(observation, anchor, line, flows, start)
 
-    def _error_prior(self, anchor: Anchor, healthy: Sequence) -> ErrorPrior:
-        """What the twin's misfit and the scatter of healthy repeats say of the errors."""
-        change = np.hypot(MIN_CHANGE_ERROR, CHANGE_ERROR_SHARE * anchor.misfit)
-        prior = ErrorPrior(change=float(min(change, MAX_CHANGE_ERROR)))
+    def _error_prior(self, healthy: Sequence) -> ErrorPrior:
+        """What the scatter of healthy repeats says of the errors."""
+        prior = ErrorPrior()
         first, *others = healthy
         repeats = [o for o in others if not between(o, first)][:MOST_REPEATS]
         scatters = [scatter_of(self.model(o, first), prior) for o in repeats]

@@ -21,15 +21,15 @@ from rippletwin.diagnosis.screening import Candidate, Screen
 LIMITS_HZ = (1000.0, 2000.0, np.inf)  # up to which angle and drift are followed, in turn
 ROUNDS = 2  # of following and searching the areas
 SCATTERS = np.geomspace(0.002, 0.02, 5)
-CHANGES = np.geomspace(0.03, 0.8, 6)
+CHANGES = np.geomspace(0.25, 4.0, 5)
 
 
 @dataclass(frozen=True)
 class ErrorPrior:
-    """Lognormal priors of the two relative errors: medians, and sds of their logarithms."""
+    """Lognormal priors of the two `Errors`: medians, and sds of their logarithms."""
 
     scatter: float = 0.005
-    change: float = 0.1
+    change: float = 1.0
     scatter_sd: float = 0.5
     change_sd: float = 0.6
 

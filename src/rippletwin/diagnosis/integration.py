@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
+from scipy.interpolate import Akima1DInterpolator
 
 COARSE, FINE = 13, 8  # nodes over the whole prior, and about the best one in each of the steps
+DENSE = 40  # points between two nodes at which the density is interpolated
 STEPS = 3  # of refinement, each a quarter of the interval before
 
 
@@ -18,18 +22,29 @@ class Density:
     nodes: np.ndarray
     log_density: np.ndarray
 
+    @cached_property
+    def _dense(self) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes, `DENSE` between two, and the log density there, interpolated smoothly: the density
+        itself can fall by many orders of magnitude from one node to the next."""
+        share = np.arange(DENSE) / DENSE
+        nodes = (self.nodes[:-1, None] + np.diff(self.nodes)[:, None] * share).ravel()
+        nodes = np.append(nodes, self.nodes[-1])
+        smooth = Akima1DInterpolator(self.nodes, self.log_density, method="makima")
+        return nodes, smooth(nodes)
+
     @property
     def log_integral(self) -> float:
-        """Of the density over its nodes, by trapezoids."""
-        top = float(np.max(self.log_density))
-        return top + float(np.log(np.trapezoid(np.exp(self.log_density - top), self.nodes)))
+        """Log of the integral of the density over its nodes."""
+        nodes, log_density = self._dense
+        top = float(np.max(log_density))
+        return top + float(np.log(np.trapezoid(np.exp(log_density - top), nodes)))
 
     def quantiles(self, shares) -> np.ndarray:
-        """Nodes, interpolated, below which there are these shares of the density."""
-        weight = np.exp(self.log_density - np.max(self.log_density))
-        steps = 0.5 * (weight[1:] + weight[:-1]) * np.diff(self.nodes)
-        below = np.concatenate([[0.0], np.cumsum(steps)])
-        return np.interp(shares, below / below[-1], self.nodes)
+        """Logarithms of areas below which there are these shares of the density."""
+        nodes, log_density = self._dense
+        weight = np.exp(log_density - np.max(log_density))
+        below = cumulative_trapezoid(weight, nodes, initial=0.0)
+        return np.interp(shares, below / below[-1], nodes)
 
 
 def explore(log_density: Callable[[float], float], low: float, high: float) -> Density:

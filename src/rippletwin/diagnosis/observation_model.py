@@ -25,10 +25,11 @@ SOURCE_DRIFT, SOURCE_WAVES = 0.01, 4
 """The healthy pump's own flow drifts by 1 %, smoothly over the frequency, in four cosines."""
 CHANGE_WAVES = 6  # cosines over the frequency in which the change's relative error is smooth
 SMOOTH_SHARE = 0.5  # of the change's relative error, in each of these
-AREA_SD = 0.05  # relative, at least: no leak is an ideal orifice
+AREA_SD = 0.1  # relative: discharge coefficients of leaks are between 0.6 and 0.8
+MIN_CHANGE_ERROR = 0.04  # relative, of the change by a leak behind the best of twins
 ALIKE = 8.0  # readings whose errors go together: those of a line are as wide as its resonances
 NEIGHBOURS = 9  # shaft orders over which a power is averaged
-BETWEEN = 0.01  # share of the ripple's power whose scatter shows at orders that pistons do not make
+BETWEEN = 0.01  # share of a power whose errors show at orders that have none of it
 
 
 @dataclass(frozen=True)
@@ -54,12 +55,14 @@ class Parts:
     drifted   (S, F) share of it that the drift of the line has made
     leaks     (K, S, F) what each leak adds
     slopes    (D, S, F) derivatives of the reading by the drift
+    spread    (F,) power, Pa2, that the leaks would make if their flow were the same at all orders
     """
 
     healthy: np.ndarray
     drifted: np.ndarray
     leaks: np.ndarray
     slopes: np.ndarray
+    spread: np.ndarray
 
     @property
     def reading(self) -> np.ndarray:
@@ -69,7 +72,8 @@ class Parts:
 
 @dataclass(frozen=True)
 class Errors:
-    """Relative errors: `scatter` of the healthy ripple, `change` of what changes in it."""
+    """Errors of a prediction: `scatter`, relative, of the healthy ripple, and `change` of what
+    changes in it, over what the twin's own misfit of the healthy ripple leads to expect."""
 
     scatter: float
     change: float
@@ -98,6 +102,7 @@ class ObservationModel:
         self.values = self.observation.values
         self.noise = anchor.variance + np.einsum("fss->sf", self.observation.covariance).real
         self._waves = _cosines(self.observation.frequency_hz, CHANGE_WAVES)
+        self._expected = np.hypot(MIN_CHANGE_ERROR, anchor.misfit)
         self._base = None
         self._undrifted = line.response()[:, : len(self.orders)]
 
@@ -155,6 +160,7 @@ class ObservationModel:
             drifted=(moved - self._undrifted) * self.anchor.flow * turn,
             leaks=moved * leaks[:, None] * turn,
             slopes=slopes * flow * turn,
+            spread=local_power(moved) * np.mean(np.abs(leaks.sum(axis=0)) ** 2),
         )
 
     # likelihood
@@ -174,10 +180,20 @@ class ObservationModel:
 
     def variance(self, parts: Parts, errors: Errors) -> np.ndarray:
         """Variance (S, F), Pa2, of the readings' independent errors. What the twin says of a change
-        is relatively wrong, whether a leak makes it or a drift of the line."""
+        is relatively wrong, whether a leak makes it or a drift of the line. A pulse of wrong shape
+        errs at all orders, also at those where the twin's own pulse has next to nothing."""
         scatter = errors.scatter**2 * self.scatter_power(parts.healthy)
-        changed = local_power(parts.leaks.sum(axis=0)) + self.power_by_class(parts.drifted)
-        return self.noise + scatter + errors.change**2 * changed
+        leaks = local_power(parts.leaks.sum(axis=0)) + BETWEEN * parts.spread
+        changed = self._measured_share(parts) ** 2 * leaks + self.power_by_class(parts.drifted)
+        return self.noise + scatter + (errors.change * self._expected) ** 2 * changed
+
+    def _measured_share(self, parts: Parts) -> float:
+        """The measured change over the predicted one. Errors of a leak's change are relative to
+        what was measured: a leak that is too large must not be forgiven more for its size."""
+        predicted = np.linalg.norm(parts.leaks.sum(axis=0))
+        if predicted == 0.0:
+            return 1.0
+        return float(np.linalg.norm(self.values - parts.healthy) / predicted)
 
     def scatter_power(self, healthy: np.ndarray) -> np.ndarray:
         """Power (F,) to which the scatter of repeated healthy recordings is in proportion."""
@@ -212,11 +228,10 @@ class ObservationModel:
     def _columns(self, parts: Parts, errors: Errors) -> np.ndarray:
         turning = TURN_SD * 1j * self.orders * parts.reading
         source = SOURCE_DRIFT * parts.healthy * self._waves[:SOURCE_WAVES, None]
-        sizes = np.full(CHANGE_WAVES, SMOOTH_SHARE * errors.change)
-        sizes[0] = np.hypot(sizes[0], AREA_SD)
-        changed = [sizes[:, None, None] * self._waves[:, None] * leak for leak in parts.leaks]
-        smooth = map(complex_columns, (source, *changed))
-        return np.concatenate([turning[None], parts.slopes, *smooth])
+        leaks = self._measured_share(parts) * parts.leaks
+        waves = SMOOTH_SHARE * errors.change * self._expected * self._waves[:, None]
+        smooth = map(complex_columns, (source, *(waves * leak for leak in leaks)))
+        return np.concatenate([turning[None], parts.slopes, AREA_SD * leaks, *smooth])
 
 
 def local_power(readings: np.ndarray) -> np.ndarray:

@@ -25,7 +25,7 @@ from rippletwin.twin.operating_point import OperatingCondition
 from rippletwin.twin.twin import Twin
 
 STEPS = 3072  # a revolution: the change moves by 0.3 % when they are doubled, 1 % at 1e-8 m2
-NODES = 11  # leak areas that are simulated, a factor of 1.9 apart
+NODES = 15  # leak areas that are simulated, a factor of 1.6 apart
 ORDERS = 600  # highest shaft order whose flow is kept
 LEAK_DISCHARGE = 0.7  # discharge coefficient of a leak where the data sheet gives none
 FITTED = ("bulk_modulus", "port_timing")  # the twin's names of the pump's fitted numbers
