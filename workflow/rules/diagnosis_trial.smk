@@ -35,8 +35,7 @@ rule record_population:
 rule diagnose_population:
     input:
         case=rules.record_population.output.case,
-        tool=relative(package_files("diagnosis_trial")),
-        jail=relative([ROOT / "src/concealed/jail.py"]),
+        tool=relative([DIAGNOSER, ROOT / "src/concealed/jail.py"]),
         source=relative(source_files_of(DIAGNOSER)),
     output:
         diagnosis=f"{TRIAL}/diagnosed/{{drawn}}/diagnosis.json",
@@ -50,12 +49,12 @@ rule diagnose_population:
     params:
         out=subpath(output.diagnosis, parent=True),
         cache=f"{TRIAL}/cache",
-        tool=relative([DIAGNOSER.parent])[0],
+        package=relative([DIAGNOSER.parent])[0],
         twin=config["diagnosis_trial"]["twin"],
     shell:
         "(mkdir -p {params.out} {params.cache};"
         " NUMBA_CACHE_DIR=$(realpath {params.cache}) TMPDIR={params.out}"
-        " python -m concealed.jail --read {input.case} --read {params.tool}"
+        " python -m concealed.jail --read {input.case} --read {params.package}"
         " --write {params.out} --write {params.cache}"
         " -- python -m diagnosis_trial.tool {input.case} {params.out} {params.twin}) > {log} 2>&1"
 
