@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rippletwin.diagnosis.anchor import alignment, correlation, distance
+from rippletwin.diagnosis.anchor import alignment, correlation, distance, relative_misfit
 
 
 def test_an_operating_point_set_twice_is_one():
@@ -37,3 +37,14 @@ def test_correlation_is_that_of_the_turned_spectrum():
     for k in (0, 17, 90):
         turned = here * np.exp(1j * orders * 2 * np.pi * k / 128)
         assert found[k] == pytest.approx(np.sum(np.conj(turned) * there).real)
+
+
+def test_a_misfit_is_told_where_it_is():
+    """A tenth is left of the ripple at low orders and half of it at high ones."""
+    orders = np.arange(1, 181)
+    readings = np.where(orders % 9 == 0, 1.0 + 1.0j, 0.0) * np.ones((2, 1))
+    share = np.where(orders < 90, 0.1, 0.5)
+    found = relative_misfit(share * readings, readings, orders, 9)
+    np.testing.assert_allclose(found[orders < 60], 0.1)
+    np.testing.assert_allclose(found[orders > 120], 0.5)
+    assert np.all(np.diff(found) >= 0.0)

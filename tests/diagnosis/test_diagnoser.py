@@ -10,6 +10,7 @@ import leaking_pump
 from rippletwin.diagnosis.diagnoser import Diagnoser
 from rippletwin.diagnosis.diagnosis_file import diagnosis_dict
 from rippletwin.diagnosis.faults.library import select_faults
+from rippletwin.figures import fault_posterior
 from rippletwin.pump.faults import Cylinder, Slipper
 from rippletwin.twin.twin import Twin
 
@@ -106,3 +107,10 @@ def test_the_file_has_the_contract_s_keys(diagnoses):
     assert entry["unlike"]["where"] == {"orders": [], "element": None}
     assert entry["networks"] == {}
     assert "slipper" in entry["sentence"] and entry["label"] in entry["sentence"]
+
+
+def test_both_pictures_of_every_state_are_written(diagnoses, tmp_path):
+    """Also of a recording that is unlike all states, and of the healthy one, which has no leak."""
+    written = fault_posterior.draw(list(diagnoses.values()), tmp_path, [".svg"])
+    assert len(written) == 2 * len(STATES)
+    assert all(path.stat().st_size > 1000 for path in written)

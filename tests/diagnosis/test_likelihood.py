@@ -39,6 +39,19 @@ def test_marginal_is_that_of_the_whole_covariance():
     np.testing.assert_allclose(found.amplitudes, amplitudes, rtol=1e-10)
 
 
+def test_readings_that_are_alike_count_as_one():
+    """Each reading there three times, its error too: nothing is learnt from the copies."""
+    rng = np.random.default_rng(1)
+    residual, column = rng.normal(size=(2, 1, 2, 5)) + 1j * rng.normal(size=(2, 1, 2, 5))
+    variance = rng.uniform(0.1, 2.0, (2, 5))
+    once = marginal(residual[0], variance, column)
+    copied = [np.repeat(x, 3, axis=-1) for x in (residual[0], variance, column)]
+    found = marginal(*copied, alike=3.0)
+    np.testing.assert_allclose(found.log_likelihood, once.log_likelihood, rtol=1e-12)
+    np.testing.assert_allclose(found.amplitudes, once.amplitudes, rtol=1e-10)
+    np.testing.assert_allclose(found.square, 3.0 * once.square, rtol=1e-10)
+
+
 def test_complex_columns_span_any_phase_with_unit_variance():
     """The two real amplitudes of a complex column give it mean square one and no favoured phase."""
     column = np.array([[[1.0 + 2.0j]]])

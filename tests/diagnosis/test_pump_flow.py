@@ -8,7 +8,7 @@ import pytest
 
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor
 from rippletwin.diagnosis.faults.library import FAULTS
-from rippletwin.diagnosis.pump_flow import STEPS, leak_flow, with_fitted_pump
+from rippletwin.diagnosis.pump_flow import STEPS, UNCERTAIN, leak_flow, with_fitted_pump
 from rippletwin.harmonics import peak_amplitudes
 from rippletwin.pump.faults import Cylinder, Slipper
 from rippletwin.pump.geometry import Geometry
@@ -35,6 +35,21 @@ def test_areas_between_the_simulated_ones_are_right(name, fault):
         truth = simulated(PUMP, fault(area)) - healthy
         found = flow.harmonics(area)[ORDERS]
         assert np.linalg.norm(found - truth) < 0.01 * np.linalg.norm(truth)
+
+
+def test_slopes_are_what_another_pump_makes():
+    """A dead volume larger by a standard deviation, at a leak that is no node: the change of the
+    change to a quarter, and it is not small."""
+    area, moved = (
+        4e-7,
+        PUMP | {"dead_volume": Geometry.dead_volume * (1 + UNCERTAIN["dead_volume"])},
+    )
+    changes = [simulated(pump, Slipper(area)) - simulated(pump) for pump in (PUMP, moved)]
+    truth = changes[1] - changes[0]
+    slopes = leak_flow(PUMP, OIL, SPEED, PRESSURE, FAULTS["slipper"]).pump_slopes(area)
+    found = slopes[list(UNCERTAIN).index("dead_volume")][ORDERS]
+    assert np.linalg.norm(found - truth) < 0.25 * np.linalg.norm(truth)
+    assert np.linalg.norm(truth) > 0.005 * np.linalg.norm(changes[0])
 
 
 def test_a_leak_has_a_discharge_coefficient_of_its_own_where_the_sheet_has_none():

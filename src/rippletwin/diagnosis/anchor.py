@@ -80,7 +80,7 @@ def make_anchor(
     angle = alignment(response * simulated, healthy.values, orders, pitch)
     turned = simulated * np.exp(1j * orders * angle)
     left = healthy.values - response * turned
-    misfit = _relative_misfit(left, healthy.values, orders, pump["pistons"])
+    misfit = relative_misfit(left, healthy.values, orders, pump["pistons"])
     variance = _noise(healthy)
     if apart:
         now = _even(flow_harmonics(here, orders), orders, pump["pistons"])
@@ -123,7 +123,7 @@ def _even(flow: np.ndarray, orders: np.ndarray, pistons: int) -> np.ndarray:
     return np.where(orders % pistons == 0, flow, 0.0)
 
 
-def _relative_misfit(left, readings, orders: np.ndarray, pistons: int) -> np.ndarray:
+def relative_misfit(left, readings, orders: np.ndarray, pistons: int) -> np.ndarray:
     """What a twin leaves (S, F) of `readings`, relative (F,), about each order. The pistons' orders
     tell; below the first of them the twin is as good as there. Orders of next to no power count
     with their neighbours."""

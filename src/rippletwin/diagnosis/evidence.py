@@ -7,8 +7,9 @@ pistons and shaft angles count by their scores in the screen.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from scipy.special import logsumexp
@@ -36,8 +37,12 @@ class ErrorPrior:
     def log_weights(self) -> np.ndarray:
         """Log probabilities (len(SCATTERS), len(CHANGES)) on the grid of both."""
         a = -0.5 * (np.log(SCATTERS / self.scatter) / self.scatter_sd) ** 2
+        return (a - logsumexp(a))[:, None] + self.log_weights_of_change()
+
+    def log_weights_of_change(self) -> np.ndarray:
+        """Log probabilities (len(CHANGES),)."""
         b = -0.5 * (np.log(CHANGES / self.change) / self.change_sd) ** 2
-        return (a - logsumexp(a))[:, None] + (b - logsumexp(b))
+        return b - logsumexp(b)
 
 
 @dataclass(frozen=True)
@@ -90,7 +95,7 @@ def _weigh(
         errors, _ = _best_errors(model, mode, prior)
     mode = model.followed(mode, errors, LIMITS_HZ[-1:])
     errors, over_errors = _best_errors(model, mode, prior)
-    integral, areas = _over_areas(model, mode, errors)
+    integral, areas = _over_areas(model, mode, errors, prior)
     at_mode = model.evaluate(mode, errors).log_likelihood
     scores = np.array([c.score for c in candidates])
     places = logsumexp(scores - best.score) - _log_places(model, best.state)
@@ -110,8 +115,11 @@ def _log_places(model: ObservationModel, state: Sequence[Fault]) -> float:
 
 
 def _at_best_areas(model: ObservationModel, mode: Hypothesis, errors: Errors) -> Hypothesis:
+    def likelihood(hypothesis: Hypothesis) -> float:
+        return model.evaluate(hypothesis, errors).log_likelihood
+
     for k, fault in enumerate(mode.state):
-        found = explore(_along(model, mode, errors, k), *_ends(fault))
+        found = explore(_along(mode, k, likelihood), *model.area_ends(fault))
         mode = _with_area(mode, k, found.nodes[np.argmax(found.log_density)])
     return mode
 
@@ -127,37 +135,40 @@ def _best_errors(model, mode: Hypothesis, prior: ErrorPrior) -> tuple[Errors, fl
 
 
 def _over_areas(
-    model: ObservationModel, mode: Hypothesis, errors: Errors
+    model: ObservationModel, mode: Hypothesis, errors: Errors, prior: ErrorPrior
 ) -> tuple[float, dict[str, Density]]:
-    """Log of the likelihood's mean over the prior of the areas, and each area's own density.
+    """Log of the likelihood's mean over the prior of areas and errors of a change, and each area's
+    own density: how wrong the twin may be decides how well an area is known.
 
     Two areas are taken as independent about the mode. What ties them is mostly that either change
     may be relatively wrong, which each density has in it.
     """
-    if not mode.state:
-        return model.evaluate(mode, errors).log_likelihood, {}
-    volume = sum(float(np.log(np.subtract(*_ends(fault)[::-1]))) for fault in mode.state)
+    likelihood = partial(_over_changes, model, errors=errors, prior=prior)
+    at_mode = likelihood(mode)
     densities = {
-        fault.name: explore(_along(model, mode, errors, k), *_ends(fault))
+        fault.name: explore(_along(mode, k, likelihood), *model.area_ends(fault))
         for k, fault in enumerate(mode.state)
     }
-    at_mode = model.evaluate(mode, errors).log_likelihood
+    volume = sum(float(d.nodes[-1] - d.nodes[0]) for d in densities.values())
     integral = at_mode - volume + sum(d.log_integral - at_mode for d in densities.values())
     return integral, densities
 
 
-def _along(model, mode: Hypothesis, errors: Errors, k: int):
-    return lambda x: model.evaluate(_with_area(mode, k, x), errors).log_likelihood
+def _over_changes(model, hypothesis: Hypothesis, errors: Errors, prior: ErrorPrior) -> float:
+    """Log likelihood integrated over the errors of a change."""
+    each = [model.evaluate(hypothesis, replace(errors, change=c)).log_likelihood for c in CHANGES]
+    return float(logsumexp(prior.log_weights_of_change() + np.array(each)))
+
+
+def _along(mode: Hypothesis, k: int, likelihood: Callable[[Hypothesis], float]):
+    """The likelihood of the logarithm of area k, all else as in the mode."""
+    return lambda log_area: likelihood(_with_area(mode, k, log_area))
 
 
 def _with_area(mode: Hypothesis, k: int, log_area: float) -> Hypothesis:
     areas = list(mode.areas)
     areas[k] = float(np.exp(log_area))
     return replace(mode, areas=tuple(areas))
-
-
-def _ends(fault: Fault) -> tuple[float, float]:
-    return float(np.log(fault.smallest)), float(np.log(fault.largest))
 
 
 def _piston_chances(model, candidates, chances, k) -> np.ndarray:

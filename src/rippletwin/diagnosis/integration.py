@@ -10,7 +10,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import Akima1DInterpolator
 
-COARSE, FINE = 13, 8  # nodes over the whole prior, and about the best one in each of the steps
+COARSE, FINE = 15, 8  # nodes over the whole prior, and about the best one in each of the steps
 DENSE = 40  # points between two nodes at which the density is interpolated
 STEPS = 3  # of refinement, each a quarter of the interval before
 

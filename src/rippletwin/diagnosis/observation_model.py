@@ -55,6 +55,7 @@ class Parts:
     drifted   (S, F) share of it that the drift of the line has made
     leaks     (K, S, F) what each leak adds
     slopes    (D, S, F) derivatives of the reading by the drift
+    pump      (P, S, F) what one standard deviation of each of the pump's numbers makes of them
     spread    (F,) power, Pa2, that the leaks would make if their flow were the same at all orders
     """
 
@@ -62,6 +63,7 @@ class Parts:
     drifted: np.ndarray
     leaks: np.ndarray
     slopes: np.ndarray
+    pump: np.ndarray
     spread: np.ndarray
 
     @property
@@ -121,9 +123,25 @@ class ObservationModel:
 
     def leak_change(self, fault: Fault, area: float, piston: int) -> np.ndarray:
         """The same (F,) of one leak."""
-        harmonics = self.flows[fault.name].harmonics(area)[self.orders]
+        return self._turned(self.flows[fault.name].harmonics(area), piston)
+
+    def _turned(self, harmonics: np.ndarray, piston: int) -> np.ndarray:
+        """Harmonics (..., K) of a leak at piston 0 as one at `piston` makes them at the orders."""
         angle = self.anchor.angle + 2.0 * np.pi * piston / self.pistons
-        return harmonics * np.exp(1j * self.orders * angle)
+        return harmonics[..., self.orders] * np.exp(1j * self.orders * angle)
+
+    def _pump_slopes(self, hypothesis: Hypothesis) -> np.ndarray:
+        """What uncertain numbers of the pump make of the leaks' flow (P, F), or (0, F)."""
+        each = [
+            self._turned(self.flows[fault.name].pump_slopes(area), piston)
+            for fault, area, piston in zip(hypothesis.state, hypothesis.areas, hypothesis.pistons)
+        ]
+        return np.sum(each, axis=0) if each else np.zeros((0, len(self.orders)), complex)
+
+    def area_ends(self, fault: Fault) -> tuple[float, float]:
+        """Ends of the prior on the logarithm of a fault's leak area, m2."""
+        areas = self.flows[fault.name].areas
+        return float(np.log(areas[0])), float(np.log(areas[-1]))
 
     def state_of_line(self, hypothesis: Hypothesis) -> np.ndarray:
         """Drift (D,) with what the leaks' loss of mean flow makes of an orifice set anew."""
@@ -160,6 +178,7 @@ class ObservationModel:
             drifted=(moved - self._undrifted) * self.anchor.flow * turn,
             leaks=moved * leaks[:, None] * turn,
             slopes=slopes * flow * turn,
+            pump=moved * self._pump_slopes(hypothesis)[:, None] * turn,
             spread=local_power(moved) * np.mean(np.abs(leaks.sum(axis=0)) ** 2),
         )
 
@@ -228,10 +247,12 @@ class ObservationModel:
     def _columns(self, parts: Parts, errors: Errors) -> np.ndarray:
         turning = TURN_SD * 1j * self.orders * parts.reading
         source = SOURCE_DRIFT * parts.healthy * self._waves[:SOURCE_WAVES, None]
-        leaks = self._measured_share(parts) * parts.leaks
+        share = self._measured_share(parts)
+        leaks = share * parts.leaks
         waves = SMOOTH_SHARE * errors.change * self._expected * self._waves[:, None]
         smooth = map(complex_columns, (source, *(waves * leak for leak in leaks)))
-        return np.concatenate([turning[None], parts.slopes, AREA_SD * leaks, *smooth])
+        known = turning[None], parts.slopes, AREA_SD * leaks, share * parts.pump
+        return np.concatenate([*known, *smooth])
 
 
 def local_power(readings: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, make_interp_spline
 
 from rippletwin.case.model import Fluid
 from rippletwin.diagnosis.faults.base import Fault
@@ -25,9 +25,20 @@ from rippletwin.twin.operating_point import OperatingCondition
 from rippletwin.twin.twin import Twin
 
 STEPS = 3072  # a revolution: the change moves by 0.3 % when they are doubled, 1 % at 1e-8 m2
-NODES = 15  # leak areas that are simulated, a factor of 1.6 apart
+NODES = 21  # leak areas that are simulated, a factor of 1.5 apart
 ORDERS = 600  # highest shaft order whose flow is kept
 LEAK_DISCHARGE = 0.7  # discharge coefficient of a leak where the data sheet gives none
+SLOPE_NODES = slice(2, None, 4)  # of these areas, at which slopes by the pump's numbers are taken
+UNCERTAIN = {
+    "bulk_modulus": 0.08,
+    "dead_volume": 0.15,
+    "port_area": 0.15,
+    "port_opening_deg": 0.15,
+    "discharge_coefficient": 0.07,
+    "air_fraction": 0.7,
+}
+"""Relative standard deviations of the numbers of a pump about those of its data sheet."""
+TIMING_SD_DEG = 0.5  # of the port plate
 FITTED = ("bulk_modulus", "port_timing")  # the twin's names of the pump's fitted numbers
 
 
@@ -75,19 +86,31 @@ class LeakFlow:
     areas    (A,) simulated, m2, ascending
     change   (A, K) change over area of the flow's peak amplitudes at orders 0 to K - 1, m/s
     mean     mean flow of the healthy pump, m3/s
+    slopes   (B, P, K) derivatives of `change` by P uncertain numbers of the pump, in standard
+             deviations, at areas[SLOPE_NODES]
     """
 
     areas: np.ndarray
     change: np.ndarray
     mean: float
+    slopes: np.ndarray
 
     @cached_property
-    def _spline(self) -> CubicSpline:
+    def _change(self) -> CubicSpline:
         return CubicSpline(np.log(self.areas), self.change)
+
+    @cached_property
+    def _slopes(self):
+        return make_interp_spline(np.log(self.areas[SLOPE_NODES]), self.slopes, k=1)
 
     def harmonics(self, area: float) -> np.ndarray:
         """Change (K,) of the flow's peak amplitudes, m3/s, orders 0 to K - 1, for a leak area."""
-        return area * self._spline(np.log(np.clip(area, self.areas[0], self.areas[-1])))
+        return area * self._change(np.log(np.clip(area, self.areas[0], self.areas[-1])))
+
+    def pump_slopes(self, area: float) -> np.ndarray:
+        """What one standard deviation of each of the pump's numbers makes of it (P, K), m3/s."""
+        first, *_, last = self.areas[SLOPE_NODES]
+        return area * self._slopes(np.log(np.clip(area, first, last)))
 
 
 def healthy_flow(pump: Mapping, fluid: Fluid, speed_rpm: float, pressure: float) -> PumpRipple:
@@ -99,19 +122,33 @@ def leak_flow(
     pump: Mapping, fluid: Fluid, speed_rpm: float, pressure: float, fault: Fault
 ) -> LeakFlow:
     """`LeakFlow` of a fault at r/min into a pressure, Pa; simulations are kept."""
-    healthy = peak_amplitudes(healthy_flow(pump, fluid, speed_rpm, pressure).flow)
-    areas = np.geomspace(fault.smallest, fault.largest, NODES)
-    change = [
-        peak_amplitudes(
-            _simulated(
-                _key(pump), fluid, float(speed_rpm), float(pressure), fault, float(area)
-            ).flow
-        )
-        - healthy
-        for area in areas
-    ]
-    change = np.array(change)[:, : ORDERS + 1] / areas[:, None]
-    return LeakFlow(areas, change, float(healthy[0].real))
+    mean = peak_amplitudes(healthy_flow(pump, fluid, speed_rpm, pressure).flow)[0].real
+    given = pump.get("discharge_coefficient")
+    coefficient = given or LEAK_DISCHARGE
+    simulated = 1.0 if given else LEAK_DISCHARGE / Geometry.discharge_coefficient
+    velocity = coefficient * np.sqrt(2.0 * pressure / fluid.density)  # of a sharp-edged orifice
+    areas = mean / pump["pistons"] / velocity * np.geomspace(fault.smallest, fault.largest, NODES)
+
+    def change(numbers: Mapping, at: np.ndarray) -> np.ndarray:
+        point = _key(numbers), fluid, float(speed_rpm), float(pressure)
+        healthy = peak_amplitudes(_simulated(*point, None, 0.0).flow)
+        leaking = [
+            peak_amplitudes(_simulated(*point, fault, float(simulated * a)).flow) for a in at
+        ]
+        return (np.array(leaking) - healthy)[:, : ORDERS + 1] / at[:, None]
+
+    found = change(pump, areas)
+    at = areas[SLOPE_NODES]
+    slopes = [change(moved, at) - found[SLOPE_NODES] for moved in _moved_pumps(pump)]
+    return LeakFlow(areas, found, float(mean), np.stack(slopes, axis=1))
+
+
+def _moved_pumps(pump: Mapping) -> list[dict]:
+    """The pump with one uncertain number after the other moved by a standard deviation."""
+    geometry = Geometry.from_dict(dict(pump))
+    moved = [{**pump, name: getattr(geometry, name) * (1.0 + sd)} for name, sd in UNCERTAIN.items()]
+    timing = geometry.port_timing_deg + TIMING_SD_DEG
+    return [*moved, {**pump, "port_timing_deg": timing}]
 
 
 def _key(pump: Mapping) -> tuple:
@@ -122,10 +159,7 @@ def _key(pump: Mapping) -> tuple:
 def _simulated(
     pump: tuple, fluid: Fluid, speed_rpm: float, pressure: float, fault: Fault | None, area: float
 ) -> PumpRipple:
-    numbers, leaks = dict(pump), None
-    if fault is not None:
-        if "discharge_coefficient" not in numbers:
-            area *= LEAK_DISCHARGE / Geometry.discharge_coefficient
-        leaks = list(fault.leaks(area, 0, numbers["pistons"]))
+    numbers = dict(pump)
+    leaks = None if fault is None else list(fault.leaks(area, 0, numbers["pistons"]))
     outlet = ConstantPressure(pressure)
     return simulate(numbers, fluid, speed_rpm, outlet, leaks, min_steps=STEPS)

@@ -22,7 +22,7 @@ from rippletwin.diagnosis.observation_model import Hypothesis, ObservationModel
 
 TOLERANCE = 0.1  # relative error of a prediction that the score forgives
 SCATTER = 0.005  # relative scatter of the healthy ripple, in the score
-AREAS = 13  # leak areas between a prior's ends
+AREAS = 19  # leak areas between a prior's ends
 ANGLES = 1024  # shaft angles in a pitch of the pistons
 KEPT = 8  # best candidates of single faults to which a second fault is added
 
@@ -128,7 +128,7 @@ class Screen:
     def _leaks_of(self, fault: Fault) -> list[tuple[float, _Term]]:
         """(leak area, what a leak at piston 0 adds to the reading)."""
         if fault.name not in self._leaks:
-            areas = np.geomspace(fault.smallest, fault.largest, AREAS)
+            areas = np.exp(np.linspace(*self.model.area_ends(fault), AREAS))
             self._leaks[fault.name] = [
                 (float(a), self._term(self._response * self.model.leak_change(fault, float(a), 0)))
                 for a in areas

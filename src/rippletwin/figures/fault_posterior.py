@@ -35,9 +35,9 @@ def change(d: Diagnosis) -> Figure:
     model, best = d.model, d.best
     model.linearise_line(best.mode)
     parts = model.parts(best.mode)
-    healthy, leaks = parts.healthy, parts.leaks
-    error = np.sqrt(model.variance(healthy, leaks, best.errors)) / 1e3
-    measured, predicted = (np.abs(x) / 1e3 for x in (model.values - healthy, leaks.sum(axis=0)))
+    error = np.sqrt(model.variance(parts, best.errors)) / 1e3
+    measured = np.abs(model.values - parts.healthy) / 1e3
+    predicted = np.abs(parts.leaks.sum(axis=0)) / 1e3
     sensors = model.line.twin.rig.sensors
     fig, axes = style.figure(len(measured), 1, height=1.8, sharex=True)
     for ax, sensor, seen, told, allowed in zip(axes[:, 0], sensors, measured, predicted, error):

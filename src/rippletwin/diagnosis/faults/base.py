@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 from rippletwin.pump.faults import Cylinder, Slipper
 
-SMALLEST, LARGEST = 1e-8, 5e-6
-"""Leak areas, m2, between which a prior is log-uniform: from 1 % of a healthy ripple to several
-times that ripple on the default pump."""
+SMALLEST, LARGEST = 0.002, 4.0
+"""Ends of a log-uniform prior on a leak's flow under the load pressure, over the mean flow of one
+piston: from below 1 % of a healthy ripple to several times that ripple."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,8 @@ class Fault:
     words         what it is, for the sentence: "a worn slipper"
     leaks         (leak area m2, piston, number of pistons) -> the pump model's faults
     source        author, year and section, or why it is so
-    smallest, largest   ends of the log-uniform prior on the leak area, m2
+    smallest, largest   ends of the log-uniform prior on the leak's flow under the load pressure,
+                  over the mean flow of one piston
     one_piston    whether it is at one piston; else all pistons are alike
     by_default    whether it is tried unless asked for otherwise
     """
