@@ -39,6 +39,7 @@ include: "workflow/rules/attention.smk"
 include: "workflow/rules/claims.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/concealed.smk"
+include: "workflow/rules/diagnosis_trial.smk"
 
 
 rule all:

@@ -127,7 +127,7 @@ def test_parts_of_explanation_import_only_parts_below_them():
     assert not wrong, "\n".join(wrong)
 
 
-@pytest.mark.parametrize("package", ["rippletwin", "virtualrig", "concealed"])
+@pytest.mark.parametrize("package", ["rippletwin", "virtualrig", "concealed", "diagnosis_trial"])
 def test_no_modules_import_each_other_in_a_circle(package):
     """Every module can be read before those that use it."""
     edges = {}
@@ -166,9 +166,10 @@ def test_packages_hold_a_docstring_only():
 @pytest.mark.parametrize(
     ("package", "strangers"),
     [
-        ("rippletwin", {"virtualrig", "concealed", "snakemake"}),
-        ("virtualrig", {"rippletwin", "concealed", "snakemake"}),
-        ("concealed", {"snakemake"}),
+        ("rippletwin", {"virtualrig", "concealed", "diagnosis_trial", "snakemake"}),
+        ("virtualrig", {"rippletwin", "concealed", "diagnosis_trial", "snakemake"}),
+        ("concealed", {"diagnosis_trial", "snakemake"}),
+        ("diagnosis_trial", {"virtualrig", "snakemake"}),
     ],
 )
 def test_programs_do_not_know_each_other(package, strangers):

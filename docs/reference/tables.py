@@ -1,10 +1,11 @@
-"""Write the tables of docs/reference from the source that they describe.
+"""Write the tables of docs from the source that they describe.
 
     python docs/reference/tables.py
 
 A table stands between `<!-- table: KIND NAME -->` and `<!-- end -->`. Kinds: `effect` (of the
 library), `keys` (of a section of rig.yaml, from its schema), `modules` (of a package, from the
-first line of their docstrings), `help` (what a command prints with --help).
+first line of their docstrings), `help` (what a command prints with --help), `nuisance` (physics of
+the diagnosis trial's rigs).
 
 Priors are those of the paper's line (resources/paper_rig.yaml) for a liquid, and of the air tube
 (resources/air_tube/rig.yaml) for a gas.
@@ -24,6 +25,7 @@ import yaml
 
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor
 from rippletwin.twin.effects.library import EFFECTS
+from virtualrig.draw_nuisance import NUISANCE
 
 FOLDER = Path(__file__).resolve().parent
 ROOT = FOLDER.parents[1]
@@ -98,7 +100,18 @@ def help(command: str) -> str:
     return f"```text\n{text.getvalue().rstrip()}\n```\n"
 
 
-KINDS = {kind.__name__: kind for kind in (effect, keys, modules, help)}
+def nuisance(_: str) -> str:
+    """Nuisance physics of a population's rigs: ranges and sources."""
+    rows = [
+        (r.what, f"{PLUS_MINUS[r.scale]}{r.low:g} to {r.high:g}", r.unit, SCALES[r.scale], r.source)
+        for r in NUISANCE.values()
+    ]
+    return _table(("quantity", "size", "unit", "drawn", "source"), rows)
+
+
+PLUS_MINUS = {"uniform": "", "log": "", "signed": "± "}
+SCALES = {"uniform": "evenly", "log": "log-uniform", "signed": "evenly, either sign"}
+KINDS = {kind.__name__: kind for kind in (effect, keys, modules, help, nuisance)}
 
 
 def fill(page: str) -> str:
@@ -146,7 +159,7 @@ def _prior_in_words(prior) -> str:
 
 
 if __name__ == "__main__":
-    for path in sorted(FOLDER.glob("*.md")):
+    for path in sorted(FOLDER.parent.rglob("*.md")):
         page = path.read_text()
         if (filled := fill(page)) != page:
             path.write_text(filled)

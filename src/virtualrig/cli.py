@@ -1,7 +1,8 @@
-"""Command line of the virtual rig: virtualrig record | check | conceal.
+"""Command line of the virtual rig: virtualrig record | check | conceal | population.
 
 `record` records a case folder. `check` checks the numerics of concealed cases, and `conceal`
-records a case drawn at random and seals its truth (docs/concealed.md).
+records a case drawn at random and seals its truth (docs/concealed.md). `population` records one rig
+of a population, with recordings of unknown state, and seals their truth (docs/diagnosis_trial.md).
 """
 
 import argparse
@@ -17,6 +18,7 @@ import numpy as np
 
 from virtualrig.conceal import record_concealed_case
 from virtualrig.draw import draw_case, random_generator
+from virtualrig.draw_population import draw_rig
 from virtualrig.exact import check_numerics
 from virtualrig.folder import (
     prepare_folder,
@@ -27,6 +29,7 @@ from virtualrig.folder import (
     write_sheet,
     write_truth,
 )
+from virtualrig.population import record_rig
 from virtualrig.recorder import Point, nominal_ripple, record
 from virtualrig.rig import SEAL, SHEET, Rig, RigError, read_rig, read_yaml
 from virtualrig.seal import new_key, seal
@@ -93,13 +96,20 @@ def _parser() -> argparse.ArgumentParser:
     check.set_defaults(run=_check)
     hide = commands.add_parser("conceal", help="record one case drawn at random and seal its truth")
     hide.add_argument("--case", type=int, required=True, help="which of the cases, from 0")
-    hide.add_argument("--out", type=Path, required=True, help="case folder to write (new or empty)")
-    hide.add_argument("--seal", type=Path, required=True, help="sealed truth to write")
-    hide.add_argument("--key", type=Path, required=True, help="key of the seal to write")
     hide.set_defaults(run=_conceal)
-    for command in (check, hide):
+    drawn = commands.add_parser("population", help="record one rig of a population, states unknown")
+    drawn.add_argument("--rig", type=int, required=True, help="which of the rigs, from 0")
+    drawn.set_defaults(run=_population)
+    for command in (hide, drawn):
+        command.add_argument(
+            "--out", type=Path, required=True, help="case folder to write (new or empty)"
+        )
+        command.add_argument("--seal", type=Path, required=True, help="sealed truth to write")
+        command.add_argument("--key", type=Path, required=True, help="key of the seal to write")
+    for command in (check, hide, drawn):
         command.add_argument("--commit", required=True, help="hash of the tool that is to be tried")
         command.add_argument("--number", type=int, required=True, help="number of the trial")
+    for command in (check, hide):
         command.add_argument("--cases", type=int, required=True, help="how many cases it has")
     return parser
 
@@ -159,15 +169,34 @@ def _check(options: argparse.Namespace) -> None:
 
 
 def _conceal(options: argparse.Namespace) -> None:
-    for path, name in ((options.seal, "--seal"), (options.key, "--key")):
-        if path.resolve().is_relative_to(options.out.resolve()):
-            raise RigError(f"{name} {path}: lies in the case folder; keep the truth out of it")
+    _keep_truth_out(options)
     if not 0 <= options.case < options.cases:
         raise RigError(f"--case {options.case}: there are {options.cases} cases, from 0")
     trial = (options.commit, options.number)
     drawn = draw_case(options.cases, *trial, options.case)
     rng = random_generator(*trial, "recording", options.case)
-    truth = record_concealed_case(drawn, options.out, rng)
+    _write_seal(options, record_concealed_case(drawn, options.out, rng))
+
+
+def _population(options: argparse.Namespace) -> None:
+    _keep_truth_out(options)
+    if options.rig < 0:
+        raise RigError(f"--rig {options.rig}: rigs count from 0")
+    trial = (options.commit, options.number)
+    rng = random_generator(*trial, "population recording", options.rig)
+    report = partial(print, "virtualrig: recorded", file=sys.stderr, flush=True)
+    truth = record_rig(draw_rig(*trial, options.rig), options.out, rng, report)
+    _write_seal(options, truth)
+
+
+def _keep_truth_out(options: argparse.Namespace) -> None:
+    """Raises RigError where the seal or its key would lie in the case folder."""
+    for path, name in ((options.seal, "--seal"), (options.key, "--key")):
+        if path.resolve().is_relative_to(options.out.resolve()):
+            raise RigError(f"{name} {path}: lies in the case folder; keep the truth out of it")
+
+
+def _write_seal(options: argparse.Namespace, truth: dict) -> None:
     key = new_key()
     options.seal.write_text(json.dumps(seal(truth, key)) + "\n")
     options.key.write_bytes(key)

@@ -17,7 +17,8 @@ class Pipe:
     compliance, retardation time) of a Kelvin-Voigt element: the shunt admittance is that of an
     elastic pipe times 1 + compliance/(1 + s time). `air` is (volume fraction at one atmosphere,
     polytropic exponent). `stiffening` is the relative growth of rho a^2 per Pa above
-    `reference` Pa. `drag` adds drag * q |q| to -q_t (rough turbulent flow: f/(2 D A)).
+    `reference` Pa. `drag` adds drag * q |q| to -q_t (rough turbulent flow: f/(2 D A)). `viscosity`,
+    m2/s, is the network's unless it is given: the liquid may be warmer here than elsewhere.
     """
 
     length: float
@@ -31,6 +32,7 @@ class Pipe:
     stiffening: float = 0.0
     reference: float = 0.0
     drag: float = 0.0
+    viscosity: float | None = None
 
 
 @dataclass(frozen=True)
@@ -148,7 +150,8 @@ def _modes(network: Network, pipe: Pipe) -> tuple[np.ndarray, np.ndarray]:
         if any(other.friction == "unsteady" for other in network.pipes):
             unused = network.modes - 1
             rates, weights = np.pad(rates, (0, unused)), np.pad(weights, (0, unused))
-    return rates * network.viscosity / (pipe.diameter / 2) ** 2, weights
+    viscosity = network.viscosity if pipe.viscosity is None else pipe.viscosity
+    return rates * viscosity / (pipe.diameter / 2) ** 2, weights
 
 
 def node_table(network: Network) -> np.ndarray:
@@ -211,4 +214,5 @@ def state_at_rest(network: Network, line: waves.Line, pressure: float, flow: flo
         node_pressure=np.full(len(network.nodes), pressure),
         node=node,
         chamber=np.full((multistep.DEPTH, pistons), pressure),
+        chamber_pressure=np.full(pistons, pressure),
     )

@@ -6,9 +6,7 @@ a node together, so no volume is lost.
 
 from numba import njit
 
-from virtualrig.pump import orifice_flow
-
-ATMOSPHERE = 1.01325e5  # Pa; all pressures are gauge pressures, unless called absolute
+from virtualrig.pump import ATMOSPHERE, orifice_flow
 
 # columns of the node table; flows leave the node, pressures in Pa
 (

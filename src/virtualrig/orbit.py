@@ -66,12 +66,17 @@ class Bench:
         self.largest_step = largest_step(rig.network)
         self.nodes = node_table(rig.network)
         self.sensors = sensor_rows(rig.network)
-        chosen = tuple(rig.faults[kind] for kind in faults)
-        self.chambers, self.ports = pump.pump_tables(rig.pump, rig.network.density, chosen)
+        self.set_faults(tuple(rig.faults[kind] for kind in faults))
         if flow is not None:
             self.chambers = self.chambers[:0]
         self._ripple = np.array(rig.ripple, dtype=float).reshape(-1, 3)
         self.state = None
+
+    def set_faults(self, faults: tuple) -> None:
+        """Give the pump these faults (`virtualrig.faults`) and no others; the state is kept."""
+        self.chambers, self.ports = pump.pump_tables(
+            self.rig.pump, self.rig.network.density, faults
+        )
 
     def settle(
         self,
@@ -97,6 +102,7 @@ class Bench:
         if self.state is None:
             pistons = len(self.chambers)
             self.state = state_at_rest(self.rig.network, line, load_pressure, flow, pistons)
+            self.state.chamber[:] = pump.compression(load_pressure, self.ports)[0]
         load = self.nodes[self.rig.load_node]
         load[node_elements.VALVE_SET] = load_pressure
         load[node_elements.ORIFICE] = (

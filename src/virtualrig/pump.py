@@ -3,6 +3,11 @@
 Crank angle is zero where a piston is furthest out; a chamber then shrinks, and delivers, for half a
 turn. Around both dead centres a chamber is shut off for `port_overlap_deg`; from there the port in
 question opens to its whole area over `port_opening_deg`, and closes the same way.
+
+Free air makes the chambers' liquid softer at low pressure. A chamber's state is its compression
+e(p) = p + B f (1 - (p0/p)^(1/n)), absolute p, that of a liquid of modulus B with a volume fraction
+f of gas at the pressure p0 of the atmosphere (Merritt, Hydraulic Control Systems, 1967, section
+2.4).
 """
 
 from dataclasses import dataclass, field, replace
@@ -11,10 +16,26 @@ import numpy as np
 from numba import njit
 
 # columns of the chamber table
-BORE, STROKE_RADIUS, DEAD_VOLUME, ANGLE, CASE_LEAK, SLIPPER, NEIGHBOUR, CHAMBER_COLUMNS = range(8)
+(
+    BORE, STROKE_RADIUS, DEAD_VOLUME, ANGLE, CASE_LEAK, SLIPPER, NEIGHBOUR,
+    NEIGHBOUR_GAP,  # laminar part of the leak to the neighbour, m3/s/Pa
+    INLET,  # share of the suction port that is not blocked
+    CHAMBER_COLUMNS,
+) = range(10)  # fmt: skip
 MOST_NEWTON_STEPS = 30
 # entries of the port table
-AREA, OPENING, OVERLAP, TIMING, ORIFICE, MODULUS, SUCTION, LAMINAR, PORT_ENTRIES = range(9)
+(
+    AREA, OPENING, OVERLAP, TIMING, ORIFICE, MODULUS, SUCTION, LAMINAR,
+    GROOVE,  # crank angle, rad, over which a relief groove opens ahead of the port
+    GROOVE_SHARE,  # greatest area of the groove, of the port's
+    AIR,  # bulk modulus times the volume fraction of free air at one atmosphere, Pa
+    WEAR,  # orifice coefficient of a worn sealing land about the dead centres, m3/s/Pa^0.5
+    PORT_ENTRIES,
+) = range(13)  # fmt: skip
+ATMOSPHERE = 1.01325e5  # Pa; all pressures are gauge pressures, unless called absolute
+AIR_EXPONENT = 1.2  # polytropic
+LEAST_PRESSURE = 2e3  # absolute, Pa: below, vapour fills the room and the pressure hardly falls
+WORN_ANGLE = np.radians(15.0)  # from a dead centre, to which a worn land connects both ports
 
 
 @dataclass(frozen=True)
@@ -23,7 +44,9 @@ class Pump:
 
     `case_leakage` is laminar, m3/s/Pa a chamber; `port_timing_deg` turns the port plate.
     `spread` (pistons, 3) are each piston's relative deviations of bore area and case leakage, and
-    its deviation of angular position in degrees.
+    its deviation of angular position in degrees. With `groove_deg` a triangular relief groove opens
+    each port that much earlier, to the share `groove_share` of its area; the port then opens as two
+    circles overlap. `air` is the volume fraction of free air in the chambers at one atmosphere.
     """
 
     pistons: int = 9
@@ -39,6 +62,9 @@ class Pump:
     case_leakage: float = 3e-13
     suction_pressure: float = 2e5
     port_timing_deg: float = 0.0
+    groove_deg: float = 0.0
+    groove_share: float = 0.0
+    air: float = 0.0
     spread: np.ndarray | None = field(default=None, repr=False)
 
     @property
@@ -57,19 +83,11 @@ class Pump:
         return replace(self, spread=spread)
 
 
-@dataclass(frozen=True)
-class Fault:
-    """A leakage path: `slipper` from chamber 0 to the case, `cylinder` from chamber 0 to 1.
+def pump_tables(pump: Pump, density: float, faults: tuple = ()):
+    """Tables for the time stepper: (pistons, CHAMBER_COLUMNS) and (PORT_ENTRIES,).
 
-    `leak_area` is that of a sharp-edged orifice, m2.
+    `faults` are those of `virtualrig.faults`.
     """
-
-    kind: str
-    leak_area: float
-
-
-def pump_tables(pump: Pump, density: float, faults: tuple[Fault, ...] = ()):
-    """Tables for the time stepper: (pistons, CHAMBER_COLUMNS) and (PORT_ENTRIES,)."""
     spread = np.zeros((pump.pistons, 3)) if pump.spread is None else np.asarray(pump.spread)
     orifice = pump.discharge_coefficient * np.sqrt(2 / density)
     chambers = np.zeros((pump.pistons, CHAMBER_COLUMNS))
@@ -79,9 +97,7 @@ def pump_tables(pump: Pump, density: float, faults: tuple[Fault, ...] = ()):
     step = 2 * np.pi / pump.pistons
     chambers[:, ANGLE] = step * np.arange(pump.pistons) + np.radians(spread[:, 2])
     chambers[:, CASE_LEAK] = pump.case_leakage * (1 + spread[:, 1])
-    for fault in faults:
-        column = {"slipper": SLIPPER, "cylinder": NEIGHBOUR}[fault.kind]
-        chambers[0, column] += orifice * fault.leak_area
+    chambers[:, INLET] = 1.0
     ports = np.zeros(PORT_ENTRIES)
     ports[AREA] = pump.port_area
     ports[OPENING] = np.radians(pump.port_opening_deg)
@@ -91,6 +107,11 @@ def pump_tables(pump: Pump, density: float, faults: tuple[Fault, ...] = ()):
     ports[MODULUS] = pump.bulk_modulus
     ports[SUCTION] = pump.suction_pressure
     ports[LAMINAR] = 2e3
+    ports[GROOVE] = np.radians(pump.groove_deg)
+    ports[GROOVE_SHARE] = pump.groove_share
+    ports[AIR] = pump.bulk_modulus * pump.air
+    for fault in faults:
+        fault.apply(chambers, ports)
     return chambers, ports
 
 
@@ -113,12 +134,47 @@ def port_opening(angle, ports):
     """
     from_start = (angle - ports[TIMING]) % (2 * np.pi) - 0.5 * ports[OVERLAP]
     to_end = np.pi - ports[OVERLAP] - from_start
+    if ports[GROOVE] > 0:
+        return _grooved_opening(min(from_start, to_end), ports)
     x = min(from_start, to_end) / ports[OPENING]
     if x <= 0:
         return 0.0
     if x >= 1:
         return 1.0
     return x * x * (3 - 2 * x)
+
+
+@njit(cache=True)
+def _grooved_opening(beyond, ports):
+    """The same, `beyond` rad from where the port itself starts to open, with a relief groove.
+
+    The cross section of a triangular groove grows with the square of its length (Manring, J. Mech.
+    Des. 125, 2003). The port's edge and the chamber's are circles: the lens that they
+    have in common is the open area.
+    """
+    groove = min(max(beyond / ports[GROOVE] + 1.0, 0.0), 1.0)
+    x = min(max(beyond / ports[OPENING], 0.0), 1.0)
+    lens = 2 * (np.arccos(1 - x) - (1 - x) * np.sqrt(x * (2 - x))) / np.pi
+    return max(ports[GROOVE_SHARE] * groove * groove, lens)
+
+
+@njit(cache=True)
+def _worn_opening(angle, ports):
+    """Orifice coefficient from a chamber to either port over a worn land, at `angle`, rad."""
+    off = abs((angle - ports[TIMING] + 0.5 * np.pi) % np.pi - 0.5 * np.pi) / WORN_ANGLE
+    return ports[WEAR] * (1 - off * off) if off < 1 else 0.0
+
+
+@njit(cache=True)
+def compression(pressure, ports):
+    """A chamber's compression e(p), Pa, at a gauge pressure in Pa, and its slope."""
+    if ports[AIR] == 0:
+        return pressure, 1.0
+    absolute = max(pressure + ATMOSPHERE, LEAST_PRESSURE)
+    gas = ports[AIR] * (ATMOSPHERE / absolute) ** (1 / AIR_EXPONENT)
+    slope = 1 + gas / (AIR_EXPONENT * absolute)
+    below = pressure + ATMOSPHERE - absolute
+    return absolute - ATMOSPHERE + ports[AIR] - gas + slope * below, slope
 
 
 @njit(cache=True, fastmath=True)
@@ -136,14 +192,18 @@ def chamber_kinematics(angle, speed, chambers, ports, stations):
         stations[i, 0] = ports[MODULUS] / volume
         stations[i, 1] = swept * np.sin(phi) * speed
         stations[i, 2] = full * port_opening(phi, ports)
-        stations[i, 3] = full * port_opening(phi + np.pi, ports)
+        stations[i, 3] = full * port_opening(phi + np.pi, ports) * chambers[i, INLET]
+        if ports[WEAR] > 0:
+            worn = _worn_opening(phi, ports)
+            stations[i, 2] += worn
+            stations[i, 3] += worn
 
 
 @njit(cache=True, fastmath=True)
 def step_chambers(stations, history, lead, chambers, ports, outlet_lead, outlet_rest, x, matrix):
     """One implicit step of all chambers and of the outlet that they share; returns Newton steps.
 
-    Solves lead p_i - history_i = dp_i/dt for the chambers and
+    Solves lead e(p_i) - history_i = de_i/dt for the chambers' compression and
     outlet_lead p - outlet_rest = sum of delivered flows for the outlet pressure, by Newton's
     method. `x` (pistons + 1,) holds the chamber pressures and the outlet pressure: start values
     in, solution out. `stations` are those of `crank`; `matrix` (pistons + 1, pistons + 2) is
@@ -157,6 +217,7 @@ def step_chambers(stations, history, lead, chambers, ports, outlet_lead, outlet_
         matrix[n, n + 1] = outlet_rest - outlet_lead * x[n]
         for i in range(n):
             stiffness, gain, opening, inlet = stations[i]
+            strain, softness = compression(x[i], ports)
             slope = chambers[i, CASE_LEAK]
             gain -= slope * x[i]
             if chambers[i, SLIPPER] > 0:
@@ -175,13 +236,15 @@ def step_chambers(stations, history, lead, chambers, ports, outlet_lead, outlet_
                 matrix[n, i] = -opening * tangent
                 matrix[n, n] += opening * tangent
                 matrix[n, n + 1] += opening * delivery
-            matrix[i, n + 1] += history[i] - lead * x[i] + stiffness * gain
-            matrix[i, i] += lead + stiffness * slope
+            matrix[i, n + 1] += history[i] - lead * strain + stiffness * gain
+            matrix[i, i] += lead * softness + stiffness * slope
             if chambers[i, NEIGHBOUR] > 0:
                 k = (i + 1) % n
                 across, tangent = orifice_flow(x[i] - x[k], laminar)
                 across *= chambers[i, NEIGHBOUR]
                 tangent *= chambers[i, NEIGHBOUR]
+                across += chambers[i, NEIGHBOUR_GAP] * (x[i] - x[k])
+                tangent += chambers[i, NEIGHBOUR_GAP]
                 matrix[i, n + 1] -= stiffness * across
                 matrix[i, i] += stiffness * tangent
                 matrix[i, k] -= stiffness * tangent

@@ -10,8 +10,9 @@ import numpy as np
 import yaml
 
 from virtualrig.effects import EFFECTS, Draft
+from virtualrig.faults import Leak
 from virtualrig.network import Network, Node, Pipe
-from virtualrig.pump import Fault, Pump
+from virtualrig.pump import Pump
 
 SHEET = Path(__file__).with_name("sheet.yaml")
 SEAL = Path(__file__).with_name("sealed.yaml")
@@ -42,7 +43,7 @@ class Rig:
     pump: Pump
     network: Network
     load_node: int
-    faults: dict[str, Fault]
+    faults: dict[str, Leak]
     sensing: tuple[Sensing, ...]
     noise: float = 0.0
     speed_error: float = 0.0
@@ -94,6 +95,7 @@ def build(known: dict, true: dict) -> Rig:
     differs = true.get("pump", {})
     geometry = Pump(**known.get("pump", {}))
     pump = geometry.changed(differs.get("relative", {}), differs.get("timing_deg", 0.0))
+    pump = replace(pump, **differs.get("values", {}))
     line = true.get("line", known["line"])
     sensors = true.get("sensors", [sensor["position"] for sensor in known["sensors"]])
     draft = Draft(pump, [dict(segment) for segment in line["segments"]], [{} for _ in sensors])
@@ -106,9 +108,7 @@ def build(known: dict, true: dict) -> Rig:
         pump=draft.pump,
         network=network,
         load_node=load_node,
-        faults={
-            kind: Fault(kind, fault["leak_area"]) for kind, fault in true.get("faults", {}).items()
-        },
+        faults={kind: Leak(kind, **fault) for kind, fault in true.get("faults", {}).items()},
         sensing=tuple(Sensing(**chain) for chain in draft.sensing),
         noise=true.get("noise", 0.0),
         speed_error=speed.get("error", 0.0),

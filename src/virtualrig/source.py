@@ -10,10 +10,12 @@ import numpy as np
 from numba import njit
 
 from virtualrig.pump import (
+    AIR,
     LAMINAR,
     MOST_NEWTON_STEPS,
     Pump,
     chamber_kinematics,
+    compression,
     orifice_flow,
     pump_tables,
     step_chambers,
@@ -52,7 +54,7 @@ def _march(chambers, ports, speed, ripple, pressure):
     n = len(chambers)
     dt = 2 * np.pi / speed / SAMPLES
     lead = 25 / 12 / dt
-    past = np.full((4, n), pressure)
+    past = np.full((4, n), compression(pressure, ports)[0])
     x = np.full(n + 1, pressure)
     stations, matrix = np.zeros((n, 4)), np.zeros((n + 1, n + 2))
     history = np.zeros(n)
@@ -69,7 +71,8 @@ def _march(chambers, ports, speed, ripple, pressure):
             history[i] = (
                 4 * past[0, i] - 3 * past[1, i] + 4 / 3 * past[2, i] - past[3, i] / 4
             ) / dt
-            x[i] = 2 * past[0, i] - past[1, i]
+            if ports[AIR] == 0:
+                x[i] = 2 * past[0, i] - past[1, i]
         x[n] = pressure
         used = step_chambers(
             stations,
@@ -86,7 +89,7 @@ def _march(chambers, ports, speed, ripple, pressure):
         delivered = 0.0
         for i in range(n):
             past[3, i], past[2, i], past[1, i] = past[2, i], past[1, i], past[0, i]
-            past[0, i] = x[i]
+            past[0, i] = compression(x[i], ports)[0]
             delivered += stations[i, 2] * orifice_flow(x[i] - pressure, ports[LAMINAR])[0]
         flow[step % SAMPLES] = delivered
     return flow, most

@@ -10,7 +10,7 @@ from numba import njit
 
 from virtualrig.multistep import DEPTH, LEAD, combine_past
 from virtualrig.node_elements import NODE_STATES, STORED, VOLUME, settle_node
-from virtualrig.pump import chamber_kinematics, step_chambers
+from virtualrig.pump import AIR, chamber_kinematics, compression, step_chambers
 from virtualrig.waves import advance_waves, close_pipes, gather_at_nodes, wave_rates
 
 
@@ -72,8 +72,11 @@ def run(line, nodes, chambers, ports, source, crank, state, phase, steps, every,
             for node in range(n_nodes):
                 history[s, node] = state.node[now, s, node] / dt
         if pistons > 0:
-            for i in range(pistons):
-                x[i] = 2 * state.chamber[last, i] - state.chamber[before, i]
+            if ports[AIR] == 0:
+                for i in range(pistons):
+                    x[i] = 2 * state.chamber[last, i] - state.chamber[before, i]
+            else:
+                x[:pistons] = state.chamber_pressure
             combine_past(state.chamber, ring)
             for i in range(pistons):
                 chamber_history[i] = state.chamber[now, i] / dt
@@ -92,7 +95,8 @@ def run(line, nodes, chambers, ports, source, crank, state, phase, steps, every,
             )
             newton = max(newton, used)
             for i in range(pistons):
-                state.chamber[now, i] = x[i]
+                state.chamber[now, i] = compression(x[i], ports)[0]
+                state.chamber_pressure[i] = x[i]
             state.node_pressure[0] = x[pistons]
             state.node[now, STORED, 0] = nodes[0, VOLUME] * x[pistons]
         for node in range(1 if pistons > 0 else 0, n_nodes):

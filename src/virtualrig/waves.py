@@ -47,7 +47,8 @@ class State(NamedTuple):
     flow_drive: np.ndarray  # (4, n, E)
     node_pressure: np.ndarray  # (nodes,)
     node: np.ndarray  # (4, NODE_STATES, nodes)
-    chamber: np.ndarray  # (4, pistons)
+    chamber: np.ndarray  # (4, pistons) compression, see `virtualrig.pump`
+    chamber_pressure: np.ndarray  # (pistons,)
 
 
 @njit(cache=True, fastmath=True)

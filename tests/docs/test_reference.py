@@ -15,7 +15,7 @@ from rippletwin.explanation.verdict.decision import VERDICTS
 from rippletwin.twin.effects.library import EFFECTS
 
 REFERENCE = ROOT / "docs" / "reference"
-PAGES = sorted(p for p in REFERENCE.glob("*.md") if "<!-- table:" in p.read_text())
+PAGES = sorted(p for p in REFERENCE.parent.rglob("*.md") if "<!-- table:" in p.read_text())
 
 
 @pytest.fixture(scope="module")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from virtualrig.faults import Leak
 from virtualrig.orbit import Bench
 from virtualrig.pump import (
-    Fault,
     Pump,
     chamber_kinematics,
     port_opening,
@@ -92,7 +92,7 @@ def chambers_by_radau(times, fault_area=0.0):
 def test_chambers_are_those_of_radau(leak_area):
     """Healthy and with a leak between neighbours: flow ripple to 0.5 %, and halving the
     step moves it by less than 0.5 %."""
-    faults = (Fault("cylinder", leak_area),) if leak_area else ()
+    faults = (Leak("cylinder", leak_area),) if leak_area else ()
     steps = 4608 * 4
     p, q = chambers_by_multistep(steps, 2, faults)
     times = 2 * np.pi / SPEED * (1 + np.arange(1, steps + 1) / steps)

@@ -1,0 +1,1 @@
+"""The diagnosis trial: how often `rippletwin diagnose` is right on a population of rigs."""

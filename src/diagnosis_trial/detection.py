@@ -1,0 +1,97 @@
+"""Probability of detection against severity, at a fixed share of false alarms.
+
+A hit/miss curve: the logistic of the logarithm of severity, fitted by maximum penalised likelihood
+(MIL-HDBK-1823A, 2009, section G.3; the penalty keeps the slope finite where one severity separates
+hits from misses).
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.special import expit, log_expit, logit
+
+FALSE_ALARMS = 0.05
+SLOPE_SD = 10.0  # of the penalty: standard deviation of the slope a decade of severity
+FOUND = (0.5, 0.9)  # probabilities of detection at which a severity is called the smallest found
+RESAMPLED = 200
+
+
+class DetectionCurve(NamedTuple):
+    """P(severity) = expit(slope (log10 severity - middle))."""
+
+    middle: float
+    slope: float
+
+    def probability(self, severity: np.ndarray) -> np.ndarray:
+        return expit(self.slope * (np.log10(severity) - self.middle))
+
+    def severity(self, probability: float) -> float:
+        """The severity that is detected with this probability."""
+        return float(10 ** (self.middle + logit(probability) / self.slope))
+
+
+def alarm_threshold(healthy: Sequence[float], share: float = FALSE_ALARMS) -> float:
+    """The least suspicion above which lies at most this share of the healthy recordings'.
+
+    Infinite where more than that share of healthy recordings has infinite suspicion.
+    """
+    ordered = np.sort(np.asarray(healthy, float))[::-1]
+    return float(ordered[int(share * len(ordered))])
+
+
+def fit_curve(
+    severity: Sequence[float], detected: Sequence[bool], start: DetectionCurve | None = None
+) -> DetectionCurve | None:
+    """The detection curve of recordings; None where there are fewer than five of them.
+
+    Without a curve to `start` from it is sought from several.
+    """
+    x, hit = np.log10(np.asarray(severity, float)), np.asarray(detected, bool)
+    if len(x) < 5:
+        return None
+
+    def minus_log_posterior(parameters: np.ndarray) -> float:
+        middle, log_slope = parameters
+        argument = np.exp(log_slope) * (x - middle)
+        likelihood = np.sum(np.where(hit, log_expit(argument), log_expit(-argument)))
+        spread = max(x.std(), 0.1)
+        prior = ((middle - x.mean()) / (3 * spread)) ** 2 + (np.exp(log_slope) / SLOPE_SD) ** 2
+        return -likelihood + 0.5 * prior
+
+    starts = [(m, s) for m in np.quantile(x, [0.1, 0.4, 0.8]) for s in (0.5, 2.0)]
+    if start is not None:
+        starts = [(start.middle, np.log(start.slope))]
+    best = min(
+        (minimize(minus_log_posterior, start, method="Nelder-Mead") for start in starts),
+        key=lambda result: result.fun,
+    )
+    return DetectionCurve(float(best.x[0]), float(np.exp(best.x[1])))
+
+
+def smallest_found(
+    severity: Sequence[float],
+    detected: Sequence[bool],
+    rigs: Sequence[int],
+    probability: float,
+    rng: np.random.Generator,
+) -> tuple[float, float, float] | None:
+    """The severity detected with `probability`, and its 95 % interval by resampling whole rigs.
+
+    Recordings of one rig go together: they share its twin (Davison, Hinkley, Bootstrap Methods,
+    1997, section 3.8).
+    """
+    severity, detected, rigs = map(np.asarray, (severity, detected, rigs))
+    curve = fit_curve(severity, detected)
+    if curve is None:
+        return None
+    members = [np.flatnonzero(rigs == rig) for rig in np.unique(rigs)]
+    drawn = []
+    for _ in range(RESAMPLED):
+        picked = np.concatenate([members[k] for k in rng.integers(len(members), size=len(members))])
+        again = fit_curve(severity[picked], detected[picked], curve)
+        if again is not None:
+            drawn.append(again.severity(probability))
+    low, high = np.quantile(drawn, [0.025, 0.975]) if drawn else (np.nan, np.nan)
+    return curve.severity(probability), float(low), float(high)

@@ -1,0 +1,143 @@
+"""Figures of a diagnosis trial: detection, confusion, severities and stated probabilities."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from concealed.summary import rate_of
+from diagnosis_trial import detection
+from diagnosis_trial.summary import (
+    ANSWERS,
+    SINGLE,
+    STATES,
+    confusion_matrix,
+    covers,
+    reliability_table,
+)
+from rippletwin.figures import style
+
+LOOK = {"slipper": (style.CALIBRATED, "o", "-"), "cylinder": (style.ALARM, "s", "--")}
+LEAST_CHANGE = 1e-3  # smaller changes are drawn here
+BINS = 6  # of equally many recordings each, in which shares are drawn beside a curve
+
+
+def draw_figures(rows: list[dict], folder: str | Path, suffix: str = ".png") -> list[Path]:
+    """Write every figure of the scored recordings into `folder`; returns their paths."""
+    paths = []
+    for name, make in FIGURES.items():
+        paths.append(Path(folder) / f"{name}{suffix}")
+        style.save(make(rows), paths[-1])
+    return paths
+
+
+def draw_detection(rows: list[dict]) -> Figure:
+    """Probability of detection at 5 % false alarms, against the change and against the leak."""
+    fig, axes = style.figure(1, 2, height=2.6, sharey=True)
+    healthy = [row["suspicion"] for row in rows if row["state"] == "healthy"]
+    threshold = detection.alarm_threshold(healthy) if healthy else np.inf
+    for state, (colour, marker, dash) in LOOK.items():
+        chosen = [row for row in rows if row["state"] == state]
+        hit = np.array([row["suspicion"] > threshold for row in chosen])
+        change = np.array([max(row["change"], LEAST_CHANGE) for row in chosen])
+        area = np.array([row["areas"][state] * 1e6 for row in chosen])
+        for ax, severity in zip(axes[0], (change, area), strict=True):
+            _draw_curve(ax, severity, hit, state, colour, marker, dash)
+    axes[0, 0].set_xlabel("relative change of the ripple")
+    axes[0, 1].set_xlabel("leak, area of the same orifice (mm$^2$)")
+    axes[0, 0].set_ylabel("probability of detection")
+    axes[0, 0].set_ylim(-0.12, 1.12)
+    if axes[0, 1].lines:
+        axes[0, 1].legend(loc="lower right")
+    return fig
+
+
+def _draw_curve(ax, severity, hit, label: str, colour: str, marker: str, dash: str) -> None:
+    """A detection curve, shares in bins with exact intervals, and the recordings as ticks."""
+    ax.set_xscale("log")
+    if not len(severity):
+        return
+    curve = detection.fit_curve(severity, hit)
+    if curve is not None:
+        grid = np.geomspace(severity.min(), severity.max(), 200)
+        ax.plot(grid, curve.probability(grid), dash, color=colour)
+    order = np.argsort(severity)
+    for k, part in enumerate(np.array_split(order, min(BINS, len(order)))):
+        rate = rate_of(hit[part])
+        low, high = rate.interval
+        x = np.exp(np.mean(np.log(severity[part])))
+        spread = [[rate.share - low], [high - rate.share]]
+        ax.errorbar(x, rate.share, spread, fmt=marker, color=colour, ms=4, capsize=2, lw=0.8,
+                    label=label if k == 0 else None)  # fmt: skip
+    side = 0.03 * (list(LOOK).index(label) + 1)
+    ax.plot(severity, np.where(hit, 1.03 + side, -0.03 - side), "|", color=colour, ms=4)
+
+
+def draw_confusion(rows: list[dict]) -> Figure:
+    """Share of the recordings of each state (rows) that get each answer; numbers in the cells."""
+    counts = confusion_matrix(rows)
+    share = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+    fig, axes = style.figure(1, 1, height=3.4)
+    ax = axes[0, 0]
+    ax.imshow(share, cmap="Blues", vmin=0, vmax=1, aspect="auto")
+    for i, j in np.ndindex(*counts.shape):
+        if counts[i, j]:
+            colour = "white" if share[i, j] > 0.6 else "black"
+            ax.text(j, i, str(counts[i, j]), ha="center", va="center", color=colour)
+    ax.set_xticks(range(len(ANSWERS)), [_words(name) for name in ANSWERS])
+    ax.set_yticks(range(len(STATES)), [_words(name) for name in STATES])
+    ax.set_xlabel("the tool says")
+    ax.set_ylabel("the truth is")
+    return fig
+
+
+def draw_severities(rows: list[dict]) -> Figure:
+    """Stated against true leak areas with 95 % intervals; share right by stated probability."""
+    fig, axes = style.figure(1, 2, height=2.9)
+    ax = axes[0, 0]
+    found = [s for row in rows if row["right"] for s in row["severities"]]
+    for fault in SINGLE:
+        colour, marker, _ = LOOK[fault]
+        for holds, face in ((True, colour), (False, "white")):
+            some = [s for s in found if s["fault"] == fault and covers(s) == holds]
+            if some:
+                true, value, low, high = (
+                    np.array([s[key] for s in some]) * 1e6
+                    for key in ("true", "value", "low", "high")
+                )
+                spread = np.maximum([value - low, high - value], 0)
+                label = fault if holds else f"{fault}, interval misses"
+                ax.errorbar(true, value, spread, fmt=marker, color=colour, mfc=face, ms=3.5,
+                            lw=0.7, label=label)  # fmt: skip
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    if found:
+        ends = [min(s["true"] for s in found) * 1e6, max(s["true"] for s in found) * 1e6]
+        ax.plot(ends, ends, color=style.NEUTRAL, lw=0.8, zorder=0)
+        ax.legend(loc="upper left", fontsize=7)
+    ax.set_xlabel("true leak (mm$^2$)")
+    ax.set_ylabel("stated leak (mm$^2$)")
+    ax = axes[0, 1]
+    ax.plot([0, 1], [0, 1], color=style.NEUTRAL, lw=0.8)
+    for b in reliability_table(rows):
+        low, high = b.right.interval
+        spread = [[b.right.share - low], [high - b.right.share]]
+        ax.errorbar(b.mean, b.right.share, spread, fmt="o", color=style.CORRECTED, ms=4, capsize=2)
+    ax.set_xlabel("stated probability of the state")
+    ax.set_ylabel("share that is right")
+    ax.set_xlim(0.3, 1.02)
+    ax.set_ylim(-0.03, 1.05)
+    return fig
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ").replace("+", "\n+ ")
+
+
+FIGURES = {
+    "detection": draw_detection,
+    "confusion": draw_confusion,
+    "severities": draw_severities,
+}

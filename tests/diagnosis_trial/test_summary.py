@@ -1,0 +1,107 @@
+"""Tables of a diagnosis trial, on made-up rows; the page and its pictures are written from them."""
+
+import numpy as np
+import pytest
+
+from diagnosed_rigs import RUN, said, truth
+from diagnosis_trial.figures import draw_figures
+from diagnosis_trial.page import report_page
+from diagnosis_trial.score import score_rig
+from diagnosis_trial.summary import (
+    ANSWERS,
+    STATES,
+    change_table,
+    confusion_matrix,
+    reliability_table,
+    score_table,
+    severity_table,
+)
+
+
+def rows(rigs: int = 10) -> list[dict]:
+    """Rigs whose slippers are found above 3 %, with intervals that hold in nine of ten."""
+    made = []
+    for rig in range(rigs):
+        change = 10 ** (-2.5 + 0.25 * rig)
+        area = 1e-7 * change
+        true = truth(
+            unknown_00=("slipper", change, {"slipper": area}),
+            unknown_01=("cylinder", change, {"cylinder": area}),
+            unknown_02=("healthy", 0.0, None),
+            unknown_03=("blocked_port", 0.3, None),
+            unknown_04=("changed_line", 0.2, None),
+            unknown_05=("slipper+cylinder", 0.1, {"slipper": area, "cylinder": area}),
+        )
+        found = change > 0.03
+        shift = 3.0 if rig == 9 else 1.0
+        interval = {"slipper": (0.8 * shift * area, 1.3 * shift * area)}
+        told = [
+            said("unknown_00", "slipper" if found else "healthy", 1e-4 if found else 0.9,
+                 interval if found else None, piston=3 if found else None),
+            said("unknown_01", "slipper", 0.2),
+            said("unknown_02", "unlike" if rig == 0 else "healthy", 0.95),
+            said("unknown_03", "unlike" if rig % 2 else "cylinder", 1e-3),
+            said("unknown_04", "unlike", 0.5),
+            said("unknown_05", "slipper+cylinder", 1e-5),
+        ]  # fmt: skip
+        made += score_rig(rig, true, {"recordings": told}, RUN)
+    return made
+
+
+def by_words(table, words):
+    """The rate of the one line whose text contains `words`."""
+    (line,) = [score for score in table if words in score.what]
+    return line.rate
+
+
+def test_shares_of_the_main_table():
+    """Counts of made-up rows, each told beforehand."""
+    table = score_table(rows())
+    assert (by_words(table, "Healthy again").hits, by_words(table, "Healthy again").count) == (
+        1,
+        10,
+    )
+    plain = by_words(table, "change of the ripple 5 % or more")
+    assert (plain.hits, plain.count) == (5, 10)  # slippers right, cylinders wrong
+    assert by_words(table, "given the name of a known one").share == 0.5
+    assert by_words(table, "the line was changed, change".capitalize()).share == 1.0
+    assert by_words(table, "95 % intervals").hits == by_words(table, "95 % intervals").count - 1
+    assert by_words(table, "each changing the ripple").share == 1.0
+    assert by_words(table, "Piston told").share == 1.0
+
+
+def test_confusion_counts_every_recording_once():
+    """The sum is the number of recordings, and a row holds those of its state."""
+    made = rows()
+    counts = confusion_matrix(made)
+    assert counts.sum() == len(made) and counts.shape == (len(STATES), len(ANSWERS))
+    assert counts[STATES.index("cylinder"), ANSWERS.index("slipper")] == 10
+
+
+def test_bins_by_change_and_severity_ratios():
+    """Slippers are noticed above 3 %; stated leaks are 1.02 of the true ones but for one rig."""
+    bins = {(b.state, b.low): b for b in change_table(rows())}
+    assert bins["slipper", 0.0].noticed.share == 0
+    assert bins["slipper", 0.05].right.share == 1
+    (slipper,) = severity_table(rows())
+    assert slipper.median == pytest.approx(np.sqrt(0.8 * 1.3))
+    assert slipper.high > 2 and slipper.coverage.count == slipper.coverage.hits + 1
+
+
+def test_stated_probabilities_are_those_of_known_states():
+    """Unlike ones and faults that the tool does not know are left out."""
+    table = reliability_table(rows())
+    assert sum(b.right.count for b in table) == 10 * 4 - 1
+    wrong = next(b for b in table if b.low == 0.8)
+    assert wrong.mean == pytest.approx(0.83, abs=0.05)
+
+
+def test_page_and_pictures_are_written(tmp_path):
+    """Every section has a table; also where next to nothing was recorded."""
+    origin = {"commit": "0" * 40, "number": 1000, "not_committed": False, "twin": "explained"}
+    for made in (rows(), rows(1)[:1]):
+        page = report_page(made, origin)
+        assert page.count("\n## ") == 6
+        assert "nan" not in page and "| slipper |" in page
+        paths = draw_figures(made, tmp_path)
+        assert all(path.stat().st_size > 5000 for path in paths) and len(paths) == 3

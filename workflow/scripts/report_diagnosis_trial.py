@@ -1,0 +1,15 @@
+"""The page and the figures of a diagnosis trial."""
+
+import json
+from pathlib import Path
+
+from diagnosis_trial.figures import draw_figures
+from diagnosis_trial.page import report_page
+from job import open_log
+
+report_progress = open_log(snakemake)
+rows = json.loads(Path(snakemake.input.rows).read_text())
+origin = {name: snakemake.params[name] for name in ("commit", "number", "not_committed", "twin")}
+draw_figures(rows, snakemake.output.figures)
+Path(snakemake.output.page).write_text(report_page(rows, origin))
+report_progress(f"{snakemake.output.page} written")
