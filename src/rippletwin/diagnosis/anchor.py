@@ -125,13 +125,13 @@ def _even(flow: np.ndarray, orders: np.ndarray, pistons: int) -> np.ndarray:
 
 def relative_misfit(left, readings, orders: np.ndarray, pistons: int) -> np.ndarray:
     """What a twin leaves (S, F) of `readings`, relative (F,), about each order. The pistons' orders
-    tell; below the first of them the twin is as good as there. Orders of next to no power count
-    with their neighbours."""
+    tell. Below the first of them errors fall with the order: at rest a line has none. Orders of next
+    to no power count with their neighbours."""
     own = np.flatnonzero(orders % pistons == 0)
     powers = [np.mean(np.abs(x[:, own]) ** 2, axis=0) for x in (left, readings)]
     about = [uniform_filter1d(power, min(ABOUT, len(own)), mode="nearest") for power in powers]
     relative = np.minimum(np.sqrt(about[0] / np.maximum(about[1], 1e-300)), 1.0)
-    return np.interp(orders, orders[own], relative)
+    return np.interp(orders, [0, *orders[own]], [0.0, *relative])
 
 
 def _noise(observation) -> np.ndarray:

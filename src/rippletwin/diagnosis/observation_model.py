@@ -27,6 +27,7 @@ CHANGE_WAVES = 6  # cosines over the frequency in which the change's relative er
 SMOOTH_SHARE = 0.5  # of the change's relative error, in each of these
 AREA_SD = 0.1  # relative: discharge coefficients of leaks are between 0.6 and 0.8
 MIN_CHANGE_ERROR = 0.04  # relative, of the change by a leak behind the best of twins
+MAX_SHARE_BESIDE = 0.3  # of a leak, below which a second one can be part of the first one's error
 ALIKE = 8.0  # readings whose errors go together: those of a line are as wide as its resonances
 NEIGHBOURS = 9  # shaft orders over which a power is averaged
 BETWEEN = 0.01  # share of a power whose errors show at orders that have none of it
@@ -146,7 +147,8 @@ class ObservationModel:
         """Ends of the prior on the logarithm of a fault's leak area, m2, with leaks of areas
         `beside` it. A leak below what the twin errs by in the other's change is part of that error.
         """
-        areas, error = self.flows[fault.name].areas, float(np.median(self._expected))
+        areas = self.flows[fault.name].areas
+        error = min(float(np.median(self._expected)), MAX_SHARE_BESIDE)
         low = max([areas[0], *(error * other for other in beside)])
         high = min([areas[-1], *(other / error for other in beside)])
         return float(np.log(low)), float(np.log(high))
@@ -201,7 +203,9 @@ class ObservationModel:
         below = self.observation.frequency_hz <= highest_hz
         columns = self._columns(parts, errors)
         # The drift is about zero: where it has been followed, back to there in a straight line.
-        residual = self.values - parts.reading + np.tensordot(hypothesis.drift, parts.slopes, 1)
+        sure = self._coherence(errors)
+        residual = self.values - self.expected_reading(parts, errors)
+        residual = residual + sure * np.tensordot(hypothesis.drift, parts.slopes, 1)
         variance = self.variance(parts, errors)
         return marginal(residual[:, below], variance[:, below], columns[..., below], ALIKE)
 
@@ -212,7 +216,19 @@ class ObservationModel:
         scatter = errors.scatter**2 * self.scatter_power(parts.healthy)
         leaks = local_power(parts.leaks.sum(axis=0)) + BETWEEN * parts.spread
         changed = self._measured_share(parts) ** 2 * leaks + self.power_by_class(parts.drifted)
-        return self.noise + scatter + (errors.change * self._expected) ** 2 * changed
+        return self.noise + scatter + (1.0 - self._coherence(errors)) * changed
+
+    def expected_reading(self, parts: Parts, errors: Errors) -> np.ndarray:
+        """The reading (S, F) to expect: changes count by as much as they are sure."""
+        leaks = parts.leaks.sum(axis=0)
+        return parts.healthy - parts.drifted + self._coherence(errors) * (parts.drifted + leaks)
+
+    def _coherence(self, errors: Errors) -> np.ndarray:
+        """Share (F,) of a predicted change that is to be expected, 1/(1 + e^2) for a relative error
+        e of the prediction (Carroll, Ruppert, Stefanski and Crainiceanu 2006, Measurement Error in
+        Nonlinear Models, section 4.1). The rest of its power is error: where the twin knows
+        nothing, a change says nothing of its size."""
+        return 1.0 / (1.0 + (errors.change * self._expected) ** 2)
 
     def _measured_share(self, parts: Parts) -> float:
         """The measured change over the predicted one. Errors of a leak's change are relative to
@@ -253,13 +269,15 @@ class ObservationModel:
         return hypothesis
 
     def _columns(self, parts: Parts, errors: Errors) -> np.ndarray:
-        turning = TURN_SD * 1j * self.orders * parts.reading
+        sure = self._coherence(errors)
+        whole = self.expected_reading(parts, errors)
+        turning = TURN_SD * 1j * self.orders * whole
         source = SOURCE_DRIFT * parts.healthy * self._waves[:SOURCE_WAVES, None]
-        share = self._measured_share(parts)
-        leaks = share * parts.leaks
-        waves = SMOOTH_SHARE * errors.change * self._expected * self._waves[:, None]
-        smooth = map(complex_columns, (source, *(waves * leak for leak in leaks)))
-        known = turning[None], parts.slopes, AREA_SD * leaks, share * parts.pump
+        # The first wave is constant: it would be a leak of another size, which AREA_SD has.
+        size = SMOOTH_SHARE * np.sqrt(1.0 - sure) * self._measured_share(parts)
+        waves = size * self._waves[1:, None]
+        smooth = map(complex_columns, (source, *(waves * leak for leak in parts.leaks)))
+        known = turning[None], sure * parts.slopes, sure * AREA_SD * parts.leaks, sure * parts.pump
         return np.concatenate([*known, *smooth])
 
 

@@ -53,7 +53,7 @@ def judge_residual(model: ObservationModel, best: StateEvidence, prior: ErrorPri
             p += chances[i, k] * gammaincc(freedom, freedom * misfit / (count * ratio))
     if p >= UNLIKE:
         return Unlikeness(float(p))
-    residual = model.values - parts.reading
+    residual = model.values - model.expected_reading(parts, best.errors)
     return Unlikeness(float(p), *_where(model, residual, usual))
 
 

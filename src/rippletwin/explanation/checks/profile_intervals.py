@@ -75,7 +75,9 @@ def add_profile_intervals(
     is_better = lowest is not None and lowest.value < best.objective - BETTER_MODE_GAIN
     if is_better and max_mode_changes > 1:
         (better,) = workers.fit([FitJob(best.hypothesis, FromTheta(lowest.theta))])
-        return add_profile_intervals(workers, better, max_mode_changes - 1)
+        # A fit that fails from there, with an infinite objective, is none.
+        if better.objective < best.objective:
+            return add_profile_intervals(workers, better, max_mode_changes - 1)
     pairs = zip(traces[::2], traces[1::2])
     ends = {k: (low.end, high.end) for k, (low, high) in zip(indices, pairs)}
     return replace(best, interval_ends=ends)
