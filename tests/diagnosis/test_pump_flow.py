@@ -28,13 +28,14 @@ def simulated(pump, fault=None):
 
 @pytest.mark.parametrize(("name", "fault"), [("slipper", Slipper), ("cylinder", Cylinder)])
 def test_areas_between_the_simulated_ones_are_right(name, fault):
-    """Small, middling and large leaks that are no nodes: within 1 % of the change."""
+    """Small, middling and large leaks that are no nodes: within 2 % of the change, half of
+    what the best of twins errs by."""
     flow = leak_flow(PUMP, OIL, SPEED, PRESSURE, FAULTS[name])
     healthy = simulated(PUMP)
     for area in (3.1e-8, 4.4e-7, 3.3e-6):
         truth = simulated(PUMP, fault(area)) - healthy
         found = flow.harmonics(area)[ORDERS]
-        assert np.linalg.norm(found - truth) < 0.01 * np.linalg.norm(truth)
+        assert np.linalg.norm(found - truth) < 0.02 * np.linalg.norm(truth)
 
 
 def test_slopes_are_what_another_pump_makes():

@@ -96,7 +96,7 @@ def signal_errors(recording: Recording, rig: Rig) -> list[InputError]:
         lambda: [_gaps(path, name, row) for name, row in rows],
         lambda: [_length_error(recording, rig)],
         lambda: list(_shape_errors(recording, rig, rows)),
-        lambda: [_speed_error(recording, rig)] if recording.kind == "periodic" else [],
+        lambda: [_speed_error(recording, rig)] if _tells_speed(recording) else [],
     ):
         errors = [error for error in check() if error is not None]
         if errors:
@@ -196,6 +196,12 @@ def _clipped(path: Path, name: str, row: np.ndarray) -> InputError | None:
                 "Record again with a larger range",
             )
     return None
+
+
+def _tells_speed(recording: Recording) -> bool:
+    """Whether the ripple is that of equal pistons: a fault can make shaft orders that are stronger
+    than those of the pistons, which then look like another speed."""
+    return recording.kind == "periodic" and recording.state == "healthy"
 
 
 def _speed_error(recording: Recording, rig: Rig) -> InputError | None:

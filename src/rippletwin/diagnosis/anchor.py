@@ -125,8 +125,8 @@ def _even(flow: np.ndarray, orders: np.ndarray, pistons: int) -> np.ndarray:
 
 def relative_misfit(left, readings, orders: np.ndarray, pistons: int) -> np.ndarray:
     """What a twin leaves (S, F) of `readings`, relative (F,), about each order. The pistons' orders
-    tell. Below the first of them errors fall with the order: at rest a line has none. Orders of next
-    to no power count with their neighbours."""
+    tell. Below the first of them errors fall with the order: at rest a line has none. Orders of
+    next to no power count with their neighbours."""
     own = np.flatnonzero(orders % pistons == 0)
     powers = [np.mean(np.abs(x[:, own]) ** 2, axis=0) for x in (left, readings)]
     about = [uniform_filter1d(power, min(ABOUT, len(own)), mode="nearest") for power in powers]

@@ -21,7 +21,7 @@ from rippletwin.diagnosis.screening import Candidate, Screen
 
 LIMITS_HZ = (1000.0, 2000.0, np.inf)  # up to which angle and drift are followed, in turn
 ROUNDS = 2  # of following and searching the areas
-SCATTERS = np.geomspace(0.002, 0.02, 5)
+SCATTERS = np.geomspace(0.002, 0.05, 6)
 CHANGES = np.geomspace(0.25, 4.0, 5)
 
 

@@ -27,7 +27,7 @@ CHANGE_WAVES = 6  # cosines over the frequency in which the change's relative er
 SMOOTH_SHARE = 0.5  # of the change's relative error, in each of these
 AREA_SD = 0.1  # relative: discharge coefficients of leaks are between 0.6 and 0.8
 MIN_CHANGE_ERROR = 0.04  # relative, of the change by a leak behind the best of twins
-MAX_SHARE_BESIDE = 0.3  # of a leak, below which a second one can be part of the first one's error
+MAX_USUAL_ERROR = 0.3  # relative, of a leak's change behind the worst of twins
 ALIKE = 8.0  # readings whose errors go together: those of a line are as wide as its resonances
 NEIGHBOURS = 9  # shaft orders over which a power is averaged
 BETWEEN = 0.01  # share of a power whose errors show at orders that have none of it
@@ -110,6 +110,7 @@ class ObservationModel:
         self.noise = anchor.variance + np.einsum("fss->sf", self.observation.covariance).real
         self._waves = _cosines(self.observation.frequency_hz, CHANGE_WAVES)
         self._expected = np.hypot(MIN_CHANGE_ERROR, anchor.misfit)
+        self._usual_error = min(float(np.median(self._expected)), MAX_USUAL_ERROR)
         self._base = None
         self._undrifted = line.response()[:, : len(self.orders)]
 
@@ -148,9 +149,8 @@ class ObservationModel:
         `beside` it. A leak below what the twin errs by in the other's change is part of that error.
         """
         areas = self.flows[fault.name].areas
-        error = min(float(np.median(self._expected)), MAX_SHARE_BESIDE)
-        low = max([areas[0], *(error * other for other in beside)])
-        high = min([areas[-1], *(other / error for other in beside)])
+        low = max([areas[0], *(self._usual_error * other for other in beside)])
+        high = min([areas[-1], *(other / self._usual_error for other in beside)])
         return float(np.log(low)), float(np.log(high))
 
     def state_of_line(self, hypothesis: Hypothesis) -> np.ndarray:
@@ -277,7 +277,10 @@ class ObservationModel:
         size = SMOOTH_SHARE * np.sqrt(1.0 - sure) * self._measured_share(parts)
         waves = size * self._waves[1:, None]
         smooth = map(complex_columns, (source, *(waves * leak for leak in parts.leaks)))
-        known = turning[None], sure * parts.slopes, sure * AREA_SD * parts.leaks, sure * parts.pump
+        # Relative to the predicted change these would favour large leaks, relative to the measured
+        # one small ones: their geometric mean favours neither.
+        leak = sure * np.sqrt(self._measured_share(parts))
+        known = turning[None], sure * parts.slopes, leak * AREA_SD * parts.leaks, leak * parts.pump
         return np.concatenate([*known, *smooth])
 
 
