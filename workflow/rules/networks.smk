@@ -1,4 +1,4 @@
-# Networks of randomised datasets -> files that `rippletwin diagnose --networks` reads.
+# Networks of randomised datasets -> files that `rippletwin diagnose` reads.
 rule keep_networks:
     input:
         learnt=rules.randomised_signals.output.learnt,
