@@ -1,8 +1,9 @@
-"""The tool on one rig: `python -m diagnosis_trial.tool CASE OUT TWIN`.
+"""The tool on one rig: a twin of its healthy recordings, then the diagnosis of the others.
 
-TWIN is `explained` or `calibrated`: what is fitted to the healthy recordings before the others are
-diagnosed. Writes twin.json and diagnosis.json into OUT, and run.json with the seconds that either
-took and the twin's misfit. It runs in one process: its confinement has no shared memory.
+Its arguments are a case, an output folder and TWIN, `explained` or `calibrated`: what is fitted to
+the healthy recordings before the others are diagnosed. Writes twin.json and diagnosis.json, and
+run.json with the seconds that either took and the twin's misfit. It runs in one process: its
+confinement has no shared memory.
 """
 
 import json
