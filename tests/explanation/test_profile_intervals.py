@@ -102,3 +102,23 @@ def test_a_better_mode_on_a_profile_replaces_the_fit(hose):
     found = add_profile_intervals(StubWorkers(), fit)
     assert found.objective == better.objective
     assert set(found.interval_ends.values()) == {(-2.0, 2.0)}
+
+
+def test_a_better_mode_that_cannot_be_fitted_is_left(hose):
+    """A profile passes a better point, but the fit from there fails: the intervals are those of the
+    fit that is there."""
+    _, fit = hose
+    failed = replace(fit, objective=np.inf)
+
+    class StubWorkers:
+        def map(self, function, jobs):
+            assert all(job.fit is fit for job in jobs)
+            value = fit.objective - 10.0
+            return [ProfileTrace(job.side * 1.0, value, fit.twin.theta) for job in jobs]
+
+        def fit(self, jobs):
+            return [failed]
+
+    found = add_profile_intervals(StubWorkers(), fit)
+    assert found.objective == fit.objective
+    assert set(found.interval_ends.values()) == {(-1.0, 1.0)}
