@@ -2,11 +2,10 @@
 
 from collections.abc import Callable, Iterable
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
-from concealed.summary import Rate, rate_of
+from concealed.summary import Rate, Score, rate_of
 from diagnosis_trial.score import CHANGED_LINE, LEAK_STATES, OUTSIDE_STATES
 
 CHANGE_EDGES = (0.0, 0.02, 0.05, np.inf)
@@ -19,14 +18,6 @@ KNOWN = ("healthy", *LEAK_STATES)
 STATES = (*KNOWN, *OUTSIDE_STATES, CHANGED_LINE)
 ANSWERS = (*KNOWN, "unlike", "crashed")
 PLAIN = 0.05  # change of the ripple from which a state counts as plain
-
-
-class Score(NamedTuple):
-    """One line of the main table; `target` is text, empty where none was set."""
-
-    what: str
-    target: str
-    rate: Rate
 
 
 def score_table(rows: list[dict]) -> list[Score]:
