@@ -89,7 +89,9 @@ def _draw_sheet(rng: np.random.Generator) -> dict:
     sheet = draw_data_sheet(rng)
     pump = sheet["pump"]
     pump["piston_diameter"] = _digits(rng.uniform(0.012, 0.018))
-    pump["pitch_radius"] = _digits(rng.uniform(0.024, 0.036))
+    # room for all cylinders, with walls between them of 15 % of a bore
+    least = 1.15 * pump["piston_diameter"] / (2.0 * np.sin(np.pi / pump["pistons"]))
+    pump["pitch_radius"] = _digits(rng.uniform(max(0.024, least), 0.036))
     swept = Pump(**pump).displacement / pump["pistons"]
     pump["dead_volume"] = _digits(swept * rng.uniform(0.4, 0.9))
     pump["port_area"] = _digits(np.pi / 4 * pump["piston_diameter"] ** 2 * rng.uniform(0.4, 0.5))

@@ -49,6 +49,14 @@ def test_every_rig_has_all_nuisance_physics_in_its_range():
         assert all(len(rig.nuisance[name]) == len(rig.sheet["sensors"]) for name in EACH_SENSOR)
 
 
+def test_cylinders_have_room():
+    """Neighbours on the pitch circle, a chord apart, do not overlap in any of fifty pumps."""
+    for k in range(50):
+        pump = draw_rig("commit", 1000, k).sheet["pump"]
+        chord = 2.0 * pump["pitch_radius"] * np.sin(np.pi / pump["pistons"])
+        assert chord > 1.1 * pump["piston_diameter"]
+
+
 def test_the_true_pump_differs_in_more_than_four_numbers():
     """And shuts its chambers off over the angle of the data sheet, groove included."""
     for rig in RIGS:

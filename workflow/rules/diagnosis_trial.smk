@@ -49,12 +49,11 @@ rule diagnose_population:
     params:
         out=subpath(output.diagnosis, parent=True),
         cache=f"{TRIAL}/cache",
-        package=relative([DIAGNOSER.parent])[0],
         twin=config["diagnosis_trial"]["twin"],
     shell:
         "(mkdir -p {params.out} {params.cache};"
         " NUMBA_CACHE_DIR=$(realpath {params.cache}) TMPDIR={params.out}"
-        " python -m concealed.jail --read {input.case} --read {params.package}"
+        " python -m concealed.jail --read {input.case} --read $(dirname {input.tool[0]})"
         " --write {params.out} --write {params.cache}"
         " -- python -m diagnosis_trial.tool {input.case} {params.out} {params.twin}) > {log} 2>&1"
 
