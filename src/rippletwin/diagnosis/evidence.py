@@ -106,6 +106,8 @@ def _weigh(
         for k, fault in enumerate(best.state)
         if fault.one_piston
     }
+    # A twin that errs by so much about a change errs by as much about its size.
+    areas = {name: density.widened(model.usual_error) for name, density in areas.items()}
     return StateEvidence(best.state, float(log_evidence), mode, errors, areas, pistons)
 
 

@@ -9,9 +9,11 @@ from functools import cached_property
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import Akima1DInterpolator
+from scipy.ndimage import gaussian_filter1d
 
 COARSE, FINE = 15, 8  # nodes over the whole prior, and about the best one in each of the steps
 DENSE = 40  # points between two nodes at which the density is interpolated
+PER_SD = 12.0  # grid points in a standard deviation that a density is widened by
 STEPS = 3  # of refinement, each a quarter of the interval before
 
 
@@ -45,6 +47,17 @@ class Density:
         weight = np.exp(log_density - np.max(log_density))
         below = cumulative_trapezoid(weight, nodes, initial=0.0)
         return np.interp(shares, below / below[-1], nodes)
+
+    def widened(self, sd: float) -> Density:
+        """The density with an independent Gaussian error of the logarithm beside it."""
+        step = sd / PER_SD
+        grid = np.arange(self.nodes[0] - 4.0 * sd, self.nodes[-1] + 4.0 * sd, step)
+        nodes, log_density = self._dense
+        below = cumulative_trapezoid(np.exp(log_density - np.max(log_density)), nodes, initial=0.0)
+        # shares of cells, so that a density narrower than a step is not missed
+        share = np.diff(np.interp(grid, nodes, below / below[-1]))
+        smooth = gaussian_filter1d(share, PER_SD, mode="constant") / step
+        return Density(grid[:-1] + 0.5 * step, np.log(np.maximum(smooth, 1e-300)))
 
 
 def explore(log_density: Callable[[float], float], low: float, high: float) -> Density:

@@ -110,7 +110,7 @@ class ObservationModel:
         self.noise = anchor.variance + np.einsum("fss->sf", self.observation.covariance).real
         self._waves = _cosines(self.observation.frequency_hz, CHANGE_WAVES)
         self._expected = np.hypot(MIN_CHANGE_ERROR, anchor.misfit)
-        self._usual_error = min(float(np.median(self._expected)), MAX_USUAL_ERROR)
+        self.usual_error = min(float(np.median(self._expected)), MAX_USUAL_ERROR)
         self._base = None
         self._undrifted = line.response()[:, : len(self.orders)]
 
@@ -149,8 +149,8 @@ class ObservationModel:
         `beside` it. A leak below what the twin errs by in the other's change is part of that error.
         """
         areas = self.flows[fault.name].areas
-        low = max([areas[0], *(self._usual_error * other for other in beside)])
-        high = min([areas[-1], *(other / self._usual_error for other in beside)])
+        low = max([areas[0], *(self.usual_error * other for other in beside)])
+        high = min([areas[-1], *(other / self.usual_error for other in beside)])
         return float(np.log(low)), float(np.log(high))
 
     def state_of_line(self, hypothesis: Hypothesis) -> np.ndarray:
