@@ -27,6 +27,7 @@ CHANGE_WAVES = 6  # cosines over the frequency in which the change's relative er
 SMOOTH_SHARE = 0.5  # of the change's relative error, in each of these
 AREA_SD = 0.1  # relative: discharge coefficients of leaks are between 0.6 and 0.8
 MIN_CHANGE_ERROR = 0.04  # relative, of the change by a leak behind the best of twins
+MAX_SHARE = 2.0  # of a measured change over the predicted one, up to which errors grow with it
 MAX_USUAL_ERROR = 0.3  # relative, of a leak's change behind the worst of twins
 ALIKE = 8.0  # readings whose errors go together: those of a line are as wide as its resonances
 NEIGHBOURS = 9  # shaft orders over which a power is averaged
@@ -232,11 +233,12 @@ class ObservationModel:
 
     def _measured_share(self, parts: Parts) -> float:
         """The measured change over the predicted one. Errors of a leak's change are relative to
-        what was measured: a leak that is too large must not be forgiven more for its size."""
+        what was measured: a leak that is too large must not be forgiven more for its size. One that
+        predicts next to nothing must not be forgiven everything."""
         predicted = np.linalg.norm(parts.leaks.sum(axis=0))
         if predicted == 0.0:
             return 1.0
-        return float(np.linalg.norm(self.values - parts.healthy) / predicted)
+        return float(min(np.linalg.norm(self.values - parts.healthy) / predicted, MAX_SHARE))
 
     def scatter_power(self, healthy: np.ndarray) -> np.ndarray:
         """Power (F,) to which the scatter of repeated healthy recordings is in proportion."""
