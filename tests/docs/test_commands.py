@@ -124,7 +124,9 @@ def write_overlay(folder: Path, page: str) -> None:
     """my.yaml as the page's own yaml block has it, where the page speaks of it."""
     for block in blocks_of(ROOT / page):
         content = yaml.safe_load(block.text) if block.language == "yaml" else None
-        if isinstance(content, dict) and {"concealed", "architectures"} & set(content):
+        if isinstance(content, dict) and {"concealed", "diagnosis_trial", "architectures"} & set(
+            content
+        ):
             names = content.get("architectures")
             if names:  # the page's own network is not in the library
                 content["architectures"] = [n for n in names if n != "cnn1d_75_25"]
