@@ -7,14 +7,16 @@ explains, are taken from it and brought to the operating point of the unknown re
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from rippletwin.case.model import FlowRipple
 from rippletwin.diagnosis.drifting_line import DriftingLine
 from rippletwin.diagnosis.pump_flow import healthy_flow
 from rippletwin.harmonics import flow_harmonics
+from rippletwin.spectra.frequency_selection import select_frequencies
 from rippletwin.twin.twin import Twin
 
 SAME_SPEED, SAME_PRESSURE = 0.01, 0.03  # relative: the same operating point, set twice
@@ -62,7 +64,8 @@ def make_anchor(
     """The anchor that `healthy` is for `observation`, whose line is `line` and whose pump runs at
     `speed_rpm` into `pressure`, Pa. The twin's pump is as fitted (`with_fitted_pump`)."""
     count = min(len(healthy.orders), len(observation.orders))
-    healthy, orders = at_orders(healthy, count), np.asarray(healthy.orders[:count])
+    healthy = select_frequencies(healthy, slice(count))
+    orders = np.asarray(healthy.orders)
     apart = distance(
         healthy.speed_hz, observation.speed_hz, healthy.load_pressure, observation.load_pressure
     )
@@ -73,17 +76,16 @@ def make_anchor(
         pressure = healthy.load_pressure or pressure
         there = healthy_flow(pump, fluid, 60.0 * healthy.speed_hz, pressure)
     response = DriftingLine(twin, healthy, there).response()
-    simulated = _even(flow_harmonics(there, orders), orders, pump["pistons"])
-    flow = np.sum(np.conj(response) * healthy.values, 0) / np.sum(np.abs(response) ** 2, 0)
-    rest = healthy.values - response * flow
+    simulated = even_flow(there, orders, pump["pistons"])
+    flow, rest = flow_at_pump(response, healthy.values)
     pitch = 2 * np.pi / pump["pistons"]
     angle = alignment(response * simulated, healthy.values, orders, pitch)
     turned = simulated * np.exp(1j * orders * angle)
     left = healthy.values - response * turned
     misfit = relative_misfit(left, healthy.values, orders, pump["pistons"])
-    variance = _noise(healthy)
+    variance = healthy.variance
     if apart:
-        now = _even(flow_harmonics(here, orders), orders, pump["pistons"])
+        now = even_flow(here, orders, pump["pistons"])
         flow = flow + (now - simulated) * np.exp(1j * orders * angle)
         share = min(apart / FAR, 1.0)
         rest = (1.0 - share) * rest
@@ -107,20 +109,16 @@ def correlation(here, there, orders, weight=1.0, count: int = ANGLES) -> np.ndar
     return np.fft.fft(spectrum, axis=-1).real
 
 
-def at_orders(observation, count: int):
-    """The observation at its first `count` shaft orders."""
-    return replace(
-        observation,
-        frequency_hz=observation.frequency_hz[:count],
-        orders=observation.orders[:count],
-        values=observation.values[:, :count],
-        covariance=observation.covariance[:count],
-    )
+def flow_at_pump(response: np.ndarray, readings: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The flow (F,) at the pump, m3/s, that comes nearest to readings (S, F) through a response
+    (S, F), and what it leaves of them (S, F)."""
+    flow = np.sum(np.conj(response) * readings, 0) / np.sum(np.abs(response) ** 2, 0)
+    return flow, readings - response * flow
 
 
-def _even(flow: np.ndarray, orders: np.ndarray, pistons: int) -> np.ndarray:
-    """A simulated flow at the orders that equal pistons make: there is nothing at the others."""
-    return np.where(orders % pistons == 0, flow, 0.0)
+def even_flow(ripple: FlowRipple, orders: np.ndarray, pistons: int) -> np.ndarray:
+    """Harmonics (F,) of a simulated ripple, m3/s: equal pistons make nothing at other orders."""
+    return np.where(orders % pistons == 0, flow_harmonics(ripple, orders), 0.0)
 
 
 def relative_misfit(left, readings, orders: np.ndarray, pistons: int) -> np.ndarray:
@@ -132,8 +130,3 @@ def relative_misfit(left, readings, orders: np.ndarray, pistons: int) -> np.ndar
     about = [uniform_filter1d(power, min(ABOUT, len(own)), mode="nearest") for power in powers]
     relative = np.minimum(np.sqrt(about[0] / np.maximum(about[1], 1e-300)), 1.0)
     return np.interp(orders, [0, *orders[own]], [0.0, *relative])
-
-
-def _noise(observation) -> np.ndarray:
-    """Variance (S, F) of the readings, Pa2."""
-    return np.einsum("fss->sf", observation.covariance).real

@@ -41,6 +41,14 @@ class DriftingLine:
         """What can drift on this line; `response` takes them in this order."""
         return tuple(name for name, indices in self._moved.items() if indices)
 
+    def reset_orifice(self, drift: np.ndarray, lost: float) -> np.ndarray:
+        """`drift` (D,) with an orifice set anew, which holds the load pressure where the mean flow
+        changes by the share `lost`."""
+        if "load" not in self.drifts or not self.twin.rig.load.passes_flow:
+            return drift
+        share = np.log1p(max(lost, -0.9)) / DRIFTS["load"]
+        return drift + share * np.equal(self.drifts, "load")
+
     def response(
         self, drift: np.ndarray | None = None, theta: np.ndarray | None = None
     ) -> np.ndarray:

@@ -14,11 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from rippletwin.diagnosis.anchor import Anchor, at_orders
-from rippletwin.diagnosis.drifting_line import DRIFTS, DriftingLine
+from rippletwin.diagnosis.anchor import Anchor
+from rippletwin.diagnosis.drifting_line import DriftingLine
 from rippletwin.diagnosis.faults.base import Fault
 from rippletwin.diagnosis.likelihood import Marginal, complex_columns, marginal
 from rippletwin.diagnosis.pump_flow import LeakFlow
+from rippletwin.spectra.frequency_selection import select_frequencies
 
 TURN_SD = 0.02  # rad, of a shaft angle that has been found already
 SOURCE_DRIFT, SOURCE_WAVES = 0.01, 4
@@ -103,12 +104,12 @@ class ObservationModel:
         start: float = 0.0,
     ):
         self.start = start
-        self.observation = at_orders(observation, len(anchor.orders))
+        self.observation = select_frequencies(observation, slice(len(anchor.orders)))
         self.anchor, self.line, self.flows = anchor, line, flows
         self.orders = anchor.orders
         self.pistons = int(line.twin.rig.pump["pistons"])
         self.values = self.observation.values
-        self.noise = anchor.variance + np.einsum("fss->sf", self.observation.covariance).real
+        self.noise = anchor.variance + self.observation.variance
         self._waves = _cosines(self.observation.frequency_hz, CHANGE_WAVES)
         self._expected = np.hypot(MIN_CHANGE_ERROR, anchor.misfit)
         self.usual_error = min(float(np.median(self._expected)), MAX_USUAL_ERROR)
@@ -156,15 +157,11 @@ class ObservationModel:
 
     def state_of_line(self, hypothesis: Hypothesis) -> np.ndarray:
         """Drift (D,) with what the leaks' loss of mean flow makes of an orifice set anew."""
-        drift = np.array(hypothesis.drift, float)
-        rig = self.line.twin.rig
-        if hypothesis.state and rig.load.passes_flow and "load" in self.line.drifts:
-            lost = sum(
-                self.flows[fault.name].harmonics(area)[0].real / self.flows[fault.name].mean
-                for fault, area in zip(hypothesis.state, hypothesis.areas)
-            )
-            drift[self.line.drifts.index("load")] += np.log1p(max(lost, -0.9)) / DRIFTS["load"]
-        return drift
+        lost = sum(
+            self.flows[fault.name].harmonics(area)[0].real / self.flows[fault.name].mean
+            for fault, area in zip(hypothesis.state, hypothesis.areas)
+        )
+        return self.line.reset_orifice(np.array(hypothesis.drift, float), lost)
 
     def linearise_line(self, hypothesis: Hypothesis) -> None:
         """From here on the line is linear in the drift about that of the hypothesis."""

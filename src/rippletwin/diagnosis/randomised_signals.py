@@ -17,12 +17,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rippletwin.diagnosis.anchor import make_anchor
-from rippletwin.diagnosis.drifting_line import DRIFTS, DriftingLine
+from rippletwin.diagnosis.anchor import even_flow, flow_at_pump, make_anchor
+from rippletwin.diagnosis.drifting_line import DriftingLine
 from rippletwin.diagnosis.faults.library import FAULTS
 from rippletwin.diagnosis.observation_model import SOURCE_DRIFT, TURN_SD
 from rippletwin.diagnosis.pump_flow import ORDERS, healthy_flow, leak_flow, with_fitted_pump
-from rippletwin.harmonics import flow_harmonics, one_period, peak_amplitudes
+from rippletwin.harmonics import one_period, peak_amplitudes
 from rippletwin.spectra.observation import Observation
 from rippletwin.twin.twin import Twin
 
@@ -83,8 +83,7 @@ class SignalSource:
         self._healthy = observed.values
         anchor = make_anchor(fitted, observed, observed, self._line, *self._point)
         self._angle, self.misfit = anchor.angle, anchor.misfit
-        even = self.orders % self._pistons == 0
-        self._flow = np.where(even, flow_harmonics(ripple, self.orders), 0.0)
+        self._flow = even_flow(ripple, self.orders, self._pistons)
         self._waves = np.cos(
             np.pi * np.outer(np.arange(WAVES), observed.frequency_hz / WAVES_HZ)
         ) / np.sqrt(WAVES)
@@ -146,8 +145,7 @@ class SignalSource:
     def _anchored(self, fixed, moved, change, rng) -> np.ndarray:
         """Readings (S, F): the measured healthy ripple through the drifted line, as the shaft stood
         when it was recorded, and the twin's change."""
-        flow = np.sum(np.conj(fixed) * self._healthy, 0) / np.sum(np.abs(fixed) ** 2, 0)
-        rest = self._healthy - fixed * flow
+        flow, rest = flow_at_pump(fixed, self._healthy)
         angle = self._angle + TURN_SD * rng.standard_normal()
         changed = moved * change * np.exp(1j * self.orders * angle)
         own = self._smooth(SOURCE_DRIFT, 1, rng) * moved * flow + rest
@@ -170,10 +168,7 @@ class SignalSource:
 
     def _draw_drift(self, lost: float, rng) -> np.ndarray:
         """Drift (D,) of the line; an orifice is set anew, so that the load pressure is held."""
-        drift = rng.standard_normal(len(self._line.drifts))
-        if "load" in self._line.drifts and self._line.twin.rig.load.passes_flow:
-            drift[self._line.drifts.index("load")] += np.log1p(max(lost, -0.9)) / DRIFTS["load"]
-        return drift
+        return self._line.reset_orifice(rng.standard_normal(len(self._line.drifts)), lost)
 
     def _smooth(self, size: float | np.ndarray, rows: int, rng) -> np.ndarray:
         """Random factors (rows, F) about 1, smooth in frequency, of relative deviation `size`, a

@@ -47,7 +47,7 @@ def _periodic(
         f"{recording.speed_rpm:g}), wandering by {100 * np.std(speed) / np.mean(speed):.3f} % rms"
     )
     mad, scatter = noise_mad(recording.pressure), noise_cycle_scatter(revolutions.windows)
-    variance = np.einsum("fss->sf", observation.covariance).real
+    variance = observation.variance
     above = np.abs(observation.values) ** 2 > SIGNIFICANT_POWER * variance
     piston = observation.orders % rig.pump["pistons"] == 0
     for s, sensor in enumerate(rig.sensors):
@@ -66,7 +66,7 @@ def _spectral(recording: Recording, observation: Observation) -> Iterator[str]:
     else:
         yield f"  measured {len(recording.spectra)} time(s)"
     yield f"  {frequency.size} frequencies, {frequency[0]:g} to {frequency[-1]:g} Hz"
-    deviation = np.sqrt(np.einsum("fss->sf", observation.covariance).real)
+    deviation = np.sqrt(observation.variance)
     relative = np.linalg.norm(deviation, axis=1) / np.linalg.norm(observation.values, axis=1)
     names = [sensor.name for sensor in observation.sensors] or ["input impedance"]
     for name, value in zip(names, relative):

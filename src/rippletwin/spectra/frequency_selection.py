@@ -36,8 +36,8 @@ def select_fitted_frequencies(observations: Sequence, rig, highest_hz: float | N
     return prepared
 
 
-def select_frequencies(observation, keep: np.ndarray):
-    """The observation at the frequencies of a mask."""
+def select_frequencies(observation, keep: np.ndarray | slice):
+    """The observation at the frequencies of a mask or slice."""
     return replace(
         observation,
         frequency_hz=observation.frequency_hz[keep],

@@ -57,6 +57,11 @@ class Observation:
     sensors: tuple[Sensor, ...]
     normalised: bool = False
 
+    @property
+    def variance(self) -> np.ndarray:
+        """Variance (S, F) of the complex errors of values, each sensor and frequency alone."""
+        return np.einsum("fss->sf", self.covariance).real
+
 
 def observe(
     recording: Recording,

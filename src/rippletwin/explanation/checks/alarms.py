@@ -160,7 +160,7 @@ def aligned_difference(a, b, delay: float) -> tuple[np.ndarray, np.ndarray]:
     """
     orders = np.asarray(a.orders, float)
     power = np.mean(np.abs(a.values) ** 2, axis=0)
-    variance = np.einsum("fss->sf", a.covariance + b.covariance).real
+    variance = a.variance + b.variance
     speed_change = abs(a.speed_hz / b.speed_hz - 1.0)
     phase = 2 * np.pi * a.frequency_hz * RESONANCE_PASSAGES * delay * speed_change
     variance = variance + (HALVES_MODEL_ERROR**2 + phase**2) * power

@@ -82,7 +82,7 @@ def find_dead_sensor(o) -> str:
         return ""
     quiet = int(np.argmin(energy))
     others = float(np.median(np.delete(energy, quiet)))
-    noise = float(np.sum(np.einsum("fss->sf", o.covariance).real[quiet]))
+    noise = float(np.sum(o.variance[quiet]))
     if (
         energy[quiet] < DEAD_RIPPLE_SHARE**2 * others
         or energy[quiet] < 1.5 * noise < DEAD_RIPPLE_SHARE * others

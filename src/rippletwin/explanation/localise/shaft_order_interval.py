@@ -78,7 +78,7 @@ class _Recording:
         # Each harmonic of the ripple has an error of its own, as in `posterior_at_fit`.
         self.ripple_sd = float(np.hypot(fit.source_sd, fit.smooth_sd))
         self.variance = variance_about_twin(o)
-        extra = self.variance - np.einsum("fss->sf", o.covariance).real
+        extra = self.variance - o.variance
         covariance = o.covariance + np.einsum("sf,st->fst", extra, np.eye(len(extra)))
         self.root = np.linalg.cholesky(covariance)
 

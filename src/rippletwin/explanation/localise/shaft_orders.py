@@ -69,7 +69,7 @@ def shaft_order_level(
     degrees_of_freedom = 0
     for o, is_shaft_order in recordings:
         power = np.abs(o.values[:, is_shaft_order]) ** 2
-        variance = _noise_variance(o)[:, is_shaft_order]
+        variance = o.variance[:, is_shaft_order]
         energy += np.sum(np.abs(o.values) ** 2)
         signal += max(np.sum(power) - np.sum(variance), 0.0)
         chi_squared += 2 * np.sum(power / variance)
@@ -216,11 +216,6 @@ def with_shaft_orders(observations: Sequence, pistons: int, highest_hz: float) -
     return [(o, is_shaft_order) for o, is_shaft_order in pairs if np.any(is_shaft_order)]
 
 
-def _noise_variance(o) -> np.ndarray:
-    """Noise variance (S, F) of an observation."""
-    return np.einsum("fss->sf", o.covariance).real
-
-
 def variance_about_twin(o) -> np.ndarray:
     """Variance (S, F) of an observation about the twin: noise and LINE_MODEL_ERROR."""
-    return _noise_variance(o) + LINE_MODEL_ERROR**2 * np.mean(np.abs(o.values) ** 2, axis=0)
+    return o.variance + LINE_MODEL_ERROR**2 * np.mean(np.abs(o.values) ** 2, axis=0)
