@@ -30,13 +30,17 @@ class Diagnoser:
 
     def __init__(self, twin: Twin, faults: Sequence[Fault]):
         self.twin, self.faults = twin, tuple(faults)
+        self._priors: dict[tuple[str, ...], ErrorPrior] = {}
 
     def __call__(self, observation, healthy: Sequence, start: float = 0.0) -> Diagnosis:
         """The diagnosis of a periodic observation, anchored to the first of `healthy`; the others
         tell how far healthy recordings of one operating point scatter. `start` as in
         `ObservationModel`."""
         model = self.model(observation, healthy[0], start)
-        prior = self._error_prior(healthy)
+        labels = tuple(each.label for each in healthy)
+        if labels not in self._priors:  # recordings of one operating point share it
+            self._priors[labels] = self._error_prior(healthy)
+        prior = self._priors[labels]
         weighed = weigh_states(model, states_of(self.faults), prior)
         probabilities = _probabilities(weighed)
         best = max(weighed, key=lambda w: probabilities[state_name(w.state)])

@@ -129,9 +129,8 @@ def _at_best_areas(model: ObservationModel, mode: Hypothesis, errors: Errors) ->
 def _best_errors(model, mode: Hypothesis, prior: ErrorPrior) -> tuple[Errors, float]:
     """Most likely errors on the grid, and the log likelihood integrated over them."""
     weights = prior.log_weights()
-    values = weights + np.array(
-        [[model.evaluate(mode, Errors(s, c)).log_likelihood for c in CHANGES] for s in SCATTERS]
-    )
+    grid = [Errors(s, c) for s in SCATTERS for c in CHANGES]
+    values = weights + model.log_likelihoods(mode, grid).reshape(weights.shape)
     at = np.unravel_index(np.argmax(values), values.shape)
     return Errors(float(SCATTERS[at[0]]), float(CHANGES[at[1]])), float(logsumexp(values))
 
@@ -158,8 +157,8 @@ def _over_areas(
 
 def _over_changes(model, hypothesis: Hypothesis, errors: Errors, prior: ErrorPrior) -> float:
     """Log likelihood integrated over the errors of a change."""
-    each = [model.evaluate(hypothesis, replace(errors, change=c)).log_likelihood for c in CHANGES]
-    return float(logsumexp(prior.log_weights_of_change() + np.array(each)))
+    each = model.log_likelihoods(hypothesis, [replace(errors, change=c) for c in CHANGES])
+    return float(logsumexp(prior.log_weights_of_change() + each))
 
 
 def _along(mode: Hypothesis, k: int, likelihood: Callable[[Hypothesis], float]):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -64,6 +65,7 @@ class Parts:
     slopes    (D, S, F) derivatives of the reading by the drift
     pump      (P, S, F) what one standard deviation of each of the pump's numbers makes of them
     spread    (F,) power, Pa2, that the leaks would make if their flow were the same at all orders
+    measured  the measured change over that by leaks, at most `MAX_SHARE`
     """
 
     healthy: np.ndarray
@@ -72,11 +74,12 @@ class Parts:
     slopes: np.ndarray
     pump: np.ndarray
     spread: np.ndarray
+    measured: float
 
-    @property
-    def reading(self) -> np.ndarray:
-        """The whole prediction (S, F)."""
-        return self.healthy + self.leaks.sum(axis=0)
+    @cached_property
+    def change(self) -> np.ndarray:
+        """What all leaks add (S, F)."""
+        return self.leaks.sum(axis=0)
 
 
 @dataclass(frozen=True)
@@ -181,13 +184,16 @@ class ObservationModel:
         leaks = self.change(hypothesis)
         flow = self.anchor.flow + np.sum(leaks, axis=0)
         turn = np.exp(1j * self.orders * hypothesis.turn)
+        healthy = (moved * self.anchor.flow + self.anchor.rest) * turn
+        added = moved * leaks[:, None] * turn
         return Parts(
-            healthy=(moved * self.anchor.flow + self.anchor.rest) * turn,
+            healthy=healthy,
             drifted=(moved - self._undrifted) * self.anchor.flow * turn,
-            leaks=moved * leaks[:, None] * turn,
+            leaks=added,
             slopes=slopes * flow * turn,
             pump=moved * self._pump_slopes(hypothesis)[:, None] * turn,
             spread=local_power(moved) * np.mean(np.abs(leaks.sum(axis=0)) ** 2),
+            measured=self._measured_share(healthy, added.sum(axis=0)),
         )
 
     # likelihood
@@ -197,13 +203,22 @@ class ObservationModel:
     ) -> Marginal:
         """Marginal likelihood of the recording below a frequency. The first amplitudes are those of
         the shaft angle, in `TURN_SD`, and of the drift."""
+        return self._evaluate(self.parts(hypothesis), hypothesis.drift, errors, highest_hz)
+
+    def log_likelihoods(self, hypothesis: Hypothesis, errors: Sequence[Errors]) -> np.ndarray:
+        """Log likelihoods (len(errors),) under errors of different sizes."""
         parts = self.parts(hypothesis)
+        found = [self._evaluate(parts, hypothesis.drift, each) for each in errors]
+        return np.array([each.log_likelihood for each in found])
+
+    def _evaluate(
+        self, parts: Parts, drift: np.ndarray, errors: Errors, highest_hz: float = np.inf
+    ) -> Marginal:
         below = self.observation.frequency_hz <= highest_hz
-        columns = self._columns(parts, errors)
+        sure, expected = self._coherence(errors), self.expected_reading(parts, errors)
+        columns = self._columns(parts, expected, sure)
         # The drift is about zero: where it has been followed, back to there in a straight line.
-        sure = self._coherence(errors)
-        residual = self.values - self.expected_reading(parts, errors)
-        residual = residual + sure * np.tensordot(hypothesis.drift, parts.slopes, 1)
+        residual = self.values - expected + sure * np.tensordot(drift, parts.slopes, 1)
         variance = self.variance(parts, errors)
         return marginal(residual[:, below], variance[:, below], columns[..., below], ALIKE)
 
@@ -212,14 +227,14 @@ class ObservationModel:
         is relatively wrong, whether a leak makes it or a drift of the line. A pulse of wrong shape
         errs at all orders, also at those where the twin's own pulse has next to nothing."""
         scatter = errors.scatter**2 * self.scatter_power(parts.healthy)
-        leaks = local_power(parts.leaks.sum(axis=0)) + BETWEEN * parts.spread
-        changed = self._measured_share(parts) ** 2 * leaks + self.power_by_class(parts.drifted)
+        leaks = local_power(parts.change) + BETWEEN * parts.spread
+        changed = parts.measured**2 * leaks + self.power_by_class(parts.drifted)
         return self.noise + scatter + (1.0 - self._coherence(errors)) * changed
 
     def expected_reading(self, parts: Parts, errors: Errors) -> np.ndarray:
         """The reading (S, F) to expect: changes count by as much as they are sure."""
-        leaks = parts.leaks.sum(axis=0)
-        return parts.healthy - parts.drifted + self._coherence(errors) * (parts.drifted + leaks)
+        changed = parts.drifted + parts.change
+        return parts.healthy - parts.drifted + self._coherence(errors) * changed
 
     def _coherence(self, errors: Errors) -> np.ndarray:
         """Share (F,) of a predicted change that is to be expected, 1/(1 + e^2) for a relative error
@@ -228,14 +243,14 @@ class ObservationModel:
         nothing, a change says nothing of its size."""
         return 1.0 / (1.0 + (errors.change * self._expected) ** 2)
 
-    def _measured_share(self, parts: Parts) -> float:
+    def _measured_share(self, healthy: np.ndarray, change: np.ndarray) -> float:
         """The measured change over the predicted one. Errors of a leak's change are relative to
         what was measured: a leak that is too large must not be forgiven more for its size. One that
         predicts next to nothing must not be forgiven everything."""
-        predicted = np.linalg.norm(parts.leaks.sum(axis=0))
+        predicted = np.linalg.norm(change)
         if predicted == 0.0:
             return 1.0
-        return float(min(np.linalg.norm(self.values - parts.healthy) / predicted, MAX_SHARE))
+        return float(min(np.linalg.norm(self.values - healthy) / predicted, MAX_SHARE))
 
     def scatter_power(self, healthy: np.ndarray) -> np.ndarray:
         """Power (F,) to which the scatter of repeated healthy recordings is in proportion."""
@@ -267,18 +282,16 @@ class ObservationModel:
         self.linearise_line(hypothesis)
         return hypothesis
 
-    def _columns(self, parts: Parts, errors: Errors) -> np.ndarray:
-        sure = self._coherence(errors)
-        whole = self.expected_reading(parts, errors)
-        turning = TURN_SD * 1j * self.orders * whole
+    def _columns(self, parts: Parts, expected: np.ndarray, sure: np.ndarray) -> np.ndarray:
+        turning = TURN_SD * 1j * self.orders * expected
         source = SOURCE_DRIFT * parts.healthy * self._waves[:SOURCE_WAVES, None]
         # The first wave is constant: it would be a leak of another size, which AREA_SD has.
-        size = SMOOTH_SHARE * np.sqrt(1.0 - sure) * self._measured_share(parts)
+        size = SMOOTH_SHARE * np.sqrt(1.0 - sure) * parts.measured
         waves = size * self._waves[1:, None]
         smooth = map(complex_columns, (source, *(waves * leak for leak in parts.leaks)))
         # Relative to the predicted change these would favour large leaks, relative to the measured
         # one small ones: their geometric mean favours neither.
-        leak = sure * np.sqrt(self._measured_share(parts))
+        leak = sure * np.sqrt(parts.measured)
         known = turning[None], sure * parts.slopes, leak * AREA_SD * parts.leaks, leak * parts.pump
         return np.concatenate([*known, *smooth])
 

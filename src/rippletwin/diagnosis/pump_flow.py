@@ -121,7 +121,15 @@ def healthy_flow(pump: Mapping, fluid: Fluid, speed_rpm: float, pressure: float)
 def leak_flow(
     pump: Mapping, fluid: Fluid, speed_rpm: float, pressure: float, fault: Fault
 ) -> LeakFlow:
-    """`LeakFlow` of a fault at r/min into a pressure, Pa; simulations are kept."""
+    """`LeakFlow` of a fault at r/min into a pressure, Pa; it is kept."""
+    return _leak_flow(_key(pump), fluid, float(speed_rpm), float(pressure), fault)
+
+
+@cache
+def _leak_flow(
+    key: tuple, fluid: Fluid, speed_rpm: float, pressure: float, fault: Fault
+) -> LeakFlow:
+    pump = dict(key)
     mean = peak_amplitudes(healthy_flow(pump, fluid, speed_rpm, pressure).flow)[0].real
     given = pump.get("discharge_coefficient")
     coefficient = given or LEAK_DISCHARGE
@@ -130,7 +138,7 @@ def leak_flow(
     areas = mean / pump["pistons"] / velocity * np.geomspace(fault.smallest, fault.largest, NODES)
 
     def change(numbers: Mapping, at: np.ndarray) -> np.ndarray:
-        point = _key(numbers), fluid, float(speed_rpm), float(pressure)
+        point = _key(numbers), fluid, speed_rpm, pressure
         healthy = peak_amplitudes(_simulated(*point, None, 0.0).flow)
         leaking = [
             peak_amplitudes(_simulated(*point, fault, float(simulated * a)).flow) for a in at

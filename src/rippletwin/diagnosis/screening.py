@@ -106,7 +106,7 @@ class Screen:
         found = {}
         low, high = np.exp(self.model.area_ends(fault, areas))
         for area, term in self._leaks_of(fault):
-            if not low <= area * (1.0 + 1e-9) <= high * (1.0 + 2e-9):
+            if not low <= area * (1.0 + 1e-9) <= high * (1.0 + 2e-9):  # rounding of the ends
                 continue
             product = np.sum(self._weight * np.conj(base.reading) * term.reading, axis=0)
             cross = 2.0 * (self._turns @ product).real

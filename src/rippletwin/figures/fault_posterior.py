@@ -37,7 +37,7 @@ def change(d: Diagnosis) -> Figure:
     parts = model.parts(best.mode)
     error = np.sqrt(model.variance(parts, best.errors)) / 1e3
     measured = np.abs(model.values - parts.healthy) / 1e3
-    predicted = np.abs(parts.leaks.sum(axis=0)) / 1e3
+    predicted = np.abs(parts.change) / 1e3
     sensors = model.line.twin.rig.sensors
     fig, axes = style.figure(len(measured), 1, height=1.8, sharex=True)
     for ax, sensor, seen, told, allowed in zip(axes[:, 0], sensors, measured, predicted, error):
