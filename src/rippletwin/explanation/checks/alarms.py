@@ -1,7 +1,7 @@
 """Alarms: does the line without effects fail to explain the data?
 
-Refitting hides what is missing, so a good fit proves nothing. Four alarms look at the base fit: the
-misfit left after refitting, the pull of the parameters away from the data sheet (where an absorbed
+Refitting hides what is missing, so a good fit proves nothing. Four alarms look at the base fit: what
+a free correction of one element would add to it, the pull of the parameters away from the data sheet (where an absorbed
 effect shows), the disagreement between fits of single operating points, and drift within a
 recording. The verdict rests on the evidence of the best effect; the alarms decide where no effect
 is accepted.
@@ -17,11 +17,12 @@ from scipy.special import chdtrc
 
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.posterior import MIN_MODEL_ERROR
+from rippletwin.explanation.checks.discrepancy import NONE, Remainders, elements_of
 from rippletwin.explanation.fit_jobs import FitJob, FromTheta, Workers
 from rippletwin.explanation.thresholds import (
     DISAGREEMENT_ALARM,
     DRIFT_SIGNIFICANCE,
-    MISFIT_ALARM,
+    MIN_LOG_BAYES_FACTOR,
     PULL_ALARM,
 )
 from rippletwin.spectra.frequency_selection import select_frequencies
@@ -35,7 +36,8 @@ HALVES_MODEL_ERROR = 0.5 * MIN_MODEL_ERROR  # relative, between the two halves o
 class Alarms:
     """What each alarm measures, and whether it is raised.
 
-    misfit         relative model error of the base fit
+    misfit         log Bayes factor of the best free correction of one element of the line
+                   (`checks.discrepancy`)
     pull           largest |coordinate| of a parameter with a prior, and the parameter's name
     disagreement   largest difference between operating points in standard deviations, and the
                    parameter's name
@@ -51,7 +53,7 @@ class Alarms:
     def raised(self) -> tuple[str, ...]:
         """Names of the alarms that are raised."""
         states = {
-            "misfit": self.misfit > MISFIT_ALARM,
+            "misfit": self.misfit >= MIN_LOG_BAYES_FACTOR,
             "pull": self.pull[0] > PULL_ALARM,
             "disagreement": self.disagreement[0] > DISAGREEMENT_ALARM,
             "drift": self.drift[0] < DRIFT_SIGNIFICANCE,
@@ -60,14 +62,21 @@ class Alarms:
 
 
 def read_alarms(
-    base: Fit, point_fits: Sequence[Fit], early: Sequence, late: Sequence, delay: float
+    base: Fit,
+    observations: Sequence,
+    point_fits: Sequence[Fit],
+    early: Sequence,
+    late: Sequence,
+    delay: float,
 ) -> Alarms:
-    """The alarms of the base fit, its fits to single observations, and the halves of recordings.
+    """The alarms of the base fit to `observations`, its fits to single ones, and the halves of
+    recordings.
 
     `delay` (s) is that of the line.
     """
+    table = Remainders(base, observations).by_element(elements_of(base.twin.rig, observations))
     return Alarms(
-        base.model_error,
+        max(table.values()) - table[NONE, None],
         largest_pull(base),
         largest_disagreement(point_fits),
         drift_p_value(early, late, delay),

@@ -31,6 +31,9 @@ EXCHANGE_ROUNDS = 2
 SUBSTITUTES_TRIED = 10  # best single effects tried in the place of another
 MAX_MODEL_ERROR_FOR_EXACT_MODE = 10.0 * MIN_MODEL_ERROR
 """Relative model error below which derivatives of the nonlinear compliance lead to the mode."""
+LOST_MODEL_ERROR = 0.1
+"""Relative model error above which a line is probably in a wrong local mode."""
+RESTARTED = 3  # extensions of a fit that are also fitted from the data sheet
 MIN_IMPROVEMENT = 1.0  # log evidence by which an exchange or another position must be better
 SPECIAL_CASES = {"line_volume": (("load_volume", None), ("source_impedance", "volume"))}
 """Effects at any position, and what they are at the ends of the line: name and form."""
@@ -41,26 +44,23 @@ def fit_extensions(workers: Workers, best: Fit, candidates: Sequence, progress) 
     if len(best.hypothesis) >= MAX_EFFECTS:
         return []
     rig = workers.base.rig
-    jobs = [extension_job(best, c, rig) for c in candidates if c not in best.hypothesis]
+    jobs = [extension_job(best, c) for c in candidates if c not in best.hypothesis]
     report = progress_callback(progress, f"{len(best.hypothesis) + 1} effects", len(jobs))
     fits = rank_by_evidence(workers.fit(jobs, report))
-    if fits and best.model_error > GOOD_MODEL_ERROR and fits[0].model_error > GOOD_MODEL_ERROR:
-        # The present effects may be correct but incomplete: start near their fit too.
-        near = workers.fit([FitJob(f.hypothesis, NearFit(best)) for f in fits])
-        fits = rank_by_evidence([max(pair, key=lambda f: f.evidence) for pair in zip(fits, near)])
+    if fits and fits[0].model_error > GOOD_MODEL_ERROR:
+        # What is missing may have led the line into a wrong local mode: start again from the data
+        # sheet with the effect in the model. A line that is lost says nothing of which effect.
+        lost = fits[0].model_error > LOST_MODEL_ERROR
+        again = fits if lost else fits[:RESTARTED]
+        restarted = workers.fit([restart_job(best, f.hypothesis, rig) for f in again])
+        better = [max(pair, key=lambda f: f.evidence) for pair in zip(again, restarted)]
+        fits = rank_by_evidence([*better, *fits[len(again) :]])
     return rank_at_exact_modes(workers, best, fits)
 
 
-def extension_job(best: Fit, candidate, rig) -> FitJob:
-    """The job that adds a candidate to a fit.
-
-    A good fit is extended from its mode. The parameters of a poor fit are biased by what is
-    missing, so the extension starts from nominal values again.
-    """
-    hypothesis = (*best.hypothesis, candidate)
-    if best.model_error > GOOD_MODEL_ERROR:
-        return restart_job(best, hypothesis, rig)
-    return FitJob(hypothesis, NearFit(best))
+def extension_job(best: Fit, candidate) -> FitJob:
+    """The job that adds a candidate to a fit, from its mode."""
+    return FitJob((*best.hypothesis, candidate), NearFit(best))
 
 
 def restart_job(best: Fit, hypothesis: Hypothesis, rig) -> FitJob:
@@ -79,11 +79,11 @@ def exchange_effects(workers: Workers, best: Fit, single_effect_fits: Sequence[F
     for _ in range(EXCHANGE_ROUNDS):
         if len(best.hypothesis) < 2 or best.model_error <= GOOD_MODEL_ERROR:
             break
-        substitutes = [f.hypothesis[0] for f in single_effect_fits[:SUBSTITUTES_TRIED]]
+        substitutes = [f.hypothesis[-1] for f in single_effect_fits[:SUBSTITUTES_TRIED]]
         jobs = []
         for k in range(len(best.hypothesis)):
             jobs += [
-                restart_job(best, (*best.without(k), substitute), workers.base.rig)
+                FitJob((*best.without(k), substitute), NearFit(best))
                 for substitute in substitutes
                 if substitute not in best.hypothesis
             ]

@@ -69,7 +69,8 @@ class Search:
     """Result of the search.
 
     base                the line without effects, fitted
-    single_effect_fits  every effect at every place alone, best first
+    single_effect_fits  every effect at every place alone, or beside the usual effects that the data
+                        show; best first
     best                the accepted hypothesis, which may be the base
     rivals              fits of every round in which an effect was or could have been accepted
     passive_networks    passive networks without a name that compete with `best`, best first
@@ -100,8 +101,8 @@ def search_effects(
 ) -> Search:
     """Search the effect library stepwise, from the line without effects."""
     candidates = applicable_candidates(workers.base.rig, workers.observations)
-    base, fits = fit_single_effects(workers, candidates, progress)
-    return _search_stepwise(workers, Search(base, fits, base, fits), candidates, progress)
+    base, start, fits = fit_single_effects(workers, candidates, progress)
+    return _search_stepwise(workers, Search(base, fits, start, fits), candidates, progress)
 
 
 def resume_search(workers: Workers, past: Search, progress=None) -> Search:
@@ -128,7 +129,7 @@ def _search_stepwise(workers: Workers, start: Search, candidates: Sequence, prog
     """Go on from `start.best` until no candidate and no other position adds enough evidence."""
     single_effect_fits, best, rivals = start.single_effect_fits, start.best, start.rivals
     extensions = single_effect_fits
-    if best.hypothesis:
+    if not any(f.hypothesis[:-1] == best.hypothesis for f in extensions):
         extensions = fit_extensions(workers, best, candidates, progress)
     while True:
         extended = _accepted_extension(best, extensions)

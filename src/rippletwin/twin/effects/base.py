@@ -110,6 +110,7 @@ class Effect:
     named       False for a passive network that represents physics without a name
     certain     always present in real lines: accepted with any other effect unless the data
                 contradict it
+    usual       in nearly all real lines: the search tries it before all others
     friction    law by which it replaces the line's, as in `series_impedance`
     """
 
@@ -123,6 +124,7 @@ class Effect:
     apply: Callable[[object, LineState, Mapping[str, object], Place], None]
     apply_in_time: Callable[[object, LineState, Mapping[str, float], Place], None]
     certain: bool = False
+    usual: bool = False
     named: bool = True
     friction: str | None = None
 
