@@ -121,6 +121,14 @@ def explain(commands) -> None:
         "library say what chance gives (at least 10; each takes a good part of the first search)",
     )
 
+    parser.add_argument(
+        "--effects",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="also try the effect that a Python file defines as EFFECT, again for more",
+    )
+
     def run(arguments) -> int:
         import json
 
@@ -132,6 +140,7 @@ def explain(commands) -> None:
         from rippletwin.explanation.checks.bootstrap import MIN_DRAWS
         from rippletwin.explanation.explain import explain as find
         from rippletwin.explanation.verdict.verdict_file import write_verdict
+        from rippletwin.twin.effects.library import add_effects
 
         if arguments.bootstrap and arguments.bootstrap < MIN_DRAWS:
             raise InputError(
@@ -141,6 +150,7 @@ def explain(commands) -> None:
                 f"give at least {MIN_DRAWS}, or leave it out",
             )
         case = load_case(arguments.case, states={"healthy"})
+        add_effects(arguments.effects, case.rig)
         _warn(case)
         with _progress_bars(arguments.json_only) as progress:
             explanation = find(case, arguments.processes, progress, arguments.bootstrap)
@@ -184,6 +194,14 @@ def diagnose(commands) -> None:
         "is not tried by default, by its name (valve_plate)",
     )
     parser.add_argument(
+        "--effects",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="an effect of the twin that a Python file defines as EFFECT, again for more; explain "
+        "tries it too",
+    )
+    parser.add_argument(
         "--networks",
         metavar="RESULTS",
         help="also ask the networks that a workflow has trained on randomised datasets",
@@ -203,12 +221,14 @@ def diagnose(commands) -> None:
         from rippletwin.diagnosis.diagnose import select_recordings
         from rippletwin.diagnosis.diagnosis_file import write_diagnosis
         from rippletwin.diagnosis.faults.library import select_faults
+        from rippletwin.twin.effects.library import add_effects
 
         _check_out(arguments.out)
         _check_processes(arguments.processes)
         faults = select_faults(arguments.faults)
         states = None if arguments.recording else {"healthy", "unknown"}
         case = load_case(arguments.case, states=states)
+        add_effects(arguments.effects, case.rig)
         _warn(case)
         recordings = select_recordings(case, arguments.recording)
         networks = _networks_of(arguments, case)
