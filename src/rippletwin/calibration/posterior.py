@@ -62,8 +62,8 @@ wanders while harmonics are averaged, the orifice's exponent is not exactly 1/2,
 
 MODEL_ERRORS = np.geomspace(MIN_MODEL_ERROR, 1.5, 9)
 SOURCE_SDS = np.array([0.01, 0.03, 0.1, 0.3, 1.0])
-"""Values of sigma. No pump model has a harmonic to better than 1 %. Relief grooves and free air that
-a data sheet does not state change a ripple by 20 to 80 % (docs/explanation/pump.md)."""
+"""Values of sigma. No pump model has a harmonic to better than 1 %. Relief grooves and free air
+that a data sheet does not state change a ripple by 20 to 80 % (docs/explanation/pump.md)."""
 SMOOTH_SDS = np.array([0.01, 0.03, 0.1, 0.3])  # values of tau
 SIZE_SD, SIZE_SD_OF_PUMP = 0.03, 0.01  # s, and s where the pump's numbers are parameters
 PRODUCT_ERROR = 0.2  # lambda

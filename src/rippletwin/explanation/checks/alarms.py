@@ -1,10 +1,10 @@
 """Alarms: does the line without effects fail to explain the data?
 
-Refitting hides what is missing, so a good fit proves nothing. Four alarms look at the base fit: what
-a free correction of one element would add to it, the pull of the parameters away from the data sheet (where an absorbed
-effect shows), the disagreement between fits of single operating points, and drift within a
-recording. The verdict rests on the evidence of the best effect; the alarms decide where no effect
-is accepted.
+Refitting hides what is missing, so a good fit proves nothing. Four alarms look at the base fit:
+what a free correction of one element would add to it, the pull of the parameters away from the data
+sheet (where an absorbed effect shows), the disagreement between fits of single operating points,
+and drift within a recording. The verdict rests on the support of the effects; the alarms decide
+where no effect is accepted.
 """
 
 from __future__ import annotations
@@ -17,8 +17,12 @@ from scipy.special import chdtrc
 
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.posterior import MIN_MODEL_ERROR
-from rippletwin.explanation.checks.discrepancy import NONE, Remainders, elements_of
 from rippletwin.explanation.fit_jobs import FitJob, FromTheta, Workers
+from rippletwin.explanation.localise.smooth_corrections import (
+    NONE,
+    SmoothCorrections,
+    elements_of,
+)
 from rippletwin.explanation.thresholds import (
     DISAGREEMENT_ALARM,
     DRIFT_SIGNIFICANCE,
@@ -37,7 +41,7 @@ class Alarms:
     """What each alarm measures, and whether it is raised.
 
     misfit         log Bayes factor of the best free correction of one element of the line
-                   (`checks.discrepancy`)
+                   (`localise.smooth_corrections`)
     pull           largest |coordinate| of a parameter with a prior, and the parameter's name
     disagreement   largest difference between operating points in standard deviations, and the
                    parameter's name
@@ -74,7 +78,9 @@ def read_alarms(
 
     `delay` (s) is that of the line.
     """
-    table = Remainders(base, observations).by_element(elements_of(base.twin.rig, observations))
+    table = SmoothCorrections(base, observations).by_element(
+        elements_of(base.twin.rig, observations)
+    )
     return Alarms(
         max(table.values()) - table[NONE, None],
         largest_pull(base),

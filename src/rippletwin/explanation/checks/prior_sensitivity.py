@@ -74,7 +74,9 @@ class WithoutEffect:
     wide_misfit: float
 
 
-def fit_without_each_effect(workers: Workers, base: Fit, accepted: Fit) -> tuple[WithoutEffect, ...]:
+def fit_without_each_effect(
+    workers: Workers, base: Fit, accepted: Fit
+) -> tuple[WithoutEffect, ...]:
     """The fits without each accepted effect; `base` is the fit without any.
 
     With priors as stated the hypothesis is fitted from the accepted fit and by continuation, which
@@ -88,7 +90,9 @@ def fit_without_each_effect(workers: Workers, base: Fit, accepted: Fit) -> tuple
     if len(rests) == 1:
         stated_fits = [max(base, stated_fits[0], key=lambda f: f.evidence)]
     wide_fits = refit_with_wide_priors(workers, stated_fits, accepted)
-    return tuple(WithoutEffect(s, wide, misfit) for s, (misfit, wide) in zip(stated_fits, wide_fits))
+    return tuple(
+        WithoutEffect(s, wide, misfit) for s, (misfit, wide) in zip(stated_fits, wide_fits)
+    )
 
 
 def compare_without_each_effect(
@@ -141,6 +145,7 @@ def refit_with_wide_priors(
             source_sd=twin.source_sd,
             guessed_load=twin.guessed_load,
             uncertain_pump=twin.uncertain_pump,
+            changing_state=twin.changing_state,
         )
         parameters = base.with_(effects=fit.hypothesis).parameters
         for start in (twin, accepted.twin):

@@ -1,10 +1,9 @@
 """How well each accepted effect is supported: established, supported or suggested.
 
-| support | the effect keeps its evidence |
-| --- | --- |
-| `established` | with the data sheet as stated and free, on held-out data, beside a free correction of any other element; and at its own place its law does as well as a free correction |
-| `supported` | with the data sheet as stated and free, and on held-out data |
-| `suggested` | in the search alone |
+suggested     The search accepted it.
+supported     It also keeps its evidence with a free data sheet, and predicts held-out data better.
+established   It also keeps its evidence beside a free correction of any other element, and with a
+              free correction at its own place its law is not needless.
 
 Effects are judged one by one: the others stay in both models.
 """
@@ -20,15 +19,14 @@ from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.shaft_angles import fit_shaft_angles
 from rippletwin.explanation.checks.cross_validation import Fold, make_folds
-from rippletwin.explanation.checks.discrepancy import (
-    Remainders,
-    Robustness,
-    compare_beside_corrections,
+from rippletwin.explanation.checks.prior_sensitivity import WithoutEffect, fit_without_each_effect
+from rippletwin.explanation.checks.robustness import Robustness, compare_beside_corrections
+from rippletwin.explanation.fit_jobs import FitJob, FromTheta, Workers, transfer_theta
+from rippletwin.explanation.localise.smooth_corrections import (
+    SmoothCorrections,
     elements_of,
     own_element,
 )
-from rippletwin.explanation.checks.prior_sensitivity import WithoutEffect, fit_without_each_effect
-from rippletwin.explanation.fit_jobs import FitJob, FromTheta, Workers, transfer_theta
 from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
 
 LEVELS = ("suggested", "supported", "established")
@@ -109,7 +107,7 @@ def evaluate_corrections(base, observations: Sequence, job: tuple) -> dict[tuple
     """Log evidence of a model with a correction of each element; `job` is (fit, theta, elements),
     for `Workers.map`."""
     fit, theta, elements = job
-    return Remainders(fit, observations, theta).by_element(elements)
+    return SmoothCorrections(fit, observations, theta).by_element(elements)
 
 
 def _level(robustness: Robustness, held_out: float) -> str:
@@ -129,9 +127,7 @@ def _held_out_gains(
             FitJob(f.hypothesis, FromTheta(f.twin.theta, exact=False), observations=fold.indices)
             for f in (best, *(each.stated for each in without))
         ]
-        present, *absent = (
-            _log_predictive(fit, fold.held_out) for fit in fold.workers.fit(jobs)
-        )
+        present, *absent = (_log_predictive(fit, fold.held_out) for fit in fold.workers.fit(jobs))
         gains += present - np.array(absent)
     return [float(g) for g in gains]
 

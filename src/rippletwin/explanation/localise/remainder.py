@@ -1,7 +1,7 @@
 """What an explanation leaves: how much, at which element, and by which law.
 
 The element is the one whose free, smooth correction adds most log evidence to the explanation
-(`checks.discrepancy`). The law is that of the most likely correction, in words.
+(`smooth_corrections`). The law is that of the most likely correction, in words.
 """
 
 from __future__ import annotations
@@ -13,11 +13,15 @@ import numpy as np
 
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.misfit import score_fit
-from rippletwin.explanation.checks.discrepancy import NONE, Remainders, elements_of
 from rippletwin.explanation.localise.missing_immittance import describe_law
 from rippletwin.explanation.localise.residual_bands import (
     residual_conditions,
     residual_frequency_bands,
+)
+from rippletwin.explanation.localise.smooth_corrections import (
+    NONE,
+    SmoothCorrections,
+    elements_of,
 )
 from rippletwin.explanation.thresholds import (
     EQUIVALENT_LOG_BAYES_FACTOR,
@@ -58,8 +62,8 @@ class Remainder:
 
 def find_remainder(fit: Fit, observations: Sequence) -> Remainder | None:
     """The remainder of a fit; None where the fit is as good as the data allow."""
-    remainders = Remainders(fit, observations)
-    table = remainders.by_element(elements_of(fit.twin.rig, observations))
+    corrections = SmoothCorrections(fit, observations)
+    table = corrections.by_element(elements_of(fit.twin.rig, observations))
     plain = table.pop((NONE, None))
     best = max(table, key=table.get)
     gain = table[best] - plain
@@ -72,7 +76,7 @@ def find_remainder(fit: Fit, observations: Sequence) -> Remainder | None:
         element=best if found else None,
         interval=_interval(table, best, float(fit.twin.rig.length)) if found else None,
         log_bayes_factor=float(gain),
-        law=_law(remainders, best) if found else None,
+        law=_law(corrections, best) if found else None,
         bands_hz=residual_frequency_bands(fit, observations),
         conditions=residual_conditions(fit, observations),
     )
@@ -80,13 +84,11 @@ def find_remainder(fit: Fit, observations: Sequence) -> Remainder | None:
 
 def _interval(table: dict, best: tuple, length: float) -> tuple[float, float] | None:
     """Ends (m) of the positions whose correction of the same kind is nearly as good."""
-    kind, where = best
+    kind = best[0]
     if kind not in ("shunt", "series"):
         return None
     positions = sorted(x for k, x in table if k == kind)
-    inside = [
-        x for x in positions if table[kind, x] > table[best] - EQUIVALENT_LOG_BAYES_FACTOR
-    ]
+    inside = [x for x in positions if table[kind, x] > table[best] - EQUIVALENT_LOG_BAYES_FACTOR]
     at = {x: k for k, x in enumerate(positions)}
     low, high = at[min(inside)], at[max(inside)]
     ends = positions[max(low - 1, 0)], positions[min(high + 1, len(positions) - 1)]
@@ -96,11 +98,10 @@ def _interval(table: dict, best: tuple, length: float) -> tuple[float, float] | 
     )
 
 
-def _law(remainders: Remainders, element: tuple) -> str | None:
+def _law(corrections: SmoothCorrections, element: tuple) -> str | None:
     """The law of the most likely correction of an element of the line, in words."""
-    kind, where = element
-    if kind in ("source", "sensor"):
+    if element[0] in ("source", "sensor"):
         return None
-    frequency_hz, correction, weight = remainders.most_likely(element)
-    unit = remainders.unit(element)
+    frequency_hz, correction, weight = corrections.most_likely(element)
+    unit = corrections.unit(element)
     return describe_law(frequency_hz, correction * unit, weight / np.abs(unit) ** 2)

@@ -68,7 +68,7 @@ def _add_usual_effects(workers: Workers, base: Fit, fits: Sequence[Fit]) -> Fit:
 def _fit_each_alone(
     workers: Workers, base: Fit, known: Sequence[Fit], candidates: Sequence, progress
 ) -> tuple[Fit, list[Fit]]:
-    """The base, and the fits of each of `candidates` alone, best first; `known` are some of them."""
+    """The base, and the fits of each of `candidates` alone, best first; `known` are some."""
     fitted = {f.hypothesis[0] for f in known}
     rest = [c for c in candidates if c not in fitted]
     report = progress_callback(progress, "single effects", len(rest))

@@ -1,28 +1,25 @@
-"""Does an effect keep its evidence if any element of the line may err without a law?
+"""Free corrections that are smooth in frequency, of one element of the line at a time.
 
-A real line is never made of the library alone. What the library lacks leaves a remainder, and an
-effect that is not there may be accepted because it fits some of it. So each effect is judged beside
-a remainder without a law: a free correction, smooth in frequency, of one element in turn. It is a
-complex Gaussian process g with
+A correction is a complex Gaussian process g with
 
     <g(f) g(f')*> = a^2 exp(-(f - f')^2 / (2 l^2)).
 
-With the same correction in both models, the log evidence of the line with the effect is compared
-with that of the line without it. Fit, correction and residual enter to first order about a mode
-theta, so every amplitude is integrated out in closed form:
+It multiplies the reading of a sensor, the pump's flow, or the impedance or admittance per metre of
+a segment, or it is a shunt or series element at a position. Fit, correction and residual enter to
+first order about a mode theta, so every amplitude is integrated out in closed form:
 
     r - J theta ~ N(0, I + J J^T + a^2 G G^T),
 
-r whitened residual, J its Jacobian, G the changes that a unit of the correction makes. The amplitude
-a and the relative model error are unknown: the likelihood is averaged over grids of both.
-(Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63:425; Brynjarsdottir and O'Hagan 2014, Inverse
-Problems 30:114007, on why a discrepancy must have structure.)
+r whitened residual, J its Jacobian, G the changes that a unit of the correction makes. The
+amplitude a and the relative model error are unknown: the likelihood is averaged over grids of both.
+(Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63:425; Rasmussen and Williams 2006, Gaussian
+Processes for Machine Learning, eq. 2.30.)
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
@@ -46,7 +43,7 @@ FLAT_SD = 1e3  # of a coordinate without a prior
 NONE = "nothing"
 
 
-class Remainders:
+class SmoothCorrections:
     """Log evidence of a fit's model with each possible correction.
 
     `theta` (P,) is where the model is linearised: the fit's mode by default.
@@ -202,40 +199,13 @@ def smooth_basis(frequency_hz: np.ndarray) -> np.ndarray:
 
 
 def _log_likelihood(r: np.ndarray, gram: np.ndarray, along: np.ndarray, scale: np.ndarray) -> float:
-    """-1/2 r^T C^-1 r - 1/2 log det C with C = I + A^T diag(scale^2) A, gram = A A^T, along = A r."""
+    """-1/2 r^T C^-1 r - 1/2 log det C with C = I + A^T diag(scale^2) A.
+
+    gram = A A^T, along = A r.
+    """
     precision = scale[:, None] * gram * scale
     precision[np.diag_indices_from(precision)] += 1.0
     factor = cholesky(precision, lower=True, check_finite=False)
     shift = solve_triangular(factor, scale * along, lower=True, check_finite=False)
     square = float(r @ r - shift @ shift)
     return -0.5 * square - float(np.sum(np.log(np.diag(factor))))
-
-
-@dataclass(frozen=True)
-class Robustness:
-    """What remains of an effect's log evidence if an element may err without a law.
-
-    plain      log Bayes factor without any correction
-    least      the least over the corrections of all elements but its own
-    element    the element (kind, where) whose correction leaves the least
-    own        with a free correction at its own place: from 0 on its law suffices there
-    """
-
-    plain: float
-    least: float
-    element: tuple
-    own: float
-
-
-def compare_beside_corrections(
-    present: Mapping[tuple, float], absent: Sequence[Mapping[tuple, float]], own: tuple
-) -> Robustness:
-    """`Robustness` of an effect: its model against the best of several models without it.
-
-    present, absent   log evidence by element, of `Remainders.by_element`
-    own               the effect's own element
-    """
-    factors = {e: value - max(each[e] for each in absent) for e, value in present.items()}
-    others = {e: factor for e, factor in factors.items() if e != own}
-    element = min(others, key=others.get)
-    return Robustness(factors[(NONE, None)], others[element], element, factors[own])
