@@ -38,11 +38,6 @@ WIDE_PRIOR_MISFIT_RATIO = 2.0
 than this times the accepted misfit is a rival; one that misfits less by this factor refutes the
 effect."""
 
-# Cross-validation
-
-SMALL_HELD_OUT_SHARE = 1 / 3  # of the base's held-out misfit
-MAX_FOLD_DIFFERENCE = 3.5  # standard deviations between an effect's parameter in a fold and overall
-
 # Shaft orders that are no multiples of the number of pistons
 
 MIN_SHAFT_ORDER_LEVEL = 0.01  # relative to the ripple; below it the orders have no name

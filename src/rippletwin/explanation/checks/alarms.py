@@ -108,19 +108,6 @@ def largest_pull(fit: Fit) -> tuple[float, str]:
     return max(pulls, default=(0.0, ""))
 
 
-def largest_effect_pull(fit: Fit) -> float:
-    """Largest |coordinate| of a parameter of the effects.
-
-    A position has no pull: its prior is uniform.
-    """
-    pulls = [
-        abs(float(u))
-        for p, u in zip(fit.twin.parameters, fit.twin.theta)
-        if "@" in p.name and p.prior.kind != "uniform"
-    ]
-    return max(pulls, default=0.0)
-
-
 def largest_disagreement(fits: Sequence[Fit]) -> tuple[float, str]:
     """Largest difference of a line parameter between fits of single operating points.
 

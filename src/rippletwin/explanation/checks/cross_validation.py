@@ -13,7 +13,6 @@ import numpy as np
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.misfit import Score, score_fit
 from rippletwin.explanation.fit_jobs import Workers, job_from
-from rippletwin.explanation.thresholds import MAX_FOLD_DIFFERENCE, SMALL_HELD_OUT_SHARE
 from rippletwin.spectra.frequency_selection import select_frequencies
 
 UNDETERMINED_VARIANCE = 0.5  # of a coordinate in a fold; its prior has 1
@@ -45,32 +44,6 @@ class Validation:
         """
         candidates = [self.before] if self.calibrated is None else [self.before, self.calibrated]
         return min(candidates, key=lambda scores: scores["in_sample"].misfit)
-
-    @property
-    def passes(self) -> bool:
-        """Whether the explanation holds on held-out data.
-
-        Either most of the held-out misfit is gone, or it improves and the folds agree on the
-        parameters. A fold of one operating point may misplace a parameter, but nothing that only
-        absorbs error removes most of the held-out misfit.
-        """
-        before, after = (which["held_out"].misfit for which in (self.before, self.after))
-        return after < SMALL_HELD_OUT_SHARE * before or (
-            after < before and self.disagreement < MAX_FOLD_DIFFERENCE
-        )
-
-    @property
-    def transfers(self) -> bool:
-        """Whether the explanation fits held-out data better than the base."""
-        return self.after["held_out"].misfit < self.before["held_out"].misfit
-
-    @property
-    def fits_better(self) -> bool:
-        """Whether the explanation fits better than the base, in sample or held out.
-
-        Evidence without a better fit means only that line parameters stay closer to the data sheet.
-        """
-        return any(self.after[k].misfit < self.before[k].misfit for k in ("in_sample", "held_out"))
 
 
 def cross_validate(

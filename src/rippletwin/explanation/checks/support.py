@@ -2,8 +2,8 @@
 
 suggested     The search accepted it.
 supported     It also keeps its evidence with a free data sheet, and predicts held-out data better.
-established   It also keeps its evidence beside a free correction of any other element, and with a
-              free correction at its own place its law is not needless.
+established   It also keeps its evidence beside a free correction of any other element, with a free
+              correction at its own place its law is not needless, and its parameters are plausible.
 
 Effects are judged one by one: the others stay in both models.
 """
@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rippletwin.calibration.fit import Fit
+from rippletwin.calibration.levenberg_marquardt import descend
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.shaft_angles import fit_shaft_angles
 from rippletwin.explanation.checks.cross_validation import Fold, make_folds
@@ -27,9 +28,9 @@ from rippletwin.explanation.localise.smooth_corrections import (
     elements_of,
     own_element,
 )
-from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
+from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR, PULL_ALARM
 
-LEVELS = ("suggested", "supported", "established")
+HELD_OUT_STEPS = 8  # of the descent in shaft angle and state of a recording that was left out
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,7 @@ class Support:
     level         one of LEVELS
     robustness    its log Bayes factors beside free corrections
     held_out      log predictive probability of held-out data that it adds, over all folds
+    pull          prior standard deviations between its parameters and their medians, at most
     """
 
     name: str
@@ -47,6 +49,7 @@ class Support:
     level: str
     robustness: Robustness
     held_out: float
+    pull: float
 
 
 def judge_effects(
@@ -91,16 +94,20 @@ def _judge_each(
     supports = []
     for k, (effect, place) in enumerate(best.hypothesis):
         robustness = compare_beside_corrections(present, absent[3 * k : 3 * k + 3], owns[k])
-        supports.append(
-            Support(
-                effect.name,
-                str(place),
-                _level(robustness, held_out[k]),
-                robustness,
-                held_out[k],
-            )
-        )
+        pull = _largest_pull(best, f"{effect.name}@{place}.")
+        level = support_level(robustness, held_out[k], pull)
+        supports.append(Support(effect.name, str(place), level, robustness, held_out[k], pull))
     return tuple(supports)
+
+
+def _largest_pull(fit: Fit, label: str) -> float:
+    """Largest |coordinate| of the parameters of one effect; a position has no pull."""
+    pulls = [
+        abs(float(u))
+        for p, u in zip(fit.twin.parameters, fit.twin.theta)
+        if p.name.startswith(label) and p.prior.kind != "uniform"
+    ]
+    return max(pulls, default=0.0)
 
 
 def evaluate_corrections(base, observations: Sequence, job: tuple) -> dict[tuple, float]:
@@ -110,11 +117,12 @@ def evaluate_corrections(base, observations: Sequence, job: tuple) -> dict[tuple
     return SmoothCorrections(fit, observations, theta).by_element(elements)
 
 
-def _level(robustness: Robustness, held_out: float) -> str:
+def support_level(robustness: Robustness, held_out: float, pull: float) -> str:
+    """Level of an effect with these results of the checks."""
     if robustness.plain < MIN_LOG_BAYES_FACTOR or held_out <= 0.0:
-        return LEVELS[0]
+        return "suggested"
     survives = robustness.least >= MIN_LOG_BAYES_FACTOR and robustness.own >= 0.0
-    return LEVELS[2] if survives else LEVELS[1]
+    return "established" if survives and pull <= PULL_ALARM else "supported"
 
 
 def _held_out_gains(
@@ -133,10 +141,15 @@ def _held_out_gains(
 
 
 def _log_predictive(fit: Fit, observations: Sequence) -> float:
-    """Log probability of observations under a fit to others; the shaft angles are free."""
+    """Log probability of observations under a fit to others.
+
+    Shaft angles and the state of each recording are free, and the sizes of the errors are those
+    that suit the observations best: another operating point has other errors.
+    """
     posterior = Posterior(fit.twin, observations, None, fit.source_free)
-    posterior.model_error = fit.model_error
-    posterior.source_sd, posterior.smooth_sd = fit.source_sd, fit.smooth_sd
+    labels = {f"{kind}[{o.label}]" for o in observations for kind in ("angle", "state")}
     theta = fit_shaft_angles(posterior, fit.twin.theta)
+    fixed = [k for k, p in enumerate(fit.twin.parameters) if p.name not in labels]
+    theta, _ = descend(posterior, theta, HELD_OUT_STEPS, fixed)
     r, log_determinant = posterior.whitened(posterior.predict(theta))
     return -float(np.sum(np.abs(r) ** 2)) - log_determinant

@@ -27,7 +27,6 @@ from rippletwin.explanation.thresholds import (
 )
 
 MAX_EFFECTS = 4  # in one hypothesis
-EXCHANGE_ROUNDS = 2
 SUBSTITUTES_TRIED = 10  # best single effects tried in the place of another
 MAX_MODEL_ERROR_FOR_EXACT_MODE = 10.0 * MIN_MODEL_ERROR
 """Relative model error below which derivatives of the nonlinear compliance lead to the mode."""
@@ -71,27 +70,24 @@ def restart_job(best: Fit, hypothesis: Hypothesis, rig) -> FitJob:
 
 
 def exchange_effects(workers: Workers, best: Fit, single_effect_fits: Sequence[Fit]) -> Fit:
-    """Exchange one effect for another as long as that is better and the fit is poor.
+    """Exchange one effect for another if that is better and the fit is poor.
 
     The first effect of a search stands in for everything that is missing. Once others are present
     it may be the wrong one. The substitutes are the best single effects.
     """
-    for _ in range(EXCHANGE_ROUNDS):
-        if len(best.hypothesis) < 2 or best.model_error <= GOOD_MODEL_ERROR:
-            break
-        substitutes = [f.hypothesis[-1] for f in single_effect_fits[:SUBSTITUTES_TRIED]]
-        jobs = []
-        for k in range(len(best.hypothesis)):
-            jobs += [
-                FitJob((*best.without(k), substitute), NearFit(best))
-                for substitute in substitutes
-                if substitute not in best.hypothesis
-            ]
-        fits = rank_by_evidence(workers.fit(jobs))
-        if not fits or fits[0].evidence < best.evidence + MIN_IMPROVEMENT:
-            break
-        best = fits[0]
-    return best
+    if len(best.hypothesis) < 2 or best.model_error <= GOOD_MODEL_ERROR:
+        return best
+    substitutes = [f.hypothesis[-1] for f in single_effect_fits[:SUBSTITUTES_TRIED]]
+    jobs = [
+        FitJob((*best.without(k), substitute), NearFit(best))
+        for k in range(len(best.hypothesis))
+        for substitute in substitutes
+        if substitute not in best.hypothesis
+    ]
+    fits = rank_by_evidence(workers.fit(jobs))
+    if not fits or fits[0].evidence < best.evidence + MIN_IMPROVEMENT:
+        return best
+    return fits[0]
 
 
 def fit_substitutes(workers: Workers, best: Fit, candidates: Sequence) -> list[Fit]:

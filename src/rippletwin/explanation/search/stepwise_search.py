@@ -1,7 +1,8 @@
 """Stepwise search over hypotheses: single effects, then up to four together, by evidence.
 
-Each round adds the best candidate, drops, exchanges and simplifies what it made needless, and moves
-effects along the line. The search ends when no extension adds enough evidence.
+Each round adds the best candidate, and drops and simplifies what it made needless. Where no
+extension adds enough evidence, effects are exchanged and moved along the line; the search ends when
+that is no better either.
 """
 
 from __future__ import annotations
@@ -120,7 +121,7 @@ def resume_search(workers: Workers, past: Search, progress=None) -> Search:
     single_effect_fits = rank_by_evidence(refits[:count])
     best, rivals = refits[count], rank_by_evidence(refits[count + 1 :])
     candidates = applicable_candidates(workers.base.rig, workers.observations)
-    best = _revise(workers, best, single_effect_fits, candidates)
+    best = _revise(workers, best, candidates)
     search = Search(base, single_effect_fits, best, rivals)
     return _search_stepwise(workers, search, candidates, progress)
 
@@ -134,14 +135,15 @@ def _search_stepwise(workers: Workers, start: Search, candidates: Sequence, prog
     while True:
         extended = _accepted_extension(best, extensions)
         if extended is None:
-            moved, other_positions = move_to_best_position(workers, best)
+            exchanged = exchange_effects(workers, best, single_effect_fits)
+            moved, other_positions = move_to_best_position(workers, exchanged)
             if moved is best:
                 break
-            best = moved
+            best = moved if exchanged is best else _revise(workers, moved, candidates)
         else:
             if extensions is not single_effect_fits:
                 rivals = [*rivals, *extensions]
-            best = _revise(workers, extended, single_effect_fits, candidates)
+            best = _revise(workers, extended, candidates)
         extensions = fit_extensions(workers, best, candidates, progress)
     substitutes = fit_substitutes(workers, best, candidates)
     if substitutes and substitutes[0].evidence > best.evidence + MIN_IMPROVEMENT:
@@ -155,10 +157,9 @@ def _search_stepwise(workers: Workers, start: Search, candidates: Sequence, prog
     )
 
 
-def _revise(workers: Workers, best: Fit, single_effect_fits: list[Fit], candidates) -> Fit:
-    """Drop, exchange and simplify effects of a new hypothesis, and refit it at its exact mode."""
+def _revise(workers: Workers, best: Fit, candidates: Sequence) -> Fit:
+    """Drop and simplify effects of a new hypothesis, and refit it at its exact mode."""
     best = drop_needless_effects(workers, best)
-    best = exchange_effects(workers, best, single_effect_fits)
     best = simplify_effects(workers, best, candidates)
     return refit_at_exact_mode(workers, best)
 

@@ -142,7 +142,7 @@ def _where(e: Explanation, entries: list[dict]) -> dict:
         element, position = element_and_extent(
             e.rig, first["effect"], first["place"], first["parameters"]
         )
-    elif _shaft_effects(e):
+    elif any(effect["support"] == "established" for effect in _shaft_effects(e)):
         element, position = "source", [0.0, 0.0]
     elif location is not None:
         element, position = location.element, list(location.position)
