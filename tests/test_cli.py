@@ -1,5 +1,6 @@
 """The command line: options are checked before anything is fitted, and it ends quietly."""
 
+import json
 import os
 import signal
 import subprocess
@@ -13,6 +14,7 @@ import pytest
 from case_folders import sheet, spoilt, write_case
 from paths import ROOT
 from rippletwin.cli import main
+from rippletwin.cli.program import COMMANDS
 
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT / "src"), "OMP_NUM_THREADS": "1"}
 
@@ -24,6 +26,9 @@ OPTIONS = {
     "negative processes": ("explain", ["--processes", "-1"], "--processes", "-1 processes"),
     "too many processes": ("explain", ["--processes", "99999"], "--processes", "99999"),
     "too few draws": ("explain", ["--bootstrap", "3"], "--bootstrap", "3 draws"),
+    "a word for a number": ("explain", ["--processes", "two"], "--processes", "two processes"),
+    "no such option": ("explain", ["--procesess", "2"], "--procesess", "explain --help"),
+    "no such finding": ("explain", ["--fail-on", "anything"], "--fail-on", "anything"),
     "no folder": ("explain", ["--out", ""], "--out", "no folder is named"),
     "blanks": ("calibrate", ["--out", "  "], "--out", "no folder is named"),
     "a file": ("calibrate", ["--out", "{file}"], "--out", "is a file"),
@@ -172,3 +177,78 @@ def test_module_is_the_command(tmp_path):
     command = [sys.executable, "-m", "rippletwin", "check", str(tmp_path / "nowhere")]
     run = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT)
     assert run.returncode == 2 and "there is no such folder" in run.stderr
+
+
+def test_json_is_all_that_is_printed(tmp_path, capsys):
+    """check --json: one document with the numbers that the words state; the rig turns 16.67 times
+    a second, of which the recording's one second has 15 whole revolutions after the first mark."""
+    write_case(tmp_path, sheet())
+    assert main(["check", str(tmp_path), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [s["name"] for s in found["sensors"]] == ["p1", "p2"]
+    recording = found["recordings"][0]
+    assert recording["speed_rpm"] == pytest.approx(1000, abs=0.1)
+    assert recording["sensors"][0]["piston_harmonics"][0] == 5
+    assert recording["sensors"][0]["noise_pa"] == pytest.approx(1e3, rel=0.1)
+
+
+def test_fail_on_a_warning(tmp_path, capsys):
+    """Exit code 3 only where a warning is told and --fail-on names it."""
+    write_case(tmp_path, sheet())
+    assert main(["check", str(tmp_path), "--fail-on", "warning"]) == 0
+    spoilt(tmp_path, lambda c: c["line"]["segments"][0].update(wave_speed=150))
+    assert main(["check", str(tmp_path)]) == 0
+    assert main(["check", str(tmp_path), "--fail-on", "warning"]) == 3
+
+
+def test_json_of_a_calibration(tmp_path, capsys):
+    """calibrate --json prints one document: misfits, parameters and warnings."""
+    write_case(tmp_path, sheet())
+    assert main(["calibrate", str(tmp_path), "--out", str(tmp_path / "out"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["fit"]["after"]["relative"] < found["fit"]["before"]["relative"]
+    assert "length[1]" in {row["name"] for row in found["parameters"]}
+
+
+def test_every_command_prints_json_and_helps(capsys):
+    """No command is without --json, and the list of commands has a line for each."""
+    assert main(["--help"]) == 0
+    listed = capsys.readouterr().out
+    for name in COMMANDS:
+        assert f"\n  {name} " in listed
+        assert main([name, "--help"]) == 0
+        assert "--json" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [("rippletwin expl", "explain"), ("rippletwin explain --boot", "--bootstrap")],
+)
+def test_completion_in_a_shell(tmp_path, words, expected):
+    """bash, with the printed script sourced, completes a command and an option."""
+    program = tmp_path / "rippletwin"
+    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m rippletwin "$@"\n')
+    program.chmod(0o755)
+    script = f"""
+        source <(rippletwin completion bash)
+        COMP_WORDS=({words}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1))
+        _rippletwin_completion rippletwin; echo "${{COMPREPLY[@]}}"
+    """
+    run = subprocess.run(
+        ["bash", "-c", script],
+        capture_output=True,
+        text=True,
+        env=ENVIRONMENT | {"PATH": f"{tmp_path}:{os.environ['PATH']}"},
+    )
+    assert run.stdout.split() == [expected], run.stderr
+
+
+def test_help_imports_no_mathematics():
+    """--help answers at once: of what takes long to import it needs nothing."""
+    script = (
+        "import sys; from rippletwin.cli import main; main(['--help'])\n"
+        "print({'numpy', 'scipy', 'pandas', 'torch', 'numba'} & set(sys.modules))"
+    )
+    command = [sys.executable, "-c", script]
+    run = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT)
+    assert run.stdout.splitlines()[-1] == "set()", run.stderr

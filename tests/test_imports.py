@@ -42,7 +42,7 @@ EXPLANATION = (("thresholds", "fit_jobs"), ("search", "localise"), ("checks",), 
 """Parts of `explanation` from the bottom, `explain` above them all; those of one level are apart,
 but that `fit_jobs` may read `thresholds`."""
 
-MAX_PACKAGES, MAX_LOOSE_MODULES = 11, 5
+MAX_PACKAGES, MAX_LOOSE_MODULES = 12, 4
 
 
 @cache
@@ -154,7 +154,8 @@ def test_packages_hold_a_docstring_only():
         name
         for name, path in modules().items()
         if path.name == "__init__.py"
-        and name not in ("rippletwin",)
+        and name
+        not in ("rippletwin", "rippletwin.cli")  # nothing of the workflow imports the second
         and not (
             len(body := ast.parse(path.read_text()).body) == 1
             and ast.get_docstring(ast.Module(body, []))

@@ -2,7 +2,7 @@
 
 import sys
 
-from rippletwin.cli import main
+from rippletwin.cli.program import main
 
 if __name__ == "__main__":
     sys.exit(main())

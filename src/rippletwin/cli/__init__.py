@@ -1,0 +1,5 @@
+"""The command line: rippletwin COMMAND ..."""
+
+from rippletwin.cli.program import main
+
+__all__ = ["main"]

@@ -1,0 +1,84 @@
+"""rippletwin calibrate CASE: fit the twin to a case's healthy recordings."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from rippletwin.cli import options
+from rippletwin.cli.exit_codes import found_code
+from rippletwin.cli.progress import warn
+from rippletwin.errors import InputError
+
+
+@click.command("calibrate", short_help="fit the twin to a case's healthy recordings")
+@options.case
+@options.out("Folder for twin.json and report.md.")
+@click.option(
+    "--friction",
+    type=click.Choice(("none", "steady", "unsteady")),
+    default="steady",
+    show_default=True,
+    help="The line's friction law; steady is the paper's.",
+)
+@options.frequency("--max-frequency", "Use nothing above it.")
+@options.fail_on(("warning",), "A parameter is not determined, or another warning is told.")
+@options.json_output
+def command(
+    case: Path,
+    out: str,
+    friction: str,
+    max_frequency: float | None,
+    fail_on: tuple[str, ...],
+    as_json: bool,
+) -> int:
+    """Fit the twin to the healthy recordings of the folder CASE."""
+    from rippletwin.calibration import report
+    from rippletwin.calibration.calibrate import Settings, calibrate
+    from rippletwin.case.load import load_case
+    from rippletwin.spectra.observation import observe
+    from rippletwin.twin.twin import Twin
+
+    read = load_case(case, states={"healthy"})
+    if not read.recordings:
+        raise InputError(
+            f"{case}/rig.yaml",
+            "recordings",
+            "none has state: healthy",
+            "calibration needs at least one healthy recording",
+        )
+    warn(read.warnings)
+    observations = [observe(r, read.rig, piston_harmonics_only=True) for r in read.recordings]
+    _check_band(observations, max_frequency)
+    twin = Twin(read.rig, observations, friction=friction)
+    settings = Settings(max_frequency_hz=max_frequency)
+    progress = None if as_json else print
+    calibration = calibrate(twin, observations, settings, progress=progress)
+    report.save(calibration, out)
+    if as_json:
+        left_out = ("twin", "covariance")
+        result = {k: v for k, v in report.to_dict(calibration).items() if k not in left_out}
+        print(json.dumps(result))
+    else:
+        before, after = calibration.before, calibration.after
+        print(f"relative misfit {before.relative:.1%} -> {after.relative:.1%}")
+        print(f"Theil's coefficient {before.theil:.3f} -> {after.theil:.3f}")
+        for warning in calibration.warnings:
+            print(f"warning: {warning}")
+    warned = bool(calibration.warnings or read.warnings)
+    return found_code(["warning"] if warned else [], fail_on)
+
+
+def _check_band(observations, max_frequency: float | None) -> None:
+    """Raise InputError where nothing of a recording is below `max_frequency`."""
+    lowest = max(o.frequency_hz[0] for o in observations)
+    if max_frequency is not None and max_frequency < lowest:
+        raise InputError(
+            "command line",
+            "--max-frequency",
+            f"{max_frequency:g} Hz leaves nothing of a recording, whose lowest frequency is "
+            f"{lowest:.4g} Hz",
+            "give a multiple of the pump's piston frequency, or leave it out",
+        )
