@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter
 from rippletwin.diagnosis.diagnosis import Diagnosis
 from rippletwin.figures import diagnosed_numbers, style
 from rippletwin.figures.diagnosed_numbers import DiagnosedNumbers
-from rippletwin.figures.quantities import unit_of, write_number, write_quantity
+from rippletwin.figures.quantities import unit_of, write_certainty, write_quantity
 from rippletwin.figures.words import name_state
 
 AREA = unit_of("m2")
@@ -52,10 +52,10 @@ def plot_change(d: DiagnosedNumbers) -> Figure:
         ax.plot(d.orders, allowed[k], ":", color=style.CALIBRATED, label="error allowed for")
         ax.set_yscale("log")
         ax.set_ylim(0.2 * max(float(np.min(allowed)), 1e-8), 2.0 * float(np.max(measured[k])))
-        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: write_number(value, value)))
+        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         ax.set_ylabel(f"{sensor}: change / bar,\nlogarithmic", fontsize=8)
     axes[-1, 0].set_xlabel("shaft order (multiples of the speed)")
-    fig.suptitle(f"{d.label}: does {name_state(d.probable)} explain the change?")
+    fig.suptitle(f"How does {d.label} differ from the healthy pump?")
     style.legend_below(fig, axes[0, 0])
     return fig
 
@@ -70,7 +70,7 @@ def plot_severity(d: DiagnosedNumbers) -> Figure:
     names = [name_state(name).replace(" and ", "\nand ") for name in states]
     ax.barh(names, shares, color=colours, height=0.6)
     for row, share in enumerate(shares):
-        ax.text(share + 2, row, _percent(share), va="center", fontsize=8)
+        ax.text(share + 2, row, write_certainty(share / 100), va="center", fontsize=8)
     ax.set_xlim(0.0, 130.0)
     ax.set_xticks([0, 50, 100])
     ax.set_xlabel("probability / %")
@@ -109,10 +109,3 @@ def _tick(value: float, _=None) -> str:
     """A tick of a logarithmic axis at 1, 2 and 5 of each decade."""
     leading = value / 10 ** np.floor(np.log10(value) + 1e-9)
     return f"{value:.3g}" if round(leading, 6) in (1, 2, 5) else ""
-
-
-def _percent(share: float) -> str:
-    """A probability in per cent that never claims to be certain."""
-    if share > 99.9:
-        return "> 99.9"
-    return "< 0.1" if share < 0.1 else write_number(share, significant=2)

@@ -12,6 +12,7 @@ from rippletwin.figures.explained_numbers import ExplainedNumbers, LinePlace, Pl
 
 LABELLED_SHARE = 0.08  # of the line's length: a shorter segment has no room for its size
 ROW = 1.0  # height of an interval and its label, in pipe widths
+FREE = "best single place, whatever the effect"
 TELLING_SHARE = 0.5
 """Of the line's length: a longer interval of one free correction tells no place."""
 POINT_SHARE = 0.006  # of the line's length: what is shorter is drawn as a mark of this length
@@ -44,7 +45,7 @@ def shown_places(places: Places) -> list[LinePlace]:
     shown = list(places.found)
     if tells_place(places):
         low, high = places.free
-        shown.append(LinePlace("one free correction", max(low, 0.0), min(high, places.length)))
+        shown.append(LinePlace(FREE, max(low, 0.0), min(high, places.length)))
     return shown
 
 
@@ -112,7 +113,7 @@ def _draw_intervals(ax, places: Places, shown: Sequence[LinePlace]) -> None:
     for row, place in enumerate(shown):
         y, width = -2.0 - ROW * row, max(place.high - place.low, POINT_SHARE * places.length)
         start = 0.5 * (place.low + place.high - width)
-        free = place.words == "one free correction"
+        free = place.words == FREE
         colour = style.NOMINAL if free else style.ALARM
         ax.add_patch(Rectangle((start, y - 0.14), width, 0.28, fc=colour, ec="none"))
         centre, ends = 0.5 * (place.low + place.high), (0.25, 0.75)

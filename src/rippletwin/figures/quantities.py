@@ -116,6 +116,13 @@ def write_share(share: float) -> str:
     return f"{percent:.0f} %" if percent >= 9.95 else f"{write_number(percent, significant=2)} %"
 
 
+def write_certainty(p: float) -> str:
+    """A probability in per cent that never claims to be certain."""
+    if p > 0.999:
+        return "> 99.9 %"
+    return "< 0.1 %" if p < 0.001 else write_share(p)
+
+
 def write_probability(p: float) -> str:
     """A probability in words where its digits say nothing any more."""
     if p < 1e-6:
