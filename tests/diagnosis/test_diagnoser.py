@@ -10,6 +10,7 @@ import leaking_pump
 from rippletwin.diagnosis.diagnoser import Diagnoser
 from rippletwin.diagnosis.diagnosis_file import diagnosis_dict
 from rippletwin.diagnosis.faults.library import select_faults
+from rippletwin.diagnosis.observation_model import Hypothesis
 from rippletwin.figures import fault_posterior
 from rippletwin.pump.faults import Cylinder, Slipper
 from rippletwin.twin.twin import Twin
@@ -92,6 +93,21 @@ def test_a_changed_line_is_told_from_the_pump(diagnoses):
 def test_known_states_are_not_unlike(diagnoses):
     """A drift of the line's state is no reason to call a recording unlike."""
     assert all(diagnoses[s].unlikeness.p_value > 0.05 for s in STATES if s != "unlike")
+
+
+def test_shaft_angles_that_the_twin_has_fitted_count_for_nothing():
+    """The angle of the anchor's shaft in the twin is the calibration's. A twin that has fitted one
+    brings the anchor to the next recording as one that has not, and that recording is the truth."""
+    rng = np.random.default_rng(0)
+    anchor, again = (leaking_pump.record(name, rng=rng) for name in ("anchor", "again"))
+    twin = Twin(leaking_pump.rig(), [anchor])
+    angle = np.equal(list(twin.index), "angle[anchor]")
+    for each in (twin, twin.with_(theta=200.0 * angle)):
+        model = Diagnoser(each, ()).model(again, anchor)
+        nothing = Hypothesis((), (), (), 0.0, np.zeros(len(model.line.drifts)))
+        model.linearise_line(nothing)
+        left = model.values - model.parts(nothing).healthy
+        assert np.linalg.norm(left) < 1e-3 * np.linalg.norm(model.values)
 
 
 def test_the_file_has_the_contract_s_keys(diagnoses):

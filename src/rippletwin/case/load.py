@@ -50,7 +50,7 @@ def load_case(folder: str | Path, states: Collection[str] | None = None) -> Case
     folder = sheet_path.parent
     sheet = parse_sheet(sheet_path)
     raise_any([*faults(sheet_path, sheet), *missing_files(sheet_path, sheet)])
-    rig = _rig(folder, sheet)
+    rig = rig_of(folder, sheet)
     recordings, errors = [], []
     for entry in sheet["recordings"]:
         if states is not None and entry["state"] not in states:
@@ -64,7 +64,8 @@ def load_case(folder: str | Path, states: Collection[str] | None = None) -> Case
     return Case(folder=folder, rig=rig, recordings=tuple(recordings), warnings=tuple(warnings))
 
 
-def _rig(folder: Path, sheet: dict) -> Rig:
+def rig_of(folder: Path, sheet: dict) -> Rig:
+    """The rig of a sheet without faults; a measured load impedance is read from `folder`."""
     pump = dict(sheet.get("pump", {}))
     if "pistons" in pump:
         pump["pistons"] = int(pump["pistons"])  # 9.0 is a whole number too

@@ -16,12 +16,13 @@ from click.exceptions import Exit, NoArgsIsHelpError
 from click.shell_completion import shell_complete
 
 from rippletwin import __version__
-from rippletwin.cli import calibrate, check, completion, diagnose, explain, report
+from rippletwin.cli import calibrate, check, completion, diagnose, explain, new, report
 from rippletwin.cli.exit_codes import BAD_INPUT, CLOSED_PIPE, INTERRUPTED
 from rippletwin.errors import InputError
 
 HELP_WIDTH = 100  # columns at most
 COMMANDS = {
+    "new": new.command,
     "check": check.command,
     "calibrate": calibrate.command,
     "explain": explain.command,

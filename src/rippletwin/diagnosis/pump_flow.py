@@ -21,7 +21,7 @@ from rippletwin.harmonics import peak_amplitudes
 from rippletwin.pump.geometry import Geometry
 from rippletwin.pump.outlets import ConstantPressure
 from rippletwin.pump.simulation import PumpRipple, simulate
-from rippletwin.twin.operating_point import OperatingCondition
+from rippletwin.twin.parameters import angle_parameter
 from rippletwin.twin.twin import Twin
 
 STEPS = 3072  # a revolution: the change moves by 0.3 % when they are doubled, 1 % at 1e-8 m2
@@ -43,7 +43,8 @@ FITTED = ("bulk_modulus", "port_timing")  # the twin's names of the pump's fitte
 
 
 def with_fitted_pump(twin: Twin, mean_flow: float | None = None, speed_hz: float = 1.0) -> Twin:
-    """The twin with its pump's numbers as fitted, and none of them a parameter.
+    """The twin with its pump's numbers as fitted, and neither they nor shaft angles parameters: the
+    angle between two recordings belongs to the diagnosis.
 
     Where the data sheet gives the number of pistons alone, the default pump is scaled to deliver
     `mean_flow`, m3/s, at `speed_hz`, rev/s.
@@ -51,14 +52,14 @@ def with_fitted_pump(twin: Twin, mean_flow: float | None = None, speed_hz: float
     pump = {key: value for key, value in twin.rig.pump.items() if value is not None}
     if set(pump) == {"pistons"} and mean_flow is not None:
         pump = _scaled(Geometry.from_dict(pump), mean_flow / speed_hz)
-    kept = np.ones(len(twin.theta), bool)
+    dropped = {angle_parameter(label).name for label in twin.labels}
     if twin.uncertain_pump:
         values = twin.values()
         pump["bulk_modulus"], pump["port_timing_deg"] = (values[name] for name in FITTED)
-        kept[[twin.index[name] for name in FITTED]] = False
+        dropped.update(FITTED)
+    kept = [name not in dropped for name in twin.index]
     return Twin(
         replace(twin.rig, pump=pump),
-        [OperatingCondition(label=label) for label in twin.labels],
         friction=twin.friction,
         effects=twin.effects,
         source_sd=twin.source_sd,

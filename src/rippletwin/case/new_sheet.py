@@ -1,0 +1,151 @@
+"""A new rig.yaml as text: what is known of a rig, in SI units, with what each number means."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import yaml
+
+from rippletwin.errors import InputError
+
+GENERIC_PUMP = """\
+  # Without its geometry, faults are simulated with a generic pump of 42 cm3 per revolution:
+  # piston_diameter: 0.017        # m
+  # pitch_radius: 0.0335          # m, of the circle of the pistons' axes
+  # swash_angle_deg: 17           # at the working point
+  # dead_volume: 3.5e-6           # m3, of a chamber at the end of delivery
+  # port_area: 1.2e-4             # m2, fully open
+"""
+UNCERTAINTY = """\
+# How well the numbers above are known: relative standard deviations, sensor_position in metres.
+# Calibration moves each number by some of these. Too small, and a wrong number looks like missing
+# physics.
+uncertainty:
+  length: 0.01
+  diameter: 0.03
+  wave_speed: {wave_speed:g}
+  viscosity: 0.1
+  load: 0.05
+  sensor_position: 0.005
+"""
+MEASURED_WAVE_SPEED, CALCULATED_WAVE_SPEED = 0.02, 0.05  # relative standard deviations
+
+
+@dataclass(frozen=True)
+class NewSegment:
+    """A segment, m and m/s, and where its wave speed is from, in words."""
+
+    length: float
+    diameter: float
+    wave_speed: float
+    origin: str
+    measured: bool = False
+
+
+@dataclass(frozen=True)
+class NewSheet:
+    """What `rippletwin new` knows of a rig.
+
+    density, viscosity  kg/m3 and m2/s, with the temperature in words
+    sensors             name -> m from the pump outlet
+    recordings          entries as rig.yaml has them
+    """
+
+    density: float
+    viscosity: float
+    temperature: str
+    pistons: int
+    segments: Sequence[NewSegment]
+    sensors: Mapping[str, float]
+    load: str
+    coefficient: float | None = None
+    recordings: Sequence[Mapping] = field(default_factory=tuple)
+
+    def text(self) -> str:
+        """The commented rig.yaml."""
+        return "".join(
+            [
+                "# A rig and its recordings in SI units: m, Pa, m3/s, kg/m3, Hz. Pressures are\n"
+                "# above the atmosphere. Check it with: rippletwin check FOLDER\n\n",
+                f"fluid:\n  density: {self.density:.4g}  # kg/m3 {self.temperature}\n"
+                f"  kinematic_viscosity: {_decimal(self.viscosity)}  # m2/s {self.temperature}\n\n",
+                f"pump:\n  pistons: {self.pistons}\n{GENERIC_PUMP}\n",
+                "line:\n  segments:  # pump first, load last\n",
+                *(_segment_text(segment) for segment in self.segments),
+                "\nsensors:  # m from the pump outlet\n",
+                *(f"  - {_flow(name=n, position=_number(x))}\n" for n, x in self.sensors.items()),
+                f"\n{self._load_text()}\n",
+                UNCERTAINTY.format(wave_speed=self._wave_speed_uncertainty()),
+                "\n# state: healthy recordings teach the twin; unknown ones are diagnosed.\n",
+                "recordings:\n",
+                *(f"  - {_flow(**entry)}\n" for entry in self.recordings),
+            ]
+        )
+
+    def _load_text(self) -> str:
+        text = f"load:\n  kind: {self.load}\n"
+        if self.coefficient is not None:
+            text += f"  coefficient: {_decimal(self.coefficient)}  # m3/s/sqrt(Pa)\n"
+        elif self.load == "orifice":
+            text += "  # coefficient, m3/s/sqrt(Pa), follows from mean flow and load pressure\n"
+        return text
+
+    def _wave_speed_uncertainty(self) -> float:
+        measured = all(segment.measured for segment in self.segments)
+        return MEASURED_WAVE_SPEED if measured else CALCULATED_WAVE_SPEED
+
+
+def write_new_sheet(sheet: NewSheet, folder: str | Path) -> Path:
+    """Write `folder`/rig.yaml and an empty folder for recordings; returns the path of rig.yaml.
+
+    Raises
+    ------
+    InputError : there is a rig.yaml already, or it cannot be written.
+    """
+    path = Path(folder) / "rig.yaml"
+    try:
+        (path.parent / "recordings").mkdir(parents=True, exist_ok=True)
+        with open(path, "x", encoding="utf-8") as file:
+            file.write(sheet.text())
+            file.flush()
+            os.fsync(file.fileno())
+    except FileExistsError as error:
+        there = path.is_file()
+        problem = "is there already" if there else f"{folder} is no folder"
+        remedy = "Edit it, or name another folder: nothing is overwritten"
+        raise InputError(path, "case", problem, remedy) from error
+    except OSError as error:
+        raise InputError(
+            path, "case", f"cannot be written ({error.strerror})", "Name a folder of your own"
+        ) from error
+    return path
+
+
+def _segment_text(segment: NewSegment) -> str:
+    numbers = {
+        "length": _number(segment.length),
+        "diameter": _number(segment.diameter),
+        "wave_speed": _number(segment.wave_speed, 4),
+    }
+    return f"    - {_flow(**numbers)}  # {segment.origin}\n"
+
+
+def _flow(**entry) -> str:
+    """A mapping on one line."""
+    return yaml.safe_dump(
+        dict(entry), default_flow_style=True, sort_keys=False, width=10**6, allow_unicode=True
+    ).strip()
+
+
+def _number(value: float, digits: int = 6) -> float | int:
+    """A number with few digits; a whole one without a decimal point."""
+    rounded = float(f"{value:.{digits}g}")
+    return int(rounded) if rounded.is_integer() else rounded
+
+
+def _decimal(value: float) -> str:
+    """A small number as YAML reads it: with a point before the exponent."""
+    return f"{value:.3e}"

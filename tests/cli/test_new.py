@@ -1,0 +1,125 @@
+"""rippletwin new: what a test bench knows, in its units, becomes a sheet that check accepts."""
+
+import json
+
+import pytest
+import yaml
+from click.testing import CliRunner
+
+from case_folders import ripple, write_hdf5
+from rippletwin.case.rig_yaml import read_sheet
+from rippletwin.cli import main
+from rippletwin.cli.new import command
+
+FLAGS = {
+    "--pistons": ["9"],
+    "--viscosity": ["32"],
+    "--temperature": ["65"],
+    "--flow": ["38"],
+    "--segment": ["5950,19.7,2.5", "3000,19.7,850m/s"],
+    "--sensor": ["p1,420", "p2,2590"],
+    "--recording": ["recordings/a.h5,healthy,1000,95"],
+}
+
+
+def flags(**other):
+    """Options of the command line; `other` replaces those of a name."""
+    chosen = FLAGS | {f"--{name}": values for name, values in other.items()}
+    return [word for name, values in chosen.items() for value in values for word in (name, value)]
+
+
+def test_units_of_the_bench_become_si(tmp_path, capsys):
+    """Independent truth: mm, cSt, bar, L/min and degrees turned by hand. The sheet has no fault,
+    and with its recording `check` reads the case."""
+    case = tmp_path / "case"
+    assert main(["new", str(case), *flags()]) == 0
+    sheet = read_sheet(case / "rig.yaml")
+    first, second = sheet["line"]["segments"]
+    assert (first["length"], first["diameter"]) == (5.95, 0.0197)
+    assert second["wave_speed"] == 850
+    # sqrt(K/rho) is 1380 m/s, and 2.5 mm of steel take 3.6 % of it
+    assert first["wave_speed"] == pytest.approx(1334, abs=5)
+    assert sheet["fluid"]["density"] == pytest.approx(870 / 1.035, rel=1e-3)
+    assert sheet["fluid"]["kinematic_viscosity"] == pytest.approx(32e-6)
+    assert [s["position"] for s in sheet["sensors"]] == [0.42, 2.59]
+    assert sheet["load"]["coefficient"] == pytest.approx(38 / 60000 / 9.5e6**0.5, rel=1e-3)
+    assert sheet["recordings"][0]["load_pressure"] == 9.5e6
+    write_hdf5(case / "recordings" / "a.h5", ripple())
+    assert main(["check", str(case)]) == 0
+
+
+def test_every_number_is_explained(tmp_path):
+    """Uncertainties, pump and wave speeds stand beside a comment."""
+    assert main(["new", str(tmp_path / "case"), *flags()]) == 0
+    text = (tmp_path / "case" / "rig.yaml").read_text()
+    for words in ("generic pump", "2.5 mm of steel", "measured", "standard deviations", "m2/s"):
+        assert words in text
+
+
+def test_questions_ask_for_what_is_missing(tmp_path):
+    """Answers give the same sheet as flags; one that makes no sense is asked for again."""
+    answers = ["9", "32", "5950,19.7,2.5", "3000,19.7,850m/s", "", "p1,420", "p2", "p2,2590", ""]
+    answers += ["recordings/a.h5,healthy,1000,95", ""]
+    options = ["--ask", "--temperature", "65", "--flow", "38"]
+    run = CliRunner().invoke(
+        command, [str(tmp_path / "asked"), *options], input="\n".join(answers) + "\n"
+    )
+    assert run.exception is None, run.output
+    assert "'p2' is not NAME,POSITION" in run.output
+    assert main(["new", str(tmp_path / "given"), *flags()]) == 0
+    asked, given = (
+        yaml.safe_load((tmp_path / name / "rig.yaml").read_text()) for name in ("asked", "given")
+    )
+    assert asked == given
+
+
+def test_what_is_missing_is_told_at_once(tmp_path, capsys):
+    """Where nobody can be asked, every missing option is in one message and nothing is written."""
+    assert main(["new", str(tmp_path / "case"), "--no-ask"]) == 2
+    told = capsys.readouterr().err
+    assert all(name in told for name in ("--pistons", "--segment", "--sensor", "--viscosity"))
+    assert not (tmp_path / "case" / "rig.yaml").exists()
+
+
+REFUSED = {
+    "a length of text": ("segment", "long,20,2", "no length"),
+    "a bore below zero": ("segment", "5950,-20,2", "no length"),
+    "a wall of cheese": ("segment", "5950,20,2,cheese", "no known modulus"),
+    "a sensor behind the pump": ("sensor", "p1,-4", "no position"),
+    "a state nobody knows": ("recording", "a.h5,worn,1000,95", "worn is no state"),
+    "a sensor beyond the line": ("sensor", "p1,42000", "outside the line"),
+    "a pressure in Pa": ("recording", "a.h5,healthy,1000,9.5e6", "implausible"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_makes_no_sense(tmp_path, capsys, name):
+    """Refused with the option or the field, and no rig.yaml is left."""
+    option, value, words = REFUSED[name]
+    assert main(["new", str(tmp_path / "case"), *flags(**{option: [value]})]) == 2
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "case" / "rig.yaml").exists()
+
+
+def test_nothing_is_overwritten(tmp_path, capsys):
+    """A rig.yaml that is there stays as it is."""
+    (tmp_path / "rig.yaml").write_text("mine")
+    assert main(["new", str(tmp_path), *flags()]) == 2
+    assert (tmp_path / "rig.yaml").read_text() == "mine"
+
+
+def test_what_the_data_must_have(tmp_path, capsys):
+    """Sensors 2.17 m apart on 1334 m/s are half a wave apart at 307 Hz; one point, two sensors and
+    the band are told. A pair 0.1 m apart and a second pressure and speed leave less to tell."""
+    options = ["new", str(tmp_path / "a"), *flags(), "--json"]
+    assert main(options) == 0
+    advice = json.loads(capsys.readouterr().out)["advice"]
+    assert any("from 307 Hz on" in line for line in advice)
+    assert any("second pressure" in line for line in advice)
+    assert any("10 kHz" in line for line in advice)
+    better = flags(
+        sensor=["p1,420", "p2,520", "p3,2590"],
+        recording=["a.h5,healthy,1000,95", "b.h5,healthy,1200,60"],
+    )
+    assert main(["new", str(tmp_path / "b"), *better, "--json"]) == 0
+    assert [line[:9] for line in json.loads(capsys.readouterr().out)["advice"]] == ["Sample at"]
