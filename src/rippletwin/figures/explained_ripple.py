@@ -19,6 +19,7 @@ LOOKS = {
 }
 """The thin lines show on the wide one, also where all three agree."""
 RESIDUAL_LIMITS = 0.1, 100.0
+LEAST_HEIGHT = 2.4  # inches, for the label of the colour scale
 
 
 def title_of(point: Point) -> str:
@@ -91,7 +92,8 @@ def plot_ripple(numbers: ExplainedNumbers) -> Figure:
 def plot_residuals(numbers: ExplainedNumbers) -> Figure:
     """Error over the error to be expected: per sensor, frequency and observation."""
     names = curves_of(numbers)[1:]
-    fig, axes = style.figure(len(numbers.points), len(names), height=1.2, sharey="row")
+    height = max(1.2, LEAST_HEIGHT / len(numbers.points))
+    fig, axes = style.figure(len(numbers.points), len(names), height=height, sharey="row")
     norm = LogNorm(*RESIDUAL_LIMITS, clip=True)
     for row, point in zip(axes, numbers.points):
         for ax, name in zip(row, names):

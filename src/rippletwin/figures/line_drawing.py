@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 
 from matplotlib.figure import Figure
@@ -10,6 +11,7 @@ from matplotlib.patches import FancyBboxPatch, Polygon, Rectangle
 from rippletwin.figures import style
 from rippletwin.figures.explained_numbers import ExplainedNumbers, LinePlace, Places
 
+LETTERS = 88  # of a line below the picture
 LABELLED_SHARE = 0.08  # of the line's length: a shorter segment has no room for its size
 ROW = 1.0  # height of an interval and its label, in pipe widths
 FREE = "best single place, whatever the effect"
@@ -65,7 +67,8 @@ def plot_place(numbers: ExplainedNumbers) -> Figure | None:
     ax.set_yticks([])
     ax.spines["left"].set_visible(False)
     ax.set_xlabel(
-        f"distance from the pump / m, to scale; diameters enlarged\n{describe_free(places)}"
+        "distance from the pump / m, to scale; diameters enlarged\n"
+        + textwrap.fill(describe_free(places), LETTERS)
     )
     fig.suptitle("Where along the line is what the twin lacks?")
     return fig

@@ -84,12 +84,20 @@ def name_parameter(name: str) -> str:
 
 
 def name_element(element: str) -> str:
-    """An element of the rig in words, after "at": "the pump", "segment 2", "sensor p1"."""
+    """An element of the rig in words, "the pump", "segment 2", "sensor p1"."""
     stem, _, kind = element.partition(", ")
     words = {"source": "the pump", "load": "the load", "line": "the whole line"}.get(stem, stem)
     words = words.replace("position", "one place")
     words = words.replace("between pump", "between the pump").replace("and load", "and the load")
     return f"{words} ({kind})" if kind else words
+
+
+def name_place(element: str) -> str:
+    """Where an element is, in words: "at the pump", "in segment 2", "between p1 and p2"."""
+    words = name_element(element)
+    if words.startswith("between"):
+        return words
+    return f"in {words}" if words.startswith(("segment", "the whole")) else f"at {words}"
 
 
 def name_state(state: str) -> str:

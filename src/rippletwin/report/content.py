@@ -14,7 +14,7 @@ from rippletwin.case.model import Rig
 from rippletwin.figures.explained_numbers import LinePlace, Places
 from rippletwin.figures.line_drawing import describe_free, shown_places
 from rippletwin.figures.quantities import write_certainty, write_share
-from rippletwin.figures.words import name_element, name_state
+from rippletwin.figures.words import name_element, name_place, name_state
 from rippletwin.report import charts, verdict_words
 from rippletwin.report.line_picture import MarkedPlace, draw_line
 from rippletwin.report.results import Results
@@ -237,7 +237,7 @@ def _diagnosis(entry: Mapping, results: Results) -> DiagnosisCard:
     unlike = entry.get("unlike") or {}
     if entry["state"] == "unlike":
         where = unlike.get("where") or {}
-        element = f" at {name_element(where['element'])}" if where.get("element") else ""
+        element = f" {name_place(where['element'])}" if where.get("element") else ""
         orders = ", ".join(map(str, where.get("orders") or ()))
         facts.append(
             f"Something else has changed{element}"

@@ -14,7 +14,7 @@ import numpy as np
 from markupsafe import Markup
 
 WIDTH, HEIGHT = 400, 236
-LEFT, RIGHT, TOP, BOTTOM = 50, 10, 8, 40
+LEFT, RIGHT, TOP, BOTTOM = 54, 18, 8, 42
 TICKS = 5
 DIGITS = 4
 MAX_DECADES = 4.5  # of a logarithmic axis: less than that of the largest value is at the bottom
@@ -156,7 +156,7 @@ def _axes(chart: Chart, scale: _Scale) -> list[Markup]:
         Markup(
             '<line class="axis" x1="{}" x2="{}" y1="{}" y2="{}"/>'
             '<text class="label" x="{}" y="{}" text-anchor="middle">{}</text>'
-            '<text class="label" transform="translate(11 {}) rotate(-90)" '
+            '<text class="label" transform="translate(14 {}) rotate(-90)" '
             'text-anchor="middle">{}</text>'
         ).format(
             LEFT,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from rippletwin.figures.quantities import write_probability, write_share
-from rippletwin.figures.words import join_words, name_effect, name_element
+from rippletwin.figures.words import join_words, name_effect, name_place
 
 TITLES = {
     "consistent": "The twin accounts for the recordings",
@@ -49,9 +49,7 @@ def verdict_sentence(verdict: Mapping) -> str:
             f"({rivals}); these recordings cannot tell which."
         )
     if not effects:
-        return (
-            f"Something is missing at {_where(verdict)}, and no effect of the library explains it."
-        )
+        return f"Something is missing {_where(verdict)}, and no effect of the library explains it."
     return (
         f"The line has what its data sheet does not contain: {_effects(effects)}{_change(verdict)}."
     )
@@ -71,7 +69,7 @@ def _effects(effects: Sequence[Mapping]) -> str:
 
 def _where(verdict: Mapping) -> str:
     where = (verdict.get("mismatch") or {}).get("where") or {}
-    words = name_element(where.get("element", "the line"))
+    words = name_place(where.get("element", "line"))
     position = where.get("position_m")
     if position and position[1] - position[0] > 5e-3:
         words += f", {position[0]:.2f} to {position[1]:.2f} m from the pump"
@@ -108,7 +106,7 @@ def remaining_sentences(verdict: Mapping) -> list[str]:
     if remainder:
         words = [f"What remains is {write_share(remainder['misfit'])} of the ripple"]
         if remainder.get("element"):
-            words.append(f"at {name_element(remainder['element'])}")
+            words.append(name_place(remainder["element"]))
         position = remainder.get("position_m")
         if position and position[1] - position[0] > 5e-3:
             words.append(f"({position[0]:.2f} to {position[1]:.2f} m from the pump)")
