@@ -264,6 +264,18 @@ def test_the_command_writes_the_page(folder, tmp_path, capsys):
     assert "is a folder" in capsys.readouterr().err
 
 
+def test_the_command_tells_programs_what_is_missing(tmp_path, capsys):
+    """--json names the page and what it lacks; --fail-on missing then ends with 3."""
+    folder = write_results(tmp_path)
+    command = ["report", str(folder), "--out", str(tmp_path / "report.html"), "--json"]
+    assert main([*command, "--fail-on", "missing"]) == 0
+    assert json.loads(capsys.readouterr().out)["missing"] == []
+    (folder / "diagnosed" / "diagnosis.json").unlink()
+    assert main([*command, "--fail-on", "missing"]) == 3
+    (said,) = json.loads(capsys.readouterr().out)["missing"]
+    assert "rippletwin diagnose" in said and main(command) == 0
+
+
 def test_the_page_is_the_same_each_time(folder, tmp_path):
     """No time, no random order: a workflow that makes it again has nothing to do after it."""
     one, two = (write_report(read_results(folder), tmp_path / name) for name in ("1", "2"))

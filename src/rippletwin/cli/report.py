@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import click
 
 from rippletwin.cli import options
+from rippletwin.cli.exit_codes import found_code
 from rippletwin.cli.progress import warn
 
 
@@ -23,7 +25,16 @@ from rippletwin.cli.progress import warn
     metavar="DIR",
     help="The folder that diagnose wrote; by default CASE/diagnosed.",
 )
-def command(case: Path, out: str, explained: str | None, diagnosed: str | None) -> int:
+@options.json_output
+@options.fail_on(("missing",), "The verdict, the ripples or the diagnosis are not there.")
+def command(
+    case: Path,
+    out: str,
+    explained: str | None,
+    diagnosed: str | None,
+    as_json: bool,
+    fail_on: tuple[str, ...],
+) -> int:
     """Show the case in the folder CASE, its verdict and its diagnosis as one HTML page.
 
     Nothing is calculated again: what is not there, the page says, with the command that makes it.
@@ -33,5 +44,6 @@ def command(case: Path, out: str, explained: str | None, diagnosed: str | None) 
 
     results = read_results(case, explained, diagnosed)
     warn([*results.case.warnings, *results.missing])
-    print(write_report(results, out))
-    return 0
+    path = write_report(results, out)
+    print(json.dumps({"report": str(path), "missing": list(results.missing)}) if as_json else path)
+    return found_code(["missing"] if results.missing else [], fail_on)

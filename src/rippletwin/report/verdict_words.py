@@ -45,13 +45,13 @@ def verdict_sentence(verdict: Mapping) -> str:
         rivals = join_words([name_effect(*each.split(" at ", 1)) for each in others])
         said = join_words(names) or "an effect"
         return (
-            f"The line has what its data sheet does not contain: {said}, or an equivalent of it "
+            f"The rig has what its data sheet does not say: {said}, or an equivalent of it "
             f"({rivals}); these recordings cannot tell which."
         )
     if not effects:
         return f"Something is missing {_where(verdict)}, and no effect of the library explains it."
     return (
-        f"The line has what its data sheet does not contain: {_effects(effects)}{_change(verdict)}."
+        f"The rig has what its data sheet does not say: {_effects(effects)}{_change(verdict)}."
     )
 
 
