@@ -280,3 +280,19 @@ def test_the_page_is_the_same_each_time(folder, tmp_path):
     """No time, no random order: a workflow that makes it again has nothing to do after it."""
     one, two = (write_report(read_results(folder), tmp_path / name) for name in ("1", "2"))
     assert one.read_bytes() == two.read_bytes()
+
+
+def test_an_effect_of_a_user_s_file_needs_no_file(tmp_path):
+    """The parameters of the line are shown though the twin has an effect that is not at hand."""
+    folder = write_results(tmp_path)
+    path = folder / "explained" / "twin.json"
+    data = json.loads(path.read_text())
+    count = len(data["theta"])
+    data["effects"] = [{"name": "mine", "file": "mine.py", "place": {"element": "line"}}]
+    data["values"]["mine@line.size"] = 3.0
+    data["theta"].append(0.5)
+    data["covariance"] = np.eye(count + 1).tolist()
+    path.write_text(json.dumps(data))
+    results = read_results(folder)
+    assert len(results.twin.parameters) == count == len(results.covariance)
+    assert make_page(results).parameters.rows

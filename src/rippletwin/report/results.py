@@ -16,7 +16,7 @@ from rippletwin.figures import diagnosed_numbers, explained_numbers
 from rippletwin.figures.diagnosed_numbers import DiagnosedNumbers
 from rippletwin.figures.explained_numbers import ExplainedNumbers
 from rippletwin.twin.twin import Twin
-from rippletwin.twin.twin_file import load_covariance, load_twin
+from rippletwin.twin.twin_file import from_dict
 
 EXPLAINED, DIAGNOSED = "explained", "diagnosed"  # folders of a case in which results are looked for
 
@@ -26,7 +26,7 @@ class Results:
     """A case and what is known of it; what is not there is None or empty, and `missing` says so.
 
     verdict, diagnosis   as in verdict.json and in the list of diagnosis.json
-    covariance           of the twin's theta, (P, P)
+    twin, covariance     the twin without its effects, and the covariance (P, P) of its theta
     explained, diagnosed the numbers behind the figures
     missing              what the report lacks and the command that makes it, a sentence each
     """
@@ -70,8 +70,7 @@ def read_results(
                 "--no-figures"
             )
         if (folder / "twin.json").exists():
-            twin = load_twin(folder / "twin.json")
-            covariance = load_covariance(folder / "twin.json")
+            twin, covariance = _line_of_twin(folder / "twin.json")
     diagnosis = _read_json(diagnosis_folder / "diagnosis.json")
     if diagnosis is None and any(r.state != "healthy" for r in case.recordings):
         missing.append(f"There is no diagnosis: {command.format('diagnose', DIAGNOSED)}")
@@ -99,6 +98,20 @@ def _folder(named: str | Path | None, default: Path, file: str, option: str) -> 
             "name the folder that was given to the command as --out",
         )
     return Path(named)
+
+
+def _line_of_twin(path: Path) -> tuple[Twin, np.ndarray | None]:
+    """The twin of a twin.json without its effects, and the covariance of its theta.
+
+    Effects have a table of their own in verdict.json, and may be of files that are not at hand.
+    """
+    data = _read_json(path)
+    data = data.get("twin", data) | {"covariance": data.get("covariance")}
+    count = sum("@" not in name for name in data["values"])  # effects' own parameters come last
+    twin = from_dict(data | {"effects": [], "theta": data["theta"][:count]})
+    if data["covariance"] is None:
+        return twin, None
+    return twin, np.array(data["covariance"])[:count, :count]
 
 
 def _read_json(path: Path) -> dict | None:

@@ -50,9 +50,7 @@ def verdict_sentence(verdict: Mapping) -> str:
         )
     if not effects:
         return f"Something is missing {_where(verdict)}, and no effect of the library explains it."
-    return (
-        f"The rig has what its data sheet does not say: {_effects(effects)}{_change(verdict)}."
-    )
+    return f"The rig has what its data sheet does not say: {_effects(effects)}{_change(verdict)}."
 
 
 def _effects(effects: Sequence[Mapping]) -> str:

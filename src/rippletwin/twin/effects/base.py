@@ -106,11 +106,13 @@ class Effect:
     places      rig -> tuple of Place
     apply       (network: FrequencyDomainLine, state: LineState, values: name -> value, place)
                 mutates the network
-    apply_in_time   (line: TimeDomainLine, state: LineState, values, place) mutates the line
+    apply_in_time   (line: TimeDomainLine, state: LineState, values, place) mutates the line; None
+                where the time domain follows from `apply` (`rippletwin.twin.time_domain_form`)
     named       False for a passive network that represents physics without a name
     certain     always present in real lines: accepted with any other effect unless the data
                 contradict it
     friction    law by which it replaces the line's, as in `series_impedance`
+    file        the user's file that defines it; None in the library
     """
 
     name: str
@@ -121,10 +123,11 @@ class Effect:
     parameters: Callable[[object, Place], tuple[Parameter, ...]]
     places: Callable[[object], tuple[Place, ...]]
     apply: Callable[[object, LineState, Mapping[str, object], Place], None]
-    apply_in_time: Callable[[object, LineState, Mapping[str, float], Place], None]
+    apply_in_time: Callable[[object, LineState, Mapping[str, float], Place], None] | None = None
     certain: bool = False
     named: bool = True
     friction: str | None = None
+    file: str | None = None
 
     def suits(self, rig) -> bool:
         """Whether the effect exists in the rig's medium."""

@@ -1,13 +1,19 @@
-"""The library of effects: every module of this package that defines `EFFECT` is one."""
+"""The library of effects: every module of this package that defines `EFFECT`, and users' files."""
 
 from __future__ import annotations
 
 import copyreg
 import importlib
 import pkgutil
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
 
+from rippletwin.case.python_file import read_object
+from rippletwin.errors import InputError
 from rippletwin.twin import effects
 from rippletwin.twin.effects.base import Effect, Place
+from rippletwin.twin.effects.own_effects import check_fields, check_on_rig
 
 
 def _discover() -> dict[str, Effect]:
@@ -24,15 +30,62 @@ def _discover() -> dict[str, Effect]:
 
 
 EFFECTS: dict[str, Effect] = _discover()
-"""Name -> effect, those without a name included."""
+"""Name -> effect, those without a name and those of users' files (`add_effects`) included."""
 
 
-def _by_name(name: str) -> Effect:
-    return EFFECTS[name]
+def add_effects(files: Iterable[str | Path], rig=None) -> tuple[Effect, ...]:
+    """Take the effects of users' Python files into the library of this process.
+
+    Processes that it forks know them too. A file that was taken before changes nothing. Raises
+    InputError for a file without a usable `EFFECT`, for the name of another effect, and for an
+    effect that does not work on `rig`, where one is given.
+    """
+    added = tuple(_add(read_effect(file)) for file in files)
+    for effect in added if rig is not None else ():
+        check_on_rig(effect, rig)
+    return added
+
+
+def _add(effect: Effect) -> Effect:
+    known = EFFECTS.get(effect.name)
+    if known is None:
+        EFFECTS[effect.name] = effect
+    elif known.file != effect.file:
+        raise InputError(
+            effect.file,
+            "EFFECT.name",
+            f"there is an effect {effect.name!r} already, in {known.file or 'the library'}",
+            "Give it a name of its own",
+        )
+    return EFFECTS[effect.name]
+
+
+def read_effect(path: str | Path) -> Effect:
+    """The `EFFECT` of a user's Python file; raises InputError where there is none."""
+    effect = read_object(path, "EFFECT", Effect, "--effects")
+    effect = replace(effect, file=str(Path(path).resolve()))
+    check_fields(effect)
+    return effect
+
+
+def find_effect(name: str, file: str | None = None) -> Effect:
+    """The effect of that name; `file` is the user's file where it was defined once, if it was.
+
+    Raises InputError where the library of this process does not have it.
+    """
+    if name in EFFECTS:
+        return EFFECTS[name]
+    raise InputError(
+        file or "the library",
+        "effects",
+        f"the effect {name!r} is not known"
+        + (f"; it was defined in a user's file called {file}" if file else ""),
+        "Give its Python file with --effects FILE (in a workflow: explain.effects)",
+    )
 
 
 # An effect is pickled by its name: its functions may be lambdas, and every process has the library.
-copyreg.pickle(Effect, lambda effect: (_by_name, (effect.name,)))
+copyreg.pickle(Effect, lambda effect: (find_effect, (effect.name,)))
 
 
 def candidates(rig, named: bool = True) -> list[tuple[Effect, Place]]:
