@@ -26,7 +26,7 @@ def run_script(
     """Run workflow/scripts/NAME.py; `files` are its inputs, its log goes into `folder`."""
     job = SimpleNamespace(
         rule=name,
-        input=Named(files),
+        input=Named({"effects": ()} | files),
         output=Named(output),
         wildcards=Named(wildcards),
         params=SimpleNamespace(**params),

@@ -29,6 +29,7 @@ FIXED = {
     "sensor_delay": "sensor",
     "thermal_boundary_layer": "line",
     "end_radiation": "load",
+    "side_hole": "position",
 }
 FREQUENCY = np.linspace(20.0, 5000.0, 150)
 S = 2j * np.pi * FREQUENCY
@@ -178,6 +179,19 @@ def test_short_branch_is_a_volume():
         readings.append(net.inserts[0][2])
     low = FREQUENCY < 1000.0
     np.testing.assert_allclose(readings[0][low], readings[1][low], rtol=2e-2)
+
+
+def test_a_leaking_pump_drives_a_matched_line_less():
+    """Into its characteristic impedance Zc the pump's flow Q makes p = Q/(1/Zc + G): the leakage is
+    a resistance parallel to the line (Kirchhoff)."""
+    base, leakage = rig(), 3e-11
+    one = Rig(base.fluid, base.pump, base.line[:1], base.sensors[:1], base.load)
+    net, state = network(one, friction="none")
+    zc = 870.0 * 1020.0 / state.area(0)
+    net.load = "impedance", np.full(len(S), zc)
+    place = Place("source", form="leakage")
+    EFFECTS["source_impedance"].apply(net, state, {"conductance": leakage}, place)
+    np.testing.assert_allclose(np.abs(net.readings()), 1.0 / (1.0 / zc + leakage), rtol=1e-9)
 
 
 def test_an_orifice_passes_what_a_leak_leaves():

@@ -6,10 +6,10 @@ from scipy.integrate import quad
 from scipy.special import j1, struve, y1
 
 from rippletwin.twin.effects.base import LineState
-from rippletwin.twin.effects.end_radiation import (
+from rippletwin.twin.effects.end_radiation import radiation_element
+from rippletwin.twin.effects.open_end import (
     FLANGED,
     UNFLANGED,
-    radiation_element,
     radiation_impedance,
 )
 

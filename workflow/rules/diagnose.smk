@@ -4,6 +4,7 @@ rule diagnose:
         rig=rig_sheet(),
         recordings=recordings(),
         twin=rules.explain.output.twin,
+        effects=config["explain"]["effects"],
         faults=[name for name in config["faults"]["files"] if name.endswith(".py")],
         source=scripts_sources("diagnose.py"),
     output:

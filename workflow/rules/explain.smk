@@ -3,6 +3,7 @@ rule explain:
     input:
         rig=rig_sheet(),
         recordings=recordings(),
+        effects=config["explain"]["effects"],
         source=scripts_sources("explain.py"),
     output:
         verdict=f"{RESULTS}/explain/verdict.json",

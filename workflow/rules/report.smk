@@ -68,6 +68,7 @@ rule report_cost:
         table=rules.accuracy_table.output.table,
         verdict=rules.explain.output.verdict,
         twin=rules.explain.output.twin,
+        effects=config["explain"]["effects"],
         source=scripts_sources("report_cost.py"),
     output:
         report(

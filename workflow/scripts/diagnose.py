@@ -15,7 +15,7 @@ case = load_case(Path(snakemake.input.rig).parent)
 labels = [r.label for r in case.recordings if r.state != "healthy" and r.kind == "periodic"]
 diagnoses = diagnose(
     case,
-    load_twin(snakemake.input.twin),
+    load_twin(snakemake.input.twin, snakemake.input.effects),
     select_recordings(case, labels),
     select_faults(snakemake.params.faults),
     lambda what, done, total: report_progress(f"{what}: {done} of {total}"),

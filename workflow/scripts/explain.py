@@ -7,9 +7,11 @@ from rippletwin.case.load import load_case
 from rippletwin.explanation.explain import explain
 from rippletwin.explanation.verdict.verdict_file import write_verdict
 from rippletwin.figures.explanation import draw
+from rippletwin.twin.effects.library import add_effects
 
 report_progress = open_log(snakemake)
 case = load_case(Path(snakemake.input.rig).parent, states={"healthy"})
+add_effects(snakemake.input.effects, case.rig)
 explanation = explain(
     case, snakemake.threads, lambda what, done, total: report_progress(f"{what}: {done} of {total}")
 )

@@ -15,7 +15,7 @@ estimate = estimate_flow_by(
     params.method,
     recorded.signal.values,
     recorded.speed_hz,
-    line_factory(load_twin(snakemake.input.twin), recorded.load_pressure),
+    line_factory(load_twin(snakemake.input.twin, snakemake.input.effects), recorded.load_pressure),
     recorded.noise_std.values,
     params.bandwidth_hz,
     width=params.width,

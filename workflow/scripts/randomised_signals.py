@@ -12,7 +12,7 @@ from rippletwin.learning.windows import early_healthy
 from rippletwin.twin.twin_file import load_covariance, load_twin
 
 report_progress = open_log(snakemake)
-params, twin = snakemake.params, load_twin(snakemake.input.twin)
+params, twin = snakemake.params, load_twin(snakemake.input.twin, snakemake.input.effects)
 recorded = store.load(snakemake.input.recorded)
 at = early_healthy(recorded.state.values, recorded.recording.values, params.learnt_share)
 source = SignalSource(

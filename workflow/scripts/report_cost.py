@@ -12,7 +12,7 @@ from rippletwin.twin.twin_file import load_twin
 report_progress = open_log(snakemake)
 results = pd.read_csv(snakemake.input.table)
 verdict = json.loads(Path(snakemake.input.verdict).read_text())
-effects = load_twin(snakemake.input.twin).effects
+effects = load_twin(snakemake.input.twin, snakemake.input.effects).effects
 taken_in = [f"{effect.name.replace('_', ' ')} ({place})" for effect, place in effects]
 Path(snakemake.output[0]).write_text(
     f"""# What the left-out physics cost

@@ -40,6 +40,10 @@ from rippletwin.cli.progress import progress_bars, warn
     help="Also try the fault that a Python file defines as FAULT, or one of the library that is "
     "not tried by default, by its name (valve_plate).",
 )
+@options.effects(
+    "An effect of the twin that a Python file defines as EFFECT, again for more; explain tries it "
+    "too."
+)
 @click.option(
     "--networks",
     "results",
@@ -56,6 +60,7 @@ def command(
     twin_file: str | None,
     labels: tuple[str, ...],
     fault_names: tuple[str, ...],
+    effects: tuple[str, ...],
     results: str | None,
     as_json: bool,
     processes: int,
@@ -68,10 +73,12 @@ def command(
     from rippletwin.diagnosis.diagnose import diagnose, select_recordings
     from rippletwin.diagnosis.diagnosis_file import write_diagnosis
     from rippletwin.diagnosis.faults.library import select_faults
+    from rippletwin.twin.effects.library import add_effects
 
     faults = select_faults(list(fault_names))
     states = None if labels else {"healthy", "unknown"}
     read = load_case(case, states=states)
+    add_effects(effects, read.rig)
     warn(read.warnings)
     recordings = select_recordings(read, list(labels))
     networks = _networks_of(results, read)

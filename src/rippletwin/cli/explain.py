@@ -28,6 +28,7 @@ of the data sheet."""
     is_flag=True,
     help="Print the verdict as JSON and nothing else.",
 )
+@options.effects("Also try the effect that a Python file defines as EFFECT, again for more.")
 @options.processes("fit")
 @options.no_figures
 @click.option(
@@ -43,6 +44,7 @@ def command(
     case: Path,
     out: str,
     as_json: bool,
+    effects: tuple[str, ...],
     processes: int,
     no_figures: bool,
     bootstrap: int,
@@ -55,6 +57,7 @@ def command(
     from rippletwin.explanation.checks.bootstrap import MIN_DRAWS
     from rippletwin.explanation.explain import explain
     from rippletwin.explanation.verdict.verdict_file import write_verdict
+    from rippletwin.twin.effects.library import add_effects
 
     if bootstrap and bootstrap < MIN_DRAWS:
         raise InputError(
@@ -64,6 +67,7 @@ def command(
             f"give at least {MIN_DRAWS}, or leave it out",
         )
     read = load_case(case, states={"healthy"})
+    add_effects(effects, read.rig)
     warn(read.warnings)
     with progress_bars(as_json) as progress:
         explanation = explain(read, processes, progress, bootstrap)

@@ -111,6 +111,11 @@ def frequency(name: str, help: str):
     return click.option(name, type=FREQUENCY, metavar="HZ", help=help)
 
 
+def effects(help: str):
+    """--effects FILE."""
+    return click.option("--effects", "effects", multiple=True, metavar="FILE", help=help)
+
+
 def fail_on(words: Sequence[str], help: str):
     """--fail-on WORD: end with exit code 3 where the command has found this."""
     return click.option(

@@ -12,6 +12,7 @@ from rippletwin.harmonics import one_period
 from rippletwin.line.time_domain import method_of_characteristics
 from rippletwin.line.time_domain.line_elements import End, Pipe, TimeDomainLine, capacitance
 from rippletwin.twin.effects.base import LineState
+from rippletwin.twin.time_domain_form import apply_in_time
 from rippletwin.twin.twin import Twin
 
 MAX_PERIODS = 200  # until the line is periodic
@@ -102,7 +103,7 @@ def line_in_time(
         load_passes_flow=rig.load.passes_flow,
     )
     for effect, place, values in twin.effect_values(twin.theta):
-        effect.apply_in_time(line, state, values, place)
+        apply_in_time(effect, line, state, values, place)
     return line
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
@@ -10,8 +11,8 @@ import numpy as np
 
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor, Uncertainty
 from rippletwin.errors import InputError
-from rippletwin.twin.effects.base import Place
-from rippletwin.twin.effects.library import EFFECTS
+from rippletwin.twin.effects.base import Effect, Place
+from rippletwin.twin.effects.library import add_effects, find_effect
 from rippletwin.twin.operating_point import OperatingCondition
 from rippletwin.twin.twin import Twin
 
@@ -28,24 +29,35 @@ def to_dict(twin: Twin) -> dict:
         "source_sd": twin.source_sd,
         "guessed_load": twin.guessed_load,
         "uncertain_pump": twin.uncertain_pump,
-        "effects": [{"name": e.name, "place": asdict(place)} for e, place in twin.effects],
+        "effects": [_effect(e, place) for e, place in twin.effects],
         "theta": twin.theta.tolist(),
         "values": twin.values(),
     }
 
 
 def from_dict(data: dict) -> Twin:
-    """The twin that `to_dict` wrote."""
+    """The twin that `to_dict` wrote.
+
+    Raises InputError where it has an effect of a user's file that this process does not know.
+    """
     return Twin(
         _rig(data["rig"]),
         [OperatingCondition(label) for label in data["recordings"]],
         friction=data["friction"],
-        effects=[(EFFECTS[e["name"]], Place(**e["place"])) for e in data["effects"]],
+        effects=[
+            (find_effect(e["name"], e.get("file")), Place(**e["place"])) for e in data["effects"]
+        ],
         source_sd=data["source_sd"],
         guessed_load=data["guessed_load"],
         uncertain_pump=data.get("uncertain_pump", False),
         theta=np.array(data["theta"]),
     )
+
+
+def _effect(effect: Effect, place: Place) -> dict:
+    """An effect at its place; of a user's effect also the name of its file."""
+    data = {"name": effect.name, "place": asdict(place)}
+    return data if effect.file is None else {**data, "file": Path(effect.file).name}
 
 
 def _rig(data: dict) -> Rig:
@@ -85,13 +97,19 @@ def load_covariance(path: str | Path) -> np.ndarray | None:
     return np.array(data["covariance"]) if "covariance" in data else None
 
 
-def load_twin(path: str | Path) -> Twin:
+def load_twin(path: str | Path, effects: Iterable[str | Path] = ()) -> Twin:
     """The twin of a twin.json, that of a calibration or the corrected one of `explain`.
 
-    Raises InputError where the file cannot be read or holds no twin.
+    effects   users' files that define effects of the twin
+
+    Raises InputError where the file cannot be read, holds no twin, or has an effect of a user's
+    file that is not given.
     """
+    add_effects(effects)
     try:
         return twin_of(json.loads(Path(path).read_text()))
+    except InputError as error:
+        raise InputError(path, error.field, error.problem, error.remedy) from None
     except OSError as error:
         problem = f"cannot be read ({error.strerror})"
     except (ValueError, KeyError, TypeError) as error:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import pkgutil
 from collections.abc import Sequence
 from itertools import combinations
 from pathlib import Path
 
+from rippletwin.case.python_file import read_object
 from rippletwin.diagnosis import faults
 from rippletwin.diagnosis.faults.base import Fault
 from rippletwin.errors import InputError
@@ -50,31 +50,7 @@ def select_faults(asked: Sequence[str | Path] = ()) -> tuple[Fault, ...]:
 
 def read_fault(path: str | Path) -> Fault:
     """The `FAULT` of a user's Python file; raises InputError where there is none."""
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(
-            path,
-            "--faults",
-            "neither a known fault nor a file",
-            f"Give a Python file that defines FAULT, or one of {', '.join(FAULTS)}",
-        )
-    spec = importlib.util.spec_from_file_location(f"fault_of_{path.stem}", path)
-    if spec is None:
-        raise InputError(path, "--faults", "no Python file", "Its name must end in .py")
-    module = importlib.util.module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:  # a user's code may raise anything
-        raise InputError(path, "FAULT", f"the file fails: {error!r}", "Correct it") from error
-    fault = getattr(module, "FAULT", None)
-    if not isinstance(fault, Fault):
-        raise InputError(
-            path,
-            "FAULT",
-            "missing, or no Fault",
-            "Define FAULT = rippletwin.diagnosis.faults.base.Fault(...)",
-        )
-    return fault
+    return read_object(path, "FAULT", Fault, "--faults", ", ".join(FAULTS))
 
 
 def states_of(chosen: Sequence[Fault]) -> tuple[tuple[Fault, ...], ...]:

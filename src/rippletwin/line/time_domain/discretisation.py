@@ -14,15 +14,24 @@ import numpy as np
 from rippletwin.line.time_domain.line_elements import Element, Pipe, TimeDomainLine, capacitance
 
 MIN_CELLS = 3  # of a pipe; a shorter piece becomes a pi section
+MAX_PREWARPED = 0.5  # rad a half step: a faster resonance is hardly resolved
 SAME_POSITION = 1e-9  # m: positions closer than this are the same
 
 
 def bilinear(element: Element, dt: float) -> np.ndarray:
     """(b0, b1, b2, a1, a2) of the element at steps of `dt` by the trapezoidal rule.
 
-    s = (2/dt)(z - 1)/(z + 1) keeps what is passive passive, hence stable (Dahlquist 1963).
+    s = (2/dt)(z - 1)/(z + 1) keeps what is passive passive, hence stable (Dahlquist 1963). It would
+    lower a resonance w to (2/dt) arctan(w dt/2): the coefficient of s^2 is divided by so much that
+    the resonance stays, and all that is slower than it.
     """
     degree = max(len(element.numerator), len(element.denominator)) - 1
+    numerator, denominator = element.numerator, list(element.denominator)
+    if len(denominator) == 3:
+        square, bend, stiff = denominator
+        turn = 0.5 * dt * np.sqrt(stiff / square)
+        if bend**2 < 4.0 * square * stiff and turn < MAX_PREWARPED:
+            denominator[0] *= (turn / np.tan(turn)) ** 2
 
     def in_z(coefficients):
         total = np.zeros(degree + 1)
@@ -31,7 +40,7 @@ def bilinear(element: Element, dt: float) -> np.ndarray:
             total += c * (2.0 / dt) ** power * term
         return np.append(total, np.zeros(2 - degree))
 
-    b, a = in_z(element.numerator), in_z(element.denominator)
+    b, a = in_z(numerator), in_z(denominator)
     return np.array([*b / a[0], *a[1:] / a[0]])
 
 

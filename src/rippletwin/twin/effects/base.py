@@ -30,14 +30,17 @@ class Place:
              "sensor p1"
     index    of the segment or sensor, from 0; None elsewhere
     form     the variant where an effect has several equations, else None
+    number   which of several of one effect at free positions, from 1
     """
 
     element: str
     index: int | None = None
     form: str | None = None
+    number: int = 1
 
     def __str__(self) -> str:
-        return self.element if self.form is None else f"{self.element} ({self.form})"
+        form = "" if self.form is None else f" ({self.form})"
+        return f"{self.element}{form}" + (f" {self.number}" if self.number > 1 else "")
 
 
 @dataclass
@@ -106,11 +109,15 @@ class Effect:
     places      rig -> tuple of Place
     apply       (network: FrequencyDomainLine, state: LineState, values: name -> value, place)
                 mutates the network
-    apply_in_time   (line: TimeDomainLine, state: LineState, values, place) mutates the line
+    apply_in_time   (line: TimeDomainLine, state: LineState, values, place) mutates the line; None
+                where the time domain follows from `apply` (`rippletwin.twin.time_domain_form`)
     named       False for a passive network that represents physics without a name
     certain     always present in real lines: accepted with any other effect unless the data
                 contradict it
     friction    law by which it replaces the line's, as in `series_impedance`
+    limits      (name, form) of effects that this one becomes at a limit of its parameters or at an
+                end of the line; what those are limits of, it is too
+    file        the user's file that defines it; None in the library
     """
 
     name: str
@@ -121,10 +128,12 @@ class Effect:
     parameters: Callable[[object, Place], tuple[Parameter, ...]]
     places: Callable[[object], tuple[Place, ...]]
     apply: Callable[[object, LineState, Mapping[str, object], Place], None]
-    apply_in_time: Callable[[object, LineState, Mapping[str, float], Place], None]
+    apply_in_time: Callable[[object, LineState, Mapping[str, float], Place], None] | None = None
     certain: bool = False
     named: bool = True
     friction: str | None = None
+    limits: tuple[tuple[str, str | None], ...] = ()
+    file: str | None = None
 
     def suits(self, rig) -> bool:
         """Whether the effect exists in the rig's medium."""
