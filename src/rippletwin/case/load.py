@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +30,11 @@ SAMPLED = ("periodic", "random")
 SMALLEST_MEAN = 1e-6  # of the largest flow; a smaller mean is none
 
 
-def load_case(folder: str | Path, states: Collection[str] | None = None) -> Case:
+def load_case(
+    folder: str | Path,
+    states: Collection[str] | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Case:
     """Read and check a case.
 
     Parameters
@@ -38,6 +42,7 @@ def load_case(folder: str | Path, states: Collection[str] | None = None) -> Case
     folder : holds rig.yaml and the files it names; or that rig.yaml.
     states : read only recordings of these states (labels of rig.yaml, e.g. {"healthy"}); all where
         None. The sheet is checked whole in any case.
+    progress : called with "reading", how many recordings have been read, and of how many.
 
     Raises
     ------
@@ -52,13 +57,14 @@ def load_case(folder: str | Path, states: Collection[str] | None = None) -> Case
     raise_any([*faults(sheet_path, sheet), *missing_files(sheet_path, sheet)])
     rig = rig_of(folder, sheet)
     recordings, errors = [], []
-    for entry in sheet["recordings"]:
-        if states is not None and entry["state"] not in states:
-            continue
+    chosen = [e for e in sheet["recordings"] if states is None or e["state"] in states]
+    for done, entry in enumerate(chosen, 1):
         try:
             recordings.append(_recording(folder, entry, rig))
         except InputError as error:
             errors.append(error)
+        if progress is not None:
+            progress("reading", done, len(chosen))
     raise_any(errors)
     warnings = unusual_values(sheet_path, sheet)
     return Case(folder=folder, rig=rig, recordings=tuple(recordings), warnings=tuple(warnings))

@@ -28,6 +28,7 @@ from rippletwin.explanation.verdict.next_experiment import (
 from rippletwin.explanation.verdict.places import element_and_extent, stretch_between_sensors
 from rippletwin.explanation.verdict.summary_text import summary_text
 from rippletwin.twin import twin_file
+from rippletwin.twin.effects.library import generalisations
 
 WIDE_INTERVAL = 0.15  # of the line's length; a wider one asks for one more sensor
 NOTHING_MISSING = ("consistent", "calibration_only")
@@ -73,6 +74,7 @@ def _line_effects(e: Explanation, entries: list[dict]) -> list[dict]:
             "element": entry["place"].element,
             "parameters": entry["parameters"],
             "probability": probabilities[entry["effect"].name],
+            "limit_of": generalisations(entry["effect"], entry["place"]),
         }
         for entry in entries
         if entry["effect"].named
