@@ -46,7 +46,7 @@ def test_only_the_band_is_fitted(tmp_path):
 
 
 def test_a_band_without_anything_is_bad_input(tmp_path):
-    """Ends in the wrong order, in the sheet or beside the command line, and a band between lines."""
+    """Ends in the wrong order, in the sheet or beside the command line; a band between lines."""
     with pytest.raises(InputError) as caught:
         load_case(banded(tmp_path, min_frequency_hz=900.0, max_frequency_hz=500.0))
     told(caught.value, "rig.yaml", "recordings[0].min_frequency_hz", "not below")

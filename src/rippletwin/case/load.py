@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +39,7 @@ SMALLEST_MEAN = 1e-6  # of the largest flow; a smaller mean is none
 def load_case(
     folder: str | Path,
     states: Collection[str] | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
     band_hz: tuple[float | None, float | None] = (None, None),
 ) -> Case:
     """Read and check a case.
@@ -48,6 +49,7 @@ def load_case(
     folder : holds rig.yaml and the files it names; or that rig.yaml.
     states : read only recordings of these states (labels of rig.yaml, e.g. {"healthy"}); all where
         None. The sheet is checked whole in any case.
+    progress : called with "reading", how many recordings have been read, and of how many.
     band_hz : lowest and highest frequency to use of every recording, within its own band.
 
     Raises
@@ -63,13 +65,14 @@ def load_case(
     raise_any([*faults(sheet_path, sheet), *missing_files(sheet_path, sheet)])
     rig = rig_of(folder, sheet)
     recordings, errors = [], []
-    for entry in sheet["recordings"]:
-        if states is not None and entry["state"] not in states:
-            continue
+    chosen = [e for e in sheet["recordings"] if states is None or e["state"] in states]
+    for done, entry in enumerate(chosen, 1):
         try:
             recordings.append(narrow_band(_recording(folder, entry, rig), *band_hz))
         except InputError as error:
             errors.append(error)
+        if progress is not None:
+            progress("reading", done, len(chosen))
     raise_any(errors)
     warnings = [*unusual_values(sheet_path, sheet), *band_warnings(rig, recordings)]
     return Case(folder=folder, rig=rig, recordings=tuple(recordings), warnings=tuple(warnings))

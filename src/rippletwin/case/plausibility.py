@@ -119,8 +119,20 @@ def implausible_values(path: Path, sheet: dict) -> list[InputError]:
 
 
 def unusual_values(path: Path, sheet: dict) -> list[str]:
-    """A line of text for every value of a sheet that is possible, but unusual."""
-    return [warning for _, found in _compared(path, sheet) for warning in found]
+    """A line of text for every value of a sheet that is possible, but unusual, or is missed."""
+    values = [warning for _, found in _compared(path, sheet) for warning in found]
+    return values + _generic_pump(sheet)
+
+
+def _generic_pump(sheet: dict) -> list[str]:
+    """The warning of a sheet that gives no more of its pump than the number of pistons."""
+    kinds = {entry.get("kind", "periodic") for entry in entries(sheet, "recordings")}
+    if "periodic" not in kinds or set(mapping(sheet, "pump")) - {"pistons"}:
+        return []
+    return [
+        "pump: only pistons is given, so that faults are those of a generic pump of 42 cm3 per "
+        "revolution; give piston_diameter, pitch_radius and swash_angle_deg"
+    ]
 
 
 def _compared(path: Path, sheet: dict) -> Iterator[tuple[list[InputError], list[str]]]:
