@@ -75,7 +75,11 @@ def test_value_that_is_possible_but_unusual(tmp_path, name):
     """Possible values are read, and a warning names the field."""
     field, value, words = WARNINGS[name]
     spoilt(tmp_path, lambda c: put(c, field, value))
-    (warning,) = (w for w in load_case(tmp_path).warnings if not w.startswith("pump: "))
+    (warning,) = (
+        w
+        for w in load_case(tmp_path).warnings
+        if not w.startswith("pump: ") and "travel too" not in w
+    )
     assert warning.startswith(field) and words in warning
 
 
