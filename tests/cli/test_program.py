@@ -37,6 +37,11 @@ OPTIONS = {
 }
 
 
+def known_pump(content):
+    """Give the sheet a pump of its own, so that no warning is told."""
+    content["pump"]["piston_diameter"] = 0.017
+
+
 @pytest.mark.parametrize("name", OPTIONS)
 def test_option_that_makes_no_sense(tmp_path, capsys, name):
     """Refused with exit code 2 before the case is even read: there is none in this folder."""
@@ -110,7 +115,7 @@ def test_warnings_are_told(tmp_path, capsys):
 def test_interrupt_ends_without_a_traceback(tmp_path, capsys, monkeypatch):
     """Ctrl-C is exit code 130 and nothing is printed."""
 
-    def interrupted(*_):
+    def interrupted(*_, **__):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("rippletwin.case.load.load_case", interrupted)
@@ -141,7 +146,7 @@ sys.exit(main(["explain", sys.argv[1], "--out", sys.argv[1] + "/out"]))
 
 def test_interrupt_ends_the_fitting_processes_too(tmp_path):
     """Ctrl-C reaches every process of the terminal; none of them prints a traceback."""
-    write_case(tmp_path, sheet())
+    spoilt(tmp_path, known_pump)
     run = subprocess.Popen(
         [sys.executable, "-c", FITS, str(tmp_path)],
         stdout=subprocess.PIPE,
@@ -158,7 +163,7 @@ def test_interrupt_ends_the_fitting_processes_too(tmp_path):
 
 def test_reader_that_leaves_ends_without_a_traceback(tmp_path):
     """rippletwin check CASE | head -1"""
-    write_case(tmp_path, sheet())
+    spoilt(tmp_path, known_pump)
     run = subprocess.Popen(
         [sys.executable, "-m", "rippletwin", "check", str(tmp_path)],
         stdout=subprocess.PIPE,
@@ -194,7 +199,7 @@ def test_json_is_all_that_is_printed(tmp_path, capsys):
 
 def test_fail_on_a_warning(tmp_path, capsys):
     """Exit code 3 only where a warning is told and --fail-on names it."""
-    write_case(tmp_path, sheet())
+    spoilt(tmp_path, known_pump)
     assert main(["check", str(tmp_path), "--fail-on", "warning"]) == 0
     spoilt(tmp_path, lambda c: c["line"]["segments"][0].update(wave_speed=150))
     assert main(["check", str(tmp_path)]) == 0

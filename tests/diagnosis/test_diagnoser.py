@@ -126,7 +126,8 @@ def test_the_file_has_the_contract_s_keys(diagnoses):
 
 
 def test_both_pictures_of_every_state_are_written(diagnoses, tmp_path):
-    """Also of a recording that is unlike all states, and of the healthy one, which has no leak."""
+    """Also of a recording that is unlike all states, and of the healthy one, which has no leak;
+    and the numbers behind them."""
     written = fault_posterior.draw(list(diagnoses.values()), tmp_path, [".svg"])
-    assert len(written) == 2 * len(STATES)
+    assert len(written) == 2 * len(STATES) + 1
     assert all(path.stat().st_size > 1000 for path in written)

@@ -51,6 +51,10 @@ NOT_RUN = {
         "test -s workflow/rippletwin.def",
     ),
     "snakemake --report report.zip": ("it needs a finished run", "snakemake --help"),
+    "python docs/figures/report.py my_case/report.html": (
+        "it needs a browser",
+        "python docs/figures/report.py --help",
+    ),
     "python benchmarks/measured_tube.py RUN_1 RUN_2 tube": (
         "the measurements are not part of the project",
         "python benchmarks/measured_tube.py --help",

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from made_fits import made_fit
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.frequency_continuation import refine
 from rippletwin.explanation.verdict.candidate_recordings import candidate_recordings
@@ -122,10 +123,7 @@ def test_gains_of_two_sensors_are_one_class():
     """Places of one effect with nearly equal evidence are a class; another effect is not in it."""
 
     def fit(name, sensor, evidence):
-        pair = (EFFECTS[name], Place(f"sensor {sensor}"))
-        return SimpleNamespace(
-            hypothesis=(pair,), names=(name,), evidence=evidence, without=lambda k: ()
-        )
+        return made_fit(evidence, (EFFECTS[name], Place(f"sensor {sensor}")))
 
     best = fit("sensor_gain", "p1", 100.0)
     others = [fit("sensor_gain", "p2", 99.0), fit("sensor_delay", "p2", 10.0)]

@@ -8,7 +8,10 @@ import pytest
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor, Uncertainty
 from rippletwin.explanation.explain import explain_observations
 from rippletwin.explanation.verdict.verdict_file import verdict_dict
-from rippletwin.figures.explanation import plot_ripple
+from rippletwin.figures import explained_numbers
+from rippletwin.figures.explanation import draw
+from rippletwin.report.charts import chart_residuals, chart_ripples
+from rippletwin.report.svg import draw_chart
 from rippletwin.spectra.observation import Observation
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
@@ -81,10 +84,10 @@ def synthetic(kind, source, fluid, load, effect):
 @pytest.mark.parametrize(
     "case", [pytest.param(c, marks=() if c in CHEAP else pytest.mark.long) for c in CASES]
 )
-def test_each_kind_is_explained_end_to_end(case, monkeypatch):
+def test_each_kind_is_explained_end_to_end(case, monkeypatch, tmp_path):
     """The true effect is named against a competing one, and the misfit falls to less than half.
 
-    The verdict and the figure of the ripple are made for every kind of observation."""
+    Verdict, figures and charts of the page are made for every kind of observation."""
     *kind, effect, rival = CASES[case]
     library = [effect, rival]
     monkeypatch.setattr(
@@ -96,4 +99,8 @@ def test_each_kind_is_explained_end_to_end(case, monkeypatch):
     named = {e["name"] for e in result["effects"]}
     assert effect[0].name in named, (result["verdict"], result["sentence"])
     assert result["fit"]["after"]["in_sample"] < 0.5 * result["fit"]["before"]["in_sample"]
-    assert plot_ripple(explanation) is not None
+    drawn = {path.stem for path in draw(explanation, tmp_path, [".svg"])}
+    assert {"explain", "explain_ripple", "explain_residuals", "explain_evidence"} <= drawn
+    numbers = explained_numbers.load(tmp_path)
+    charts = [draw_chart(each) for each in chart_ripples(numbers) + chart_residuals(numbers)]
+    assert len(charts) == len(numbers.points[0].measured) + 1

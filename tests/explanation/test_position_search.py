@@ -46,10 +46,10 @@ def test_an_effect_at_a_wrong_local_mode_is_moved_to_the_true_one(place):
     theta[k] = known.twin.parameters[k].prior.coordinate(place)
     (wrong,) = workers.fit([FitJob(LEAK, FromTheta(theta))])
     assert wrong.evidence < known.evidence - EQUIVALENT_LOG_BAYES_FACTOR
-    assert abs(positions_of_effects(wrong)["leak"] - 1.7) > 0.1
+    assert abs(positions_of_effects(wrong)["leak@position"] - 1.7) > 0.1
     best, others = move_to_best_position(workers, wrong)
     assert best.evidence == pytest.approx(known.evidence, abs=0.5)
-    assert positions_of_effects(best)["leak"] == pytest.approx(1.7, abs=0.03)
+    assert positions_of_effects(best)["leak@position"] == pytest.approx(1.7, abs=0.03)
     assert others == [] and equivalent_positions(best, others) == ()
 
 
@@ -66,7 +66,7 @@ def test_all_equivalent_positions_of_a_weak_leak_are_stated(monkeypatch, seed):
     assert known.evidence > base.evidence + MIN_LOG_BAYES_FACTOR
     best, others = move_to_best_position(workers, best)
     assert known.evidence - 0.5 < best.evidence < known.evidence + EQUIVALENT_LOG_BAYES_FACTOR
-    positions = [positions_of_effects(f)["leak"] for f in (best, *others)]
+    positions = [positions_of_effects(f)["leak@position"] for f in (best, *others)]
     assert abs(positions[0] - 0.6) > 1.0 and min(abs(x - 0.6) for x in positions) < 0.03
     (names,) = equivalent_positions(best, others)
     assert len(names) == len(positions) > 1 and "leak at 0.6" in " ".join(names)

@@ -20,9 +20,10 @@ from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
 from rippletwin.explanation.verdict.decision import equivalent_effects, equivalent_places
 from rippletwin.twin.effects.base import Place
-from rippletwin.twin.effects.library import EFFECTS
+from rippletwin.twin.effects.library import EFFECTS, generalisations
 from synthetic_observations import rig
 
+BRANCH = (EFFECTS["side_branch"], Place("position"))
 HOSE = (EFFECTS["viscoelastic_wall"], Place("segment 1", 0))
 VOLUME = (EFFECTS["line_volume"], Place("position"))
 VOLUME_AT_LOAD = (EFFECTS["load_volume"], Place("load"))
@@ -62,12 +63,16 @@ def test_every_effect_is_compared_with_its_substitutes():
 
 @pytest.mark.parametrize(
     ("general", "special_cases"),
-    [(VOLUME_AND_PASSAGE, [VOLUME_AT_PUMP]), (VOLUME, [VOLUME_AT_LOAD, VOLUME_AT_PUMP])],
+    [
+        (VOLUME_AND_PASSAGE, [VOLUME_AT_PUMP]),
+        (VOLUME, [VOLUME_AT_LOAD, VOLUME_AT_PUMP]),
+        (BRANCH, [VOLUME, VOLUME_AT_LOAD, VOLUME_AT_PUMP]),
+    ],
 )
 @pytest.mark.parametrize("cost", [MIN_LOG_BAYES_FACTOR - 1, MIN_LOG_BAYES_FACTOR + 1])
 def test_a_general_effect_needs_evidence_over_its_special_cases(general, special_cases, cost):
-    """A passage beside a volume at the pump, and a position of its own for a volume, are kept only
-    if they add MIN_LOG_BAYES_FACTOR."""
+    """A passage beside a volume at the pump, a position of its own for a volume, and a branch that
+    could be one, are kept only if they add MIN_LOG_BAYES_FACTOR."""
     best, asked = made_fit(100.0, HOSE, general), []
 
     def fit(jobs):
@@ -77,9 +82,43 @@ def test_a_general_effect_needs_evidence_over_its_special_cases(general, special
     workers = SimpleNamespace(base=SimpleNamespace(rig=rig()), fit=fit)
     library = [HOSE, VOLUME, VOLUME_AT_LOAD, VOLUME_AT_PUMP, VOLUME_AND_PASSAGE]
     simplified = simplify_effects(workers, best, library)
-    assert asked == [(HOSE, special) for special in special_cases]
-    kept = special_cases[0] if cost < MIN_LOG_BAYES_FACTOR else general
-    assert simplified.hypothesis == (HOSE, kept)
+    assert asked[: len(special_cases)] == [(HOSE, special) for special in special_cases]
+    if cost > MIN_LOG_BAYES_FACTOR:
+        assert simplified.hypothesis == (HOSE, general) and len(asked) == len(special_cases)
+    else:
+        assert simplified.hypothesis[1] in special_cases
+
+
+def test_the_general_form_of_an_effect_is_no_other_effect():
+    """A volume at the load that a branch and a volume on the line fit as well is one family, told
+    as such; a hose that fits as well is another effect."""
+    best = made_fit(100.0, VOLUME_AT_LOAD)
+    general = [made_fit(99.0, BRANCH), made_fit(99.0, VOLUME)]
+    assert equivalent_effects(Search(made_fit(0.0), [], best, general)) == ()
+    (names,) = equivalent_effects(Search(made_fit(0.0), [], best, [*general, made_fit(99.0, HOSE)]))
+    assert names == ("load_volume", "viscoelastic_wall")
+    assert set(generalisations(*VOLUME_AT_LOAD)) == {"line_volume", "side_branch"}
+
+
+def test_a_line_may_have_several_of_one_effect(monkeypatch):
+    """Beside a volume another volume is a candidate, with a number of its own, up to four; beside a
+    sensor's gain the gain of another sensor, and not its own again."""
+    monkeypatch.setattr(stepwise_moves, "NearFit", lambda fit: None)
+    gains = [(EFFECTS["sensor_gain"], Place(f"sensor p{k}", k - 1)) for k in (1, 2)]
+    asked = []
+
+    def fit(jobs, report=None):
+        asked.extend(job.hypothesis for job in jobs)
+        return [made_fit(1.0, *job.hypothesis) for job in jobs]
+
+    workers = SimpleNamespace(base=SimpleNamespace(rig=rig()), fit=fit)
+    fit_extensions(workers, made_fit(0.0, VOLUME, gains[0]), [VOLUME, *gains], None)
+    second = (VOLUME[0], Place("position", number=2))
+    assert asked == [(VOLUME, gains[0], second), (VOLUME, gains[0], gains[1])]
+    asked.clear()
+    four = [(VOLUME[0], Place("position", number=n)) for n in (1, 2, 3, 4)]
+    fit_extensions(workers, made_fit(0.0, *four), [VOLUME], None)
+    assert asked == []
 
 
 @pytest.mark.parametrize(("model_error", "is_asked"), [(0.004, False), (0.3, True)])

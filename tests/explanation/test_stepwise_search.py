@@ -37,6 +37,29 @@ def test_the_search_accepts_no_effect_if_nothing_is_missing(small_library):
     assert search.log_bayes_factor(search.single_effect_fits[0]) < MIN_LOG_BAYES_FACTOR
 
 
+@pytest.mark.long
+def test_two_volumes_are_found_at_their_places(small_library):
+    """Of two volumes in a line both are named, each within 10 cm of where it is and 20 % of its
+    size; one volume alone is rejected for the two."""
+    two = (VOLUME, (VOLUME[0], Place("position", number=2)))
+    values = {
+        "line_volume@position.position": 1.7,
+        "line_volume@position.volume": 6e-5,
+        "line_volume@position 2.position": 5.2,
+        "line_volume@position 2.volume": 9e-5,
+    }
+    bench, observations, _ = make(np.random.default_rng(8), two, values)
+    search = search_effects(Workers(Twin(bench, observations), observations))
+    assert search.best.names == ("line_volume", "line_volume")
+    found = search.best.twin.values()
+    at = sorted(
+        (found[f"line_volume@{p}.position"], found[f"line_volume@{p}.volume"])
+        for _, p in search.best.hypothesis
+    )
+    np.testing.assert_allclose([x for x, _ in at], [1.7, 5.2], atol=0.1)
+    np.testing.assert_allclose([v for _, v in at], [6e-5, 9e-5], rtol=0.2)
+
+
 def test_the_search_names_the_effect_and_it_holds_on_held_out_points(small_library):
     """A sensor's gain is discriminated from a hose and a volume, and transfers to unseen points.
 

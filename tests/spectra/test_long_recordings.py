@@ -5,8 +5,12 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from case_folders import RATE, ripple
-from rippletwin.spectra import speed_regression
+from case_folders import RATE, ripple, sheet, write_case
+from rippletwin.case import speed_estimate
+from rippletwin.case.load import load_case
+from rippletwin.case.model import Recording
+from rippletwin.case.signal_checks import longest_run, signal_errors
+from rippletwin.spectra import case_summary, noise, speed_regression
 from rippletwin.spectra.angular_resampling import cut_revolutions
 from rippletwin.spectra.speed_regression import (
     MAX_BLOCK_REVOLUTIONS,
@@ -86,3 +90,64 @@ def test_cutting_takes_memory_in_proportion_to_the_recording():
     finally:
         tracemalloc.stop()
     assert peak < 7 * pressure.nbytes
+
+
+@pytest.fixture
+def long_recording(monkeypatch):
+    """40 s at 1000 r/min, of which a quarter is analysed: blocks are smaller than they are."""
+    monkeypatch.setattr(case_summary, "MAX_ANALYSED_REVOLUTIONS", 100)
+    monkeypatch.setattr(speed_estimate, "BLOCK_SAMPLES", 2**17)
+    monkeypatch.setattr(noise, "BLOCK_SAMPLES", 2**17)
+    pressure = ripple(40.0).astype(np.float32)
+    return Recording(
+        file=None, kind="periodic", state="healthy", label="long", speed_rpm=1000.0,
+        load_pressure=9.5e6, sampling_rate_hz=RATE, pressure=pressure,
+    )  # fmt: skip
+
+
+def test_the_middle_of_a_long_recording_is_analysed(tmp_path, long_recording):
+    """Truth: 1 kPa of noise, five piston harmonics, 1000 r/min. All samples are counted, 100
+    revolutions are analysed, and memory grows by no more than the recording itself."""
+    write_case(tmp_path, sheet())
+    rig = load_case(tmp_path).rig
+    tracemalloc.start()
+    try:
+        assert signal_errors(long_recording, rig) == []
+        found, observation = case_summary.summarise_recording(long_recording, rig)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert found["revolutions"] == pytest.approx(40 * 1000 / 60, abs=1)
+    assert 95 <= found["analysed_revolutions"] <= 105
+    assert found["speed_rpm"] == pytest.approx(1000, abs=0.1)
+    assert found["speed_range_rpm"] == pytest.approx([1000, 1000], abs=2)
+    for sensor in found["sensors"]:
+        assert sensor["noise_pa"] == pytest.approx(1e3, rel=0.03)
+        assert sensor["piston_harmonics"][0] == 5
+        assert sensor["mean_pa"] == pytest.approx(9.5e6, abs=10)
+    assert observation.values.shape[0] == 2
+    assert peak < 4 * long_recording.pressure.nbytes
+
+
+def test_a_speed_that_changes_is_seen_outside_the_middle(tmp_path, long_recording):
+    """The first eighth of the recording turns 2 % slower: the range says so."""
+    write_case(tmp_path, sheet())
+    rig = load_case(tmp_path).rig
+    slow = ripple(5.0, speed_hz=0.98 * 1000 / 60)
+    long_recording.pressure[:, : slow.shape[1]] = slow
+    found, _ = case_summary.summarise_recording(long_recording, rig)
+    assert found["speed_range_rpm"] == pytest.approx([980, 1000], abs=2)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_longest_run_is_that_of_a_plain_count(seed):
+    """Independent truth: every run counted. Values are few, so that grid points often agree."""
+    rng = np.random.default_rng(seed)
+    row = rng.integers(0, 3, 5000).astype(float)
+    for start, length in ((rng.integers(4000), 300), (4970, 30), (0, 40)):
+        row[start : start + length] = 1.0
+    edges = np.flatnonzero(np.diff(row, prepend=np.nan, append=np.nan))
+    runs = np.diff(edges)
+    assert longest_run(row, 32) == (edges[np.argmax(runs)], runs.max())
+    assert longest_run(row, 5000) == (0, 0)
+    assert longest_run(np.ones(5000), 32) == (0, 5000)

@@ -181,6 +181,19 @@ def test_short_branch_is_a_volume():
     np.testing.assert_allclose(readings[0][low], readings[1][low], rtol=2e-2)
 
 
+def test_a_leaking_pump_drives_a_matched_line_less():
+    """Into its characteristic impedance Zc the pump's flow Q makes p = Q/(1/Zc + G): the leakage is
+    a resistance parallel to the line (Kirchhoff)."""
+    base, leakage = rig(), 3e-11
+    one = Rig(base.fluid, base.pump, base.line[:1], base.sensors[:1], base.load)
+    net, state = network(one, friction="none")
+    zc = 870.0 * 1020.0 / state.area(0)
+    net.load = "impedance", np.full(len(S), zc)
+    place = Place("source", form="leakage")
+    EFFECTS["source_impedance"].apply(net, state, {"conductance": leakage}, place)
+    np.testing.assert_allclose(np.abs(net.readings()), 1.0 / (1.0 / zc + leakage), rtol=1e-9)
+
+
 def test_an_orifice_passes_what_a_leak_leaves():
     """A laminar leak G takes G p of the mean flow Q; the orifice then passes q = Q - G p, and the
     slope of its square law at p is q/(2 p)."""

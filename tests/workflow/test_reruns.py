@@ -21,6 +21,7 @@ TESTED_AGAIN = {
     "recording_table",
     "report_compound",
     "report_cost",
+    "report_page",
     "plot_accuracy",
     "plot_confusion",
 }

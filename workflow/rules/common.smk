@@ -46,6 +46,13 @@ RIG, SHEET = (
 CASE = os.path.dirname(RIG)
 
 
+# whether a recording's state is to be told, or to be checked
+DIAGNOSED_HERE = RECORDED_HERE or any(
+    entry["state"] != "healthy" and entry.get("kind", "periodic") == "periodic"
+    for entry in SHEET["recordings"]
+)
+
+
 def recordings():
     """The case's files besides rig.yaml: one folder where the virtual rig makes them."""
     if RECORDED_HERE:

@@ -9,6 +9,7 @@ def get_final_output():
     wanted = [
         rules.accuracy_table.output,
         rules.recording_table.output,
+        rules.report_page.output,
         rules.claims.output,
         rules.plot_accuracy.output,
         rules.plot_calibration.output,
@@ -162,6 +163,14 @@ def cylinder_class_of(wildcards):
 
 
 # ---- tables ----
+
+
+def shown_attention():
+    """Pictures of attention on the page: of the first simulated dataset, on time windows."""
+    if not SIMULATED or not of_domain("time"):
+        return []
+    name = f"{RESULTS}/figures/attention_{SIMULATED[0]}_time_{{windows}}.png"
+    return expand(name, windows=["simulated", "recorded"])
 
 
 def table_columns():

@@ -84,3 +84,35 @@ rule report_cost:
         pairs=corrected_pairs(),
     script:
         "../scripts/report_cost.py"
+
+
+# One page of everything: snakemake --cores 2 results/report.html
+rule report_page:
+    input:
+        rig=rig_sheet(),
+        recordings=recordings(),
+        verdict=rules.explain.output.verdict,
+        twin=rules.explain.output.twin,
+        explained=rules.explain.output.figures,
+        diagnosis=rules.diagnose.output if DIAGNOSED_HERE else [],
+        table=rules.accuracy_table.output.table,
+        paper=PAPER,
+        attention=shown_attention(),
+        source=scripts_sources("report_page.py"),
+    output:
+        report(
+            f"{RESULTS}/report.html",
+            category="summary",
+            caption="../report/page.rst",
+        ),
+    log:
+        f"{RESULTS}/logs/report_page.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/report_page.tsv"
+    params:
+        rig=rig_sections("fluid", "pump", "line", "sensors", "load", "recordings"),
+        recordings="the virtual rig's" if RECORDED_HERE else f"those of {CASE}",
+        benchmarks=f"{RESULTS}/benchmarks",
+        configuration=config,
+    script:
+        "../scripts/report_page.py"

@@ -161,18 +161,46 @@ def _longest_flat(recording: Recording, rig: Rig) -> int:
 
 
 def _stuck(path: Path, name: str, row: np.ndarray, longest: int) -> InputError | None:
-    changes = np.flatnonzero(np.diff(row)) + 1
-    edges = np.concatenate([[0], changes, [row.size]])
-    runs = np.diff(edges)
-    if runs.max() <= longest:
+    start, length = longest_run(row, longest)
+    if length <= longest:
         return None
-    start = edges[np.argmax(runs)]
     return InputError(
         path,
         name,
-        f"stuck at {row[start]:g} for {runs.max()} samples from sample {start}",
+        f"stuck at {row[start]:g} for {length} samples from sample {start}",
         "Check the sensor and its cable, or take it out of `sensors`",
     )
+
+
+def longest_run(row: np.ndarray, shortest: int) -> tuple[int, int]:
+    """(first sample, length) of the longest run of one value; (0, 0) where none exceeds `shortest`.
+
+    Such a run holds two neighbours of every grid that is at most half as wide. Only where these are
+    equal is every sample between them compared.
+    """
+    step = max(shortest // 2, 1)
+    points = row[::step]
+    best = (0, 0)
+    for k in np.flatnonzero(points[1:] == points[:-1]):
+        if k * step < best[0] + best[1] or not np.all(row[k * step : (k + 1) * step] == points[k]):
+            continue
+        start, end = _first_other(row[: k * step][::-1], points[k]), k * step
+        length = start + _first_other(row[end:], points[k])
+        if length > max(best[1], shortest):
+            best = (int(end - start), int(length))
+    return best
+
+
+def _first_other(row: np.ndarray, value: float) -> int:
+    """How many samples at the beginning of `row` have this value."""
+    size = 1024
+    while True:
+        other = np.flatnonzero(row[:size] != value)
+        if other.size:
+            return int(other[0])
+        if size >= len(row):
+            return len(row)
+        size *= 4
 
 
 def _clipped(path: Path, name: str, row: np.ndarray) -> InputError | None:
@@ -186,9 +214,11 @@ def _clipped(path: Path, name: str, row: np.ndarray) -> InputError | None:
         count = int(np.count_nonzero(at))
         if count < 10 or not np.any(at[2:] & at[1:-1] & at[:-2]):
             continue
-        rest = row[~at]
-        neighbour = rest.max() if side == "top" else rest.min()
-        if count > 5 * np.count_nonzero(rest == neighbour):
+        if side == "top":
+            neighbour = np.max(row, where=~at, initial=-np.inf)
+        else:
+            neighbour = np.min(row, where=~at, initial=np.inf)
+        if count > 5 * np.count_nonzero(row == neighbour):
             return InputError(
                 path,
                 name,

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.fft import rfft
 
 HARMONICS = 12  # of the nominal speed; every candidate is seen up to the same frequency
 SEARCH = (0.5, 2.0)
 CONTRAST = 5.0
+BLOCK_SAMPLES = 2**19  # transformed at once; of it half a minute is seen at 20 kHz
 
 
 def estimate_speed(
@@ -40,12 +42,21 @@ def estimate_speed(
 
 
 def _spectrum(pressure: np.ndarray, sampling_rate_hz: float) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (F,) and power (F,) over all sensors.
+
+    A long recording is transformed in blocks whose powers are added (Welch 1967, IEEE Trans. Audio
+    Electroacoust. 15, 70, without overlap), so that memory does not grow with it.
+    """
     samples = pressure.shape[1]
-    window = np.hanning(samples)
-    power = np.zeros(samples // 2 + 1)
+    blocks = max(samples // BLOCK_SAMPLES, 1)
+    size = samples // blocks
+    window = np.hanning(size)
+    power = np.zeros(size // 2 + 1)
     for row in pressure:
-        power += np.abs(np.fft.rfft((row - np.mean(row)) * window)) ** 2
-    return np.fft.rfftfreq(samples, 1 / sampling_rate_hz), power
+        for start in range(0, blocks * size, size):
+            block = row[start : start + size]
+            power += np.abs(rfft((block - np.mean(block, dtype=float)) * window)) ** 2
+    return np.fft.rfftfreq(size, 1 / sampling_rate_hz), power
 
 
 def _band_power(frequency, power, centre, relative_width):

@@ -23,19 +23,46 @@ def command(case: Path, fail_on: tuple[str, ...], as_json: bool) -> int:
     from rippletwin.case.load import load_case
     from rippletwin.spectra import case_summary
 
-    read = load_case(case)
+    with progress_bars(as_json, passing=True) as progress:
+        read = load_case(case, progress=progress)
     warn(read.warnings)
     summary = case_summary.summarise_rig(read)
     if not as_json:
         print("\n".join(case_summary.rig_in_words(summary)), flush=True)
-    summary["recordings"] = []
+    summary["recordings"], healthy = [], []
     # one thread: the matrices are small, and threads only wait for each other
     with threadpool_limits(1), progress_bars(as_json, passing=True) as progress:
         for recording in read.recordings:
-            found = case_summary.summarise_recording(recording, read.rig, progress)
+            found, observation = case_summary.summarise_recording(recording, read.rig, progress)
             summary["recordings"].append(found)
+            healthy += [observation] * (recording.state == "healthy")
             if not as_json:
                 print("\n".join(case_summary.recording_in_words(found)), flush=True)
+        effects = _effects(read.rig, healthy, progress)
+    summary["effects"] = [effect.as_dict() for effect in effects]
     if as_json:
         print(json.dumps(summary))
+    else:
+        _print_outlook(effects, summary["advice"])
     return found_code(["warning"] if read.warnings else [], fail_on)
+
+
+def _effects(rig, healthy: list, progress) -> list:
+    """What the healthy recordings could tell of each effect of the library."""
+    from rippletwin.case.recording_advice import BAND_HZ
+    from rippletwin.explanation.verdict.expected_confusion import expect_discriminations
+    from rippletwin.spectra.frequency_selection import select_fitted_frequencies
+
+    if not healthy:
+        return []
+    fitted = select_fitted_frequencies(healthy, rig, BAND_HZ)
+    return list(expect_discriminations(rig, fitted, progress))
+
+
+def _print_outlook(effects: list, advice: list[str]) -> None:
+    from rippletwin.explanation.verdict.expected_confusion import in_words
+
+    if effects:
+        print("\n".join(in_words(effects)))
+    for line in advice:
+        print(f"advice: {line}")

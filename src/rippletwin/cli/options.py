@@ -79,6 +79,14 @@ def _out_folder(text: str) -> str:
     return text
 
 
+def _out_file(text: str) -> str:
+    """Raise ValueError where a file of this name could not be written."""
+    if Path(text).is_dir():
+        raise ValueError(f"{text} is a folder, not a file. name a file, such as report.html")
+    _out_folder(str(Path(text).parent) if text.strip() else text)
+    return text
+
+
 FREQUENCY = CheckedValue("HZ", lambda text: number(text, "frequency", "Hz, or leave it out"))
 
 case = click.argument("case", metavar="CASE", type=click.Path(path_type=Path))
@@ -92,6 +100,12 @@ def out(help: str):
     """--out DIR, required."""
     kind = CheckedValue("DIR", _out_folder)
     return click.option("--out", required=True, metavar="DIR", type=kind, help=help)
+
+
+def out_file(help: str):
+    """--out FILE, required."""
+    kind = CheckedValue("FILE", _out_file)
+    return click.option("--out", required=True, metavar="FILE", type=kind, help=help)
 
 
 def processes(purpose: str):

@@ -7,77 +7,105 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 from rippletwin.diagnosis.diagnosis import Diagnosis
-from rippletwin.diagnosis.faults.library import state_name
-from rippletwin.figures import style
+from rippletwin.figures import diagnosed_numbers, style
+from rippletwin.figures.diagnosed_numbers import DiagnosedNumbers
+from rippletwin.figures.quantities import unit_of, write_certainty, write_quantity
+from rippletwin.figures.words import name_state
+
+AREA = unit_of("m2")
+LINES = ("-", "--", "-.")
 
 
 def draw(
     diagnoses: Sequence[Diagnosis], folder: str | Path, suffixes: Sequence[str] = (".png", ".svg")
 ) -> list[Path]:
-    """Write both pictures of each recording into `folder`/figures; returns the paths."""
-    written = []
-    for d in diagnoses:
-        for name, figure in (("change", change(d)), ("severity", severity(d))):
-            paths = [
-                Path(folder) / "figures" / f"diagnose_{d.label}_{name}{suffix}"
-                for suffix in suffixes
-            ]
+    """Write both pictures of each recording into `folder`/figures, and the numbers behind them;
+    returns the paths."""
+    folder = Path(folder)
+    (folder / "figures").mkdir(parents=True, exist_ok=True)
+    numbers = [diagnosed_numbers.gather(d) for d in diagnoses]
+    written = [diagnosed_numbers.save(numbers, folder)]
+    for each in numbers:
+        for name, figure in (("change", plot_change(each)), ("severity", plot_severity(each))):
+            stem = f"diagnose_{each.label}_{name}"
+            paths = [folder / "figures" / f"{stem}{suffix}" for suffix in suffixes]
             style.save(figure, *paths)
             written += paths
     return written
 
 
-def change(d: Diagnosis) -> Figure:
+def plot_change(d: DiagnosedNumbers) -> Figure:
     """Amplitude of the change at each shaft order and sensor, measured and by the most probable
     state, with the error that is allowed for."""
-    model, best = d.model, d.best
-    model.linearise_line(best.mode)
-    parts = model.parts(best.mode)
-    error = np.sqrt(model.variance(parts, best.errors)) / 1e3
-    measured = np.abs(model.values - parts.healthy) / 1e3
-    predicted = np.abs(parts.change) / 1e3
-    sensors = model.line.twin.rig.sensors
-    fig, axes = style.figure(len(measured), 1, height=1.8, sharex=True)
-    for ax, sensor, seen, told, allowed in zip(axes[:, 0], sensors, measured, predicted, error):
-        ax.plot(model.orders, seen, "o", ms=2.5, color=style.MEASURED, label="measured")
-        name = "no change" if not best.state else state_name(best.state)
-        ax.plot(model.orders, told, color=style.CORRECTED, lw=0.8, label=f"predicted: {name}")
-        ax.plot(model.orders, allowed, ":", color=style.NEUTRAL, label="error allowed for")
+    fig, axes = style.figure(len(d.sensors), 1, height=2.0, sharex=True)
+    measured, predicted, allowed = (
+        np.asarray(values) / 1e5 for values in (d.measured, d.predicted, d.allowed)
+    )
+    for k, (ax, sensor) in enumerate(zip(axes[:, 0], d.sensors)):
+        dot = dict(ms=2.5, color=style.MEASURED)
+        ax.plot(d.orders, measured[k], "o", label="measured", **dot)
+        label = f"predicted: {name_state(d.probable)}"
+        ax.plot(d.orders, predicted[k], color=style.ALARM, lw=1.0, label=label)
+        ax.plot(d.orders, allowed[k], ":", color=style.CALIBRATED, label="error allowed for")
         ax.set_yscale("log")
-        ax.set_ylim(0.2 * max(float(np.min(allowed)), 1e-6), 2.0 * float(np.max(seen)))
-        ax.set_ylabel(f"{sensor.name}: change / kPa")
-    axes[0, 0].set_title(f"{d.label}: {d.state}", loc="left")
-    axes[-1, 0].set_xlabel("shaft order")
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside upper right", ncols=3)
+        ax.set_ylim(0.2 * max(float(np.min(allowed)), 1e-8), 2.0 * float(np.max(measured[k])))
+        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        ax.set_ylabel(f"{sensor}: change / bar,\nlogarithmic", fontsize=8)
+    axes[-1, 0].set_xlabel("shaft order (multiples of the speed)")
+    fig.suptitle(f"How does {d.label} differ from the healthy pump?")
+    style.legend_below(fig, axes[0, 0])
     return fig
 
 
-def severity(d: Diagnosis) -> Figure:
+def plot_severity(d: DiagnosedNumbers) -> Figure:
     """Probability of each state, and the density of each leak area of the most probable one."""
-    fig, axes = style.figure(1, 2, height=2.4, width_ratios=(1, 1.4))
-    names = list(d.probabilities)[::-1]
+    fig, axes = style.figure(1, 2, height=2.6, width_ratios=(1, 1.4))
+    states = list(d.probabilities)[::-1]
+    shares = [100 * d.probabilities[name] for name in states]
     ax = axes[0, 0]
-    colours = [style.CORRECTED if n == state_name(d.best.state) else style.NEUTRAL for n in names]
-    ax.barh(names, [d.probabilities[n] for n in names], color=colours, height=0.6)
-    ax.set_xlim(0.0, 1.0)
-    ax.set_xlabel("probability")
-    ax.set_title(f"{d.label}: {d.state}", loc="left")
-    ax = axes[0, 1]
-    for (name, density), colour in zip(d.best.areas.items(), style.CYCLE):
-        shape = np.exp(density.log_density - np.max(density.log_density))
-        ax.plot(np.exp(density.nodes), shape, color=colour, label=name)
-        middle, low, high = np.exp(density.quantiles([0.5, 0.025, 0.975]))
-        ax.axvspan(low, high, color=colour, alpha=0.15, lw=0)
-        ax.axvline(middle, color=colour, lw=0.8, ls=":")
-    ax.set_xscale("log")
-    ax.set_yticks([])
-    ax.set_ylabel("density over log area")
-    ax.set_xlabel("leak area / m2")
-    if d.best.areas:
-        ax.legend()
-    else:
-        ax.text(0.5, 0.5, "no leak", transform=ax.transAxes, ha="center")
+    colours = [style.ALARM if name == d.probable else style.NEUTRAL for name in states]
+    names = [name_state(name).replace(" and ", "\nand ") for name in states]
+    ax.barh(names, shares, color=colours, height=0.6)
+    for row, share in enumerate(shares):
+        ax.text(share + 2, row, write_certainty(share / 100), va="center", fontsize=8)
+    ax.set_xlim(0.0, 130.0)
+    ax.set_xticks([0, 50, 100])
+    ax.set_xlabel("probability / %")
+    ax.set_title("Which state?", loc="left")
+    _plot_areas(axes[0, 1], d)
+    fig.suptitle(f"{d.label}: {name_state(d.state)}")
     return fig
+
+
+def _plot_areas(ax, d: DiagnosedNumbers) -> None:
+    ax.set_title("How large is the leak?", loc="left")
+    if not d.leaks:
+        ax.set_axis_off()
+        ax.text(0.5, 0.5, "no leak", transform=ax.transAxes, ha="center")
+        return
+    for (name, leak), colour, line in zip(d.leaks.items(), style.CYCLE, LINES):
+        ends = write_quantity(leak.median, AREA, (leak.low, leak.high))
+        area = AREA.factor * np.asarray(leak.area)
+        ax.plot(area, leak.density, line, color=colour, label=f"{name_state(name)}: {ends}")
+        ends = AREA.factor * leak.low, AREA.factor * leak.high
+        ax.axvspan(*ends, color=colour, alpha=0.15, lw=0)
+    ax.set_xscale("log")
+    low = min(AREA.factor * leak.low for leak in d.leaks.values())
+    high = max(AREA.factor * leak.high for leak in d.leaks.values())
+    ax.set_xlim(low / 3, high * 3)
+    for axis in (ax.xaxis.set_major_formatter, ax.xaxis.set_minor_formatter):
+        axis(FuncFormatter(_tick))
+    ax.set_ylim(0, 1.35)
+    ax.set_yticks([])
+    ax.set_ylabel("how probable")
+    ax.set_xlabel(f"leak area / {AREA.name}, logarithmic; shaded: 95 %")
+    ax.legend(loc="upper left", fontsize=8)
+
+
+def _tick(value: float, _=None) -> str:
+    """A tick of a logarithmic axis at 1, 2 and 5 of each decade."""
+    leading = value / 10 ** np.floor(np.log10(value) + 1e-9)
+    return f"{value:.3g}" if round(leading, 6) in (1, 2, 5) else ""

@@ -25,6 +25,7 @@ mpl.rcParams.update(
         "figure.dpi": 110,
         "savefig.dpi": 160,
         "font.size": 9,
+        "figure.titlesize": 10,
         "axes.titlesize": 9,
         "axes.labelsize": 9,
         "axes.spines.top": False,
@@ -43,6 +44,12 @@ def figure(rows: int = 1, columns: int = 1, height: float = 2.2, **kwargs):
     """A figure one text column wide and its axes (rows, columns), `height` inches a row."""
     fig = Figure(figsize=(COLUMN, height * rows), layout="constrained")
     return fig, fig.subplots(rows, columns, squeeze=False, **kwargs)
+
+
+def legend_below(fig: Figure, ax) -> None:
+    """One legend for the whole figure, of the labels of `ax`, below everything else."""
+    handles, labels = ax.get_legend_handles_labels()
+    fig.legend(handles, labels, loc="outside lower center", ncols=max(len(labels), 1))
 
 
 def save(fig: Figure, *paths) -> None:

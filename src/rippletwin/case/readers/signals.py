@@ -22,13 +22,14 @@ class Signals:
 
 
 def numbers(path: Path, field: str, values) -> np.ndarray:
-    """`values` as floats: single precision stays single, every other number becomes double.
+    """`values` as floats: single precision and 16 bits become single, all else double precision.
 
     Raises InputError where they are not real numbers.
     """
     array = np.asarray(values)
     check_type(path, field, array.dtype)
-    return array if array.dtype == np.float32 else array.astype(float)
+    single = array.dtype == np.float32 or (array.dtype.kind in "iu" and array.dtype.itemsize <= 2)
+    return array.astype(np.float32 if single else float, copy=False)
 
 
 def check_type(path: Path, field: str, dtype: np.dtype) -> None:

@@ -21,6 +21,7 @@ from rippletwin.explanation.fit_jobs import (
 )
 from rippletwin.explanation.search.stepwise_moves import MIN_IMPROVEMENT
 from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR
+from rippletwin.twin.effects.base import Effect, Place
 
 STARTS_PER_WAVELENGTH = 2  # on the shortest wavelength, which has about as many local modes
 MIN_DISTANCE_IN_WAVELENGTHS = 0.25  # of the shortest wavelength, between two distinct positions
@@ -62,31 +63,43 @@ def fit_other_positions(workers: Workers, best: Fit) -> list[Fit]:
             theta = start.copy()
             theta[index] = prior.coordinate(prior.centre + prior.scale * share)
             jobs.append(FitJob(hypothesis, FromTheta(theta, exact=False)))
-    distinct, known = [], [positions_of_effects(best)]
+    distinct, known = [], [_sorted_positions(best)]
     for fit in rank_by_evidence(workers.fit(jobs)):
-        positions = positions_of_effects(fit)
-        if all(any(abs(positions[n] - p[n]) > min_distance for n in positions) for p in known):
+        positions = _sorted_positions(fit)
+        if all(np.max(np.abs(positions - others)) > min_distance for others in known):
             known.append(positions)
             distinct.append(fit)
     return distinct
 
 
 def positions_of_effects(fit: Fit) -> dict[str, float]:
-    """Fitted positions (m) of the effects that may be anywhere, by the effect's name."""
+    """Fitted positions (m) of the effects that may be anywhere, by the effect's label."""
     values = fit.twin.values()
     return {
-        effect.name: values[f"{effect.name}@{place}.position"]
+        _label(effect, place): values[f"{_label(effect, place)}.position"]
         for effect, place in fit.hypothesis
         if place.element == "position"
     }
 
 
+def _label(effect: Effect, place: Place) -> str:
+    return f"{effect.name}@{place}"
+
+
+def _sorted_positions(fit: Fit) -> np.ndarray:
+    """The same (n,), effect by effect; of several of one effect in their order along the line."""
+    positions = positions_of_effects(fit)
+    ordered = sorted((label.split("@")[0], x) for label, x in positions.items())
+    return np.array([x for _, x in ordered])
+
+
 def equivalent_positions(best: Fit, others: Sequence[Fit]) -> tuple[tuple[str, ...], ...]:
     """For each effect that `others` have elsewhere than `best`: its positions, "name at x m"."""
     classes = []
-    for name, x in positions_of_effects(best).items() if others else ():
-        moved = [f for f in others if f.hypothesis[-1][0].name == name]
+    for label, x in positions_of_effects(best).items() if others else ():
+        moved = [f for f in others if _label(*f.hypothesis[-1]) == label]
         if moved:
-            positions = sorted([x, *(positions_of_effects(f)[name] for f in moved)])
+            positions = sorted([x, *(positions_of_effects(f)[label] for f in moved)])
+            name = label.split("@")[0]
             classes.append(tuple(f"{name} at {x:.2f} m" for x in positions))
     return tuple(classes)

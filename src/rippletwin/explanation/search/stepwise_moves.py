@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,8 +26,10 @@ from rippletwin.explanation.thresholds import (
     MIN_LOG_BAYES_FACTOR,
     min_log_bayes_factor,
 )
+from rippletwin.twin.effects.library import is_limit, next_instance
 
-MAX_EFFECTS = 4  # in one hypothesis
+MAX_EFFECTS = 4  # different ones in one hypothesis
+MAX_OF_ONE_EFFECT = 4  # at free positions
 SUBSTITUTES_TRIED = 10  # best single effects tried in the place of another
 MAX_MODEL_ERROR_FOR_EXACT_MODE = 10.0 * MIN_MODEL_ERROR
 """Relative model error below which derivatives of the nonlinear compliance lead to the mode."""
@@ -34,16 +37,16 @@ LOST_MODEL_ERROR = 0.1
 """Relative model error above which a line is probably in a wrong local mode."""
 RESTARTED = 3  # extensions of a fit that are also fitted from the data sheet
 MIN_IMPROVEMENT = 1.0  # log evidence by which an exchange or another position must be better
-SPECIAL_CASES = {"line_volume": (("load_volume", None), ("source_impedance", "volume"))}
-"""Effects at any position, and what they are at the ends of the line: name and form."""
 
 
 def fit_extensions(workers: Workers, best: Fit, candidates: Sequence, progress) -> list[Fit]:
-    """Fits of `best` with each further candidate added, best first; none beyond MAX_EFFECTS."""
-    if len(best.hypothesis) >= MAX_EFFECTS:
-        return []
+    """Fits of `best` with each further candidate added, best first.
+
+    None goes beyond MAX_EFFECTS and MAX_OF_ONE_EFFECT. Of an effect at a free position one more is
+    a candidate.
+    """
     rig = workers.base.rig
-    jobs = [extension_job(best, c) for c in candidates if c not in best.hypothesis]
+    jobs = [extension_job(best, c) for c in _additions(best.hypothesis, candidates)]
     report = progress_callback(progress, f"{len(best.hypothesis) + 1} effects", len(jobs))
     fits = rank_by_evidence(workers.fit(jobs, report))
     if fits and fits[0].model_error > GOOD_MODEL_ERROR:
@@ -55,6 +58,25 @@ def fit_extensions(workers: Workers, best: Fit, candidates: Sequence, progress) 
         better = [max(pair, key=lambda f: f.evidence) for pair in zip(again, restarted)]
         fits = rank_by_evidence([*better, *fits[len(again) :]])
     return rank_at_exact_modes(workers, best, fits)
+
+
+def _additions(hypothesis: Hypothesis, candidates: Sequence) -> list:
+    """The candidates that may still be added, each as the next of its kind."""
+    names = {effect.name for effect, _ in hypothesis}
+    instances = [next_instance(candidate, hypothesis) for candidate in candidates]
+    return [
+        (effect, place)
+        for effect, place in filter(None, instances)
+        if place.number <= MAX_OF_ONE_EFFECT and len(names | {effect.name}) <= MAX_EFFECTS
+    ]
+
+
+def _exchanges(hypothesis: Hypothesis, k: int, candidates: Sequence) -> list[Hypothesis]:
+    """The hypotheses with effect k exchanged for each candidate that is another."""
+    rest, (effect, place) = hypothesis[:k] + hypothesis[k + 1 :], hypothesis[k]
+    own = effect, replace(place, number=1)
+    instances = [next_instance(c, rest) for c in candidates if c != own]
+    return [(*rest, instance) for instance in instances if instance is not None]
 
 
 def extension_job(best: Fit, candidate) -> FitJob:
@@ -79,10 +101,9 @@ def exchange_effects(workers: Workers, best: Fit, single_effect_fits: Sequence[F
         return best
     substitutes = [f.hypothesis[-1] for f in single_effect_fits[:SUBSTITUTES_TRIED]]
     jobs = [
-        FitJob((*best.without(k), substitute), NearFit(best))
+        FitJob(hypothesis, NearFit(best))
         for k in range(len(best.hypothesis))
-        for substitute in substitutes
-        if substitute not in best.hypothesis
+        for hypothesis in _exchanges(best.hypothesis, k, substitutes)
     ]
     fits = rank_by_evidence(workers.fit(jobs))
     if not fits or fits[0].evidence < best.evidence + MIN_IMPROVEMENT:
@@ -98,13 +119,12 @@ def fit_substitutes(workers: Workers, best: Fit, candidates: Sequence) -> list[F
     present is not exchanged.
     """
     members = best.hypothesis if len(best.hypothesis) > 1 else ()
-    jobs = [
-        FitJob((*best.without(k), candidate), NearFit(best))
-        for k, (effect, place) in enumerate(members)
-        for candidate in candidates
-        if candidate[1].element == place.element or candidate[0].name == effect.name
-        if candidate not in best.hypothesis and not effect.certain
-    ]
+    jobs = []
+    for k, (effect, place) in enumerate(members):
+        if effect.certain:
+            continue
+        alike = [c for c in candidates if c[1].element == place.element or c[0] is effect]
+        jobs += [FitJob(hypothesis, NearFit(best)) for hypothesis in _exchanges(members, k, alike)]
     return rank_by_evidence(workers.fit(jobs))
 
 
@@ -114,27 +134,12 @@ def simplify_effects(workers: Workers, best: Fit, candidates: Sequence) -> Fit:
     What the general effect has besides is further physics, which needs as much evidence as any.
     """
     for k, member in enumerate(best.hypothesis):
-        rest = best.without(k)
-        jobs = [
-            FitJob((*rest, candidate), NearFit(best))
-            for candidate in candidates
-            if candidate not in rest and _contains(member, candidate, workers.base.rig)
-        ]
+        special = [c for c in candidates if is_limit(c, member, workers.base.rig)]
+        jobs = [FitJob(h, NearFit(best)) for h in _exchanges(best.hypothesis, k, special)]
         for fit in rank_by_evidence(workers.fit(jobs))[:1]:
             if fit.evidence > best.evidence - MIN_LOG_BAYES_FACTOR:
                 return simplify_effects(workers, fit, candidates)
     return best
-
-
-def _contains(general, special, rig) -> bool:
-    """Whether an effect at its place is a special case of another, by its equations or place."""
-    (effect, place), (special_effect, special_place) = general, special
-    if effect is not special_effect:
-        special_cases = SPECIAL_CASES.get(effect.name, ())
-        return (special_effect.name, special_place.form) in special_cases
-    names = {p.name for p in effect.parameters(rig, place)}
-    special_names = {p.name for p in special_effect.parameters(rig, special_place)}
-    return place.element == special_place.element and special_names < names
 
 
 def drop_needless_effects(workers: Workers, best: Fit) -> Fit:

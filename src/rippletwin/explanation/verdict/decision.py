@@ -23,6 +23,7 @@ from rippletwin.explanation.thresholds import (
     MIN_LOG_BAYES_FACTOR,
 )
 from rippletwin.twin.effects.base import Place
+from rippletwin.twin.effects.library import is_limit
 
 VERDICTS = ("consistent", "named", "ambiguous", "unexplained", "calibration_only", "bad_data")
 
@@ -148,7 +149,8 @@ def _equivalent_substitutes(search: Search) -> list[tuple[tuple[str, Place], lis
     """For each accepted effect (name, place): equivalent fits with another effect in its place.
 
     As (effect, place, fit). An always-present effect has none: it is known to be there, whatever
-    else could do its work.
+    else could do its work. Neither has an effect those of which it is a limit: they fit as well
+    whatever the data are, and the search has taken the limit (`simplify_effects`).
     """
     best, table = search.best, []
     for k, own in enumerate(best.hypothesis):
@@ -160,7 +162,8 @@ def _equivalent_substitutes(search: Search) -> list[tuple[tuple[str, Place], lis
             others = set(fit.hypothesis) - rest
             if is_close and rest < set(fit.hypothesis) and len(others) == 1 and own not in others:
                 ((effect, place),) = others
-                substitutes.append((effect, place, fit))
+                if not is_limit(own, (effect, place), best.twin.rig):
+                    substitutes.append((effect, place, fit))
         table.append(((own[0].name, own[1]), substitutes))
     return table
 

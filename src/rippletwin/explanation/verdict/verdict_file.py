@@ -32,6 +32,7 @@ from rippletwin.explanation.verdict.places import (
 )
 from rippletwin.explanation.verdict.summary_text import summary_text
 from rippletwin.twin import twin_file
+from rippletwin.twin.effects.library import generalisations
 
 WIDE_INTERVAL = 0.15  # of the line's length; a wider one asks for one more sensor
 NOTHING_MISSING = ("consistent", "calibration_only")
@@ -76,6 +77,7 @@ def _line_effects(e: Explanation, entries: list[dict]) -> list[dict]:
             "parameters": entry["parameters"],
             "probability": probabilities[entry["effect"].name],
             "support": levels[entry["effect"].name, str(entry["place"])],
+            "limit_of": generalisations(entry["effect"], entry["place"]),
         }
         for entry in entries
         if entry["effect"].named

@@ -30,14 +30,17 @@ class Place:
              "sensor p1"
     index    of the segment or sensor, from 0; None elsewhere
     form     the variant where an effect has several equations, else None
+    number   which of several of one effect at free positions, from 1
     """
 
     element: str
     index: int | None = None
     form: str | None = None
+    number: int = 1
 
     def __str__(self) -> str:
-        return self.element if self.form is None else f"{self.element} ({self.form})"
+        form = "" if self.form is None else f" ({self.form})"
+        return f"{self.element}{form}" + (f" {self.number}" if self.number > 1 else "")
 
 
 @dataclass
@@ -113,6 +116,8 @@ class Effect:
                 contradict it
     usual       in nearly all real lines: the search tries it before all others
     friction    law by which it replaces the line's, as in `series_impedance`
+    limits      (name, form) of effects that this one becomes at a limit of its parameters or at an
+                end of the line; what those are limits of, it is too
     file        the user's file that defines it; None in the library
     """
 
@@ -129,6 +134,7 @@ class Effect:
     usual: bool = False
     named: bool = True
     friction: str | None = None
+    limits: tuple[tuple[str, str | None], ...] = ()
     file: str | None = None
 
     def suits(self, rig) -> bool:

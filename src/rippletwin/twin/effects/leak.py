@@ -91,4 +91,5 @@ EFFECT = Effect(
     places=position_place,
     apply=_apply,
     apply_in_time=_apply_in_time,
+    limits=(("source_impedance", "leakage"),),
 )

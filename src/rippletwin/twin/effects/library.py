@@ -5,7 +5,7 @@ from __future__ import annotations
 import copyreg
 import importlib
 import pkgutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -99,3 +99,44 @@ def candidates(rig, named: bool = True) -> list[tuple[Effect, Place]]:
         if effect.named == named and effect.suits(rig)
         for place in effect.places(rig)
     ]
+
+
+def next_instance(
+    candidate: tuple[Effect, Place], others: Sequence[tuple[Effect, Place]]
+) -> tuple[Effect, Place] | None:
+    """The candidate as it can join `others`; None where it is among them and has one place only.
+
+    Of an effect at a free position a line may have several: they are numbered.
+    """
+    effect, place = candidate
+    if place.element != "position":
+        return None if candidate in others else candidate
+    taken = {p.number for e, p in others if e is effect and p.form == place.form}
+    number = next(n for n in range(1, len(taken) + 2) if n not in taken)
+    return effect, replace(place, number=number)
+
+
+def is_limit(special: tuple[Effect, Place], general: tuple[Effect, Place], rig) -> bool:
+    """Whether an effect at its place is a limit of another, which then fits at least as well.
+
+    It is the same effect with fewer parameters, or declared as a limit (`Effect.limits`).
+    """
+    (effect, place), (wide, at) = special, general
+    if effect is wide:
+        own = {p.name for p in effect.parameters(rig, place)}
+        return place.element == at.element and own < {p.name for p in wide.parameters(rig, at)}
+    return (effect.name, place.form) in _all_limits(wide)
+
+
+def generalisations(effect: Effect, place: Place) -> list[str]:
+    """Names of the other effects that become this one at a limit."""
+    return [e.name for e in EFFECTS.values() if (effect.name, place.form) in _all_limits(e)]
+
+
+def _all_limits(effect: Effect) -> set[tuple[str, str | None]]:
+    """The limits of an effect, those of its limits included."""
+    found = set(effect.limits)
+    for name, _ in effect.limits:
+        if name in EFFECTS:
+            found |= _all_limits(EFFECTS[name])
+    return found

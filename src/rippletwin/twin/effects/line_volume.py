@@ -42,4 +42,5 @@ EFFECT = Effect(
     places=position_place,
     apply=_apply,
     apply_in_time=_apply_in_time,
+    limits=(("load_volume", None), ("source_impedance", "volume")),
 )

@@ -69,4 +69,5 @@ EFFECT = Effect(
     places=position_place,
     apply=_apply,
     apply_in_time=_apply_in_time,
+    limits=(("line_volume", None),),  # where it is short against the wave
 )

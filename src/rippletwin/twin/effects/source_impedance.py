@@ -11,14 +11,15 @@ from rippletwin.twin.effects.lumped_elements import volume_compliance
 from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal
 
+FORMS = ("leakage", "volume", "volume and passage")  # each has what the one before has, and more
+
 
 def _places(rig):
-    return (Place("source", form="volume"), Place("source", form="volume and passage"))
+    return tuple(Place("source", form=form) for form in FORMS)
 
 
 def _apply(network, state, values, place):
-    compliance = volume_compliance(values["volume"], state.density, state.wave_speeds[0])
-    admittance = network.s * compliance + values["conductance"]
+    admittance = values["conductance"] + network.s * _compliance(state, values, place)
     network.source_admittance = network.source_admittance + admittance
     if place.form == "volume and passage":
         impedance = network.s * values["inertance"]
@@ -26,25 +27,26 @@ def _apply(network, state, values, place):
         network.inserts.insert(0, Insert(0.0 * network.length, "series", impedance))
 
 
+def _compliance(state, values, place):
+    """Of the outlet volume, m3/Pa; zero for a pump that only leaks."""
+    if place.form == "leakage":
+        return 0.0
+    return volume_compliance(values["volume"], state.density, state.wave_speeds[0])
+
+
 def _parameters(rig, place):
     first = rig.line[0]
     area = 0.25 * np.pi * first.diameter**2
-    parameters = (
-        Parameter("volume", "m3", lognormal(1e-4 * (first.diameter / 0.02) ** 3, 1.2)),
-        Parameter(
-            "conductance",
-            "m3/(Pa s)",
-            lognormal(0.01 * area / (rig.fluid.density * first.wave_speed), 1.5),
-        ),
-    )
-    if place.form == "volume and passage":
-        passage = Parameter("inertance", "Pa s2/m3", lognormal(0.1 * rig.fluid.density / area, 1.0))
-        return (*parameters, passage)
-    return parameters
+    characteristic = area / (rig.fluid.density * first.wave_speed)
+    volume = Parameter("volume", "m3", lognormal(1e-4 * (first.diameter / 0.02) ** 3, 1.2))
+    leakage = Parameter("conductance", "m3/(Pa s)", lognormal(0.01 * characteristic, 1.5))
+    passage = Parameter("inertance", "Pa s2/m3", lognormal(0.1 * rig.fluid.density / area, 1.0))
+    own = {"leakage": (leakage,), "volume": (volume, leakage)}
+    return own.get(place.form, (volume, leakage, passage))
 
 
 def _apply_in_time(line, state, values, place):
-    compliance = volume_compliance(values["volume"], state.density, state.wave_speeds[0])
+    compliance = _compliance(state, values, place)
     line.source.append(Element(0.0, "shunt", (compliance, values["conductance"])))
     if place.form == "volume and passage":
         line.inserts.insert(0, inertance(0.0, values["inertance"]))
@@ -56,7 +58,7 @@ EFFECT = Effect(
     medium="any",
     equation="q(0) = Q - (s V/(rho a^2) + G) p_pump, p_pump = p(0) + s I q(0)",
     source="Edge & Johnston 1990, Proc. IMechE 204(I):33 (source impedance of pumps, "
-    "lumped volume and passage)",
+    "leakage, lumped volume and passage)",
     parameters=_parameters,
     places=_places,
     apply=_apply,

@@ -1,0 +1,1 @@
+"""The page: results of a case as one self-contained HTML file."""

@@ -1,0 +1,49 @@
+"""The page as one HTML file that requests nothing and runs no script but its own."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import os
+from importlib.resources import files
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from rippletwin.report.content import Page, WorkflowPart, make_page
+from rippletwin.report.results import Results
+
+TEMPLATES = "templates"
+
+
+def render(page: Page) -> str:
+    """The page as HTML; everything that is not a drawing of ours is escaped."""
+    environment = Environment(
+        loader=PackageLoader("rippletwin.report", TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    folder = files("rippletwin.report") / TEMPLATES
+    script, style = ((folder / name).read_text() for name in ("page.js", "page.css"))
+    # The browser runs this script and no other, wherever it may come from.
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    template = environment.get_template("page.html")
+    return template.render(
+        page=page, script=Markup(script), style=Markup(style), script_hash=f"sha256-{digest}"
+    )
+
+
+def write_report(results: Results, path: str | Path, workflow: WorkflowPart | None = None) -> Path:
+    """Write the report of results to a file, whole or not at all; returns its path."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        temporary.write_text(render(make_page(results, workflow)), encoding="utf-8")
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return path

@@ -1,0 +1,125 @@
+"""Read what a report is made of: the case, and the results that lie beside it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from rippletwin.case.load import load_case
+from rippletwin.case.model import Case
+from rippletwin.errors import InputError
+from rippletwin.figures import diagnosed_numbers, explained_numbers
+from rippletwin.figures.diagnosed_numbers import DiagnosedNumbers
+from rippletwin.figures.explained_numbers import ExplainedNumbers
+from rippletwin.twin.twin import Twin
+from rippletwin.twin.twin_file import from_dict
+
+EXPLAINED, DIAGNOSED = "explained", "diagnosed"  # folders of a case in which results are looked for
+
+
+@dataclass(frozen=True)
+class Results:
+    """A case and what is known of it; what is not there is None or empty, and `missing` says so.
+
+    verdict, diagnosis   as in verdict.json and in the list of diagnosis.json
+    twin, covariance     the twin without its effects, and the covariance (P, P) of its theta
+    explained, diagnosed the numbers behind the figures
+    missing              what the report lacks and the command that makes it, a sentence each
+    """
+
+    case: Case
+    verdict: Mapping | None = None
+    twin: Twin | None = None
+    covariance: np.ndarray | None = None
+    explained: ExplainedNumbers | None = None
+    diagnosis: Sequence[Mapping] = ()
+    diagnosed: Mapping[str, DiagnosedNumbers] = field(default_factory=dict)
+    missing: Sequence[str] = ()
+
+
+def read_results(
+    case_folder: str | Path,
+    explained: str | Path | None = None,
+    diagnosed: str | Path | None = None,
+) -> Results:
+    """The case and its results.
+
+    explained, diagnosed : folders that `explain` and `diagnose` wrote; by default the folders
+        `explained` and `diagnosed` of the case, where they exist.
+
+    Raises InputError where the case is wrong, or a folder that is named holds no result.
+    """
+    case = load_case(case_folder)
+    command = f"rippletwin {{}} {case_folder} --out {Path(case_folder) / '{}'}"
+    missing = []
+    diagnosis_folder = _folder(diagnosed, case.folder / DIAGNOSED, "diagnosis.json", "--diagnosed")
+    inside = diagnosis_folder if (diagnosis_folder / "verdict.json").exists() else None
+    folder = _folder(explained, inside or case.folder / EXPLAINED, "verdict.json", "--explained")
+    verdict, numbers, twin, covariance = _read_json(folder / "verdict.json"), None, None, None
+    if verdict is None:
+        missing.append(f"There is no verdict: {command.format('explain', EXPLAINED)}")
+    else:
+        numbers = explained_numbers.load(folder)
+        if numbers is None:
+            missing.append(
+                "There are no ripples, because explain drew no figures: run it again without "
+                "--no-figures"
+            )
+        if (folder / "twin.json").exists():
+            twin, covariance = _line_of_twin(folder / "twin.json")
+    diagnosis = _read_json(diagnosis_folder / "diagnosis.json")
+    if diagnosis is None and any(r.state != "healthy" for r in case.recordings):
+        missing.append(f"There is no diagnosis: {command.format('diagnose', DIAGNOSED)}")
+    return Results(
+        case=case,
+        verdict=verdict,
+        twin=twin,
+        covariance=covariance,
+        explained=numbers,
+        diagnosis=() if diagnosis is None else tuple(diagnosis["recordings"]),
+        diagnosed=diagnosed_numbers.load(diagnosis_folder),
+        missing=tuple(missing),
+    )
+
+
+def _folder(named: str | Path | None, default: Path, file: str, option: str) -> Path:
+    """The folder that is named, or the default; InputError where a named one lacks `file`."""
+    if named is None:
+        return default
+    if not (Path(named) / file).is_file():
+        raise InputError(
+            "command line",
+            option,
+            f"{named} holds no {file}",
+            "name the folder that was given to the command as --out",
+        )
+    return Path(named)
+
+
+def _line_of_twin(path: Path) -> tuple[Twin, np.ndarray | None]:
+    """The twin of a twin.json without its effects, and the covariance of its theta.
+
+    Effects have a table of their own in verdict.json, and may be of files that are not at hand.
+    """
+    data = _read_json(path)
+    data = data.get("twin", data) | {"covariance": data.get("covariance")}
+    count = sum("@" not in name for name in data["values"])  # effects' own parameters come last
+    twin = from_dict(data | {"effects": [], "theta": data["theta"][:count]})
+    if data["covariance"] is None:
+        return twin, None
+    return twin, np.array(data["covariance"])[:count, :count]
+
+
+def _read_json(path: Path) -> dict | None:
+    """What a JSON file holds; None where there is none."""
+    if not path.is_file():
+        return None
+    try:
+        return json.loads(path.read_text())
+    except ValueError as error:
+        problem = f"is no JSON ({error})"
+        raise InputError(path, path.name, problem, "write it again with the command") from None

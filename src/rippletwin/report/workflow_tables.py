@@ -1,0 +1,72 @@
+"""Tables of what a whole run of the workflow adds: accuracies beside the paper's, and timings."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from rippletwin.figures.quantities import write_number
+from rippletwin.report.tables import Cell, Table, text
+
+
+def accuracy_table(
+    rows: Sequence[Mapping], paper: Mapping[tuple[str, str], tuple[float, float]]
+) -> Table:
+    """Accuracy of every network and dataset in per cent, beside the paper's.
+
+    rows   each with architecture, title, dataset, mean and std
+    paper  mean and standard deviation by (architecture, dataset)
+    """
+    cells = []
+    for row in rows:
+        theirs = paper.get((row["architecture"], row["dataset"]))
+        beside = Cell("", -1.0) if theirs is None else _mean(*theirs)
+        ours = _mean(row["mean"], row["std"])
+        cells.append([text(row["title"]), text(row["dataset"]), ours, beside])
+    columns = ("Network", "Learnt from", "Accuracy / %", "The paper's / %")
+    return Table(
+        "Accuracy on recordings: mean and standard deviation over seeds",
+        columns, (False, False, True, True), cells,
+    )  # fmt: skip
+
+
+def _mean(mean: float, sd: float) -> Cell:
+    if mean != mean:  # nothing was scored
+        return Cell("not scored", -1.0)
+    return Cell(f"{mean:.1f} ± {sd:.1f}", mean)
+
+
+def timing_table(folder: str | Path) -> Table:
+    """Jobs, seconds and largest memory of each rule, of the benchmark files below `folder`."""
+    folder, rules = Path(folder), {}
+    for path in sorted(folder.rglob("*.tsv")):
+        with path.open(newline="") as file:
+            for row in csv.DictReader(file, delimiter="\t"):
+                rule = path.relative_to(folder).with_suffix("").parts[0]
+                rules.setdefault(rule, []).append((_number(row["s"]), _number(row["max_rss"])))
+    cells = []
+    for rule, jobs in sorted(rules.items(), key=lambda item: -sum(s for s, _ in item[1])):
+        seconds, memory = sum(s for s, _ in jobs), max(m for _, m in jobs)
+        cells.append(
+            [
+                text(rule.replace("_", " ")),
+                Cell(str(len(jobs)), len(jobs)),
+                Cell(write_number(seconds), seconds),
+                Cell(f"{memory:.0f}", memory),
+            ]
+        )
+    return Table(
+        "Time and memory of the jobs that had ended when this page was made",
+        ("Stage", "Jobs", "Seconds, all jobs", "Largest job / MB"),
+        (False, True, True, True),
+        cells,
+    )
+
+
+def _number(words: str) -> float:
+    """A number of a benchmark file; 0 where the job was too short to be measured."""
+    try:
+        return float(words)
+    except ValueError:
+        return 0.0

@@ -1,0 +1,134 @@
+"""Figures of explain and diagnose: words, scale, nothing cut off, the place said or denied."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.text import Text
+
+from made_results import AMPLITUDES, ORDERS, made_change, made_numbers
+from rippletwin.figures import diagnosed_numbers, explained_numbers
+from rippletwin.figures.explained_ripple import curve, plot_residuals, plot_ripple
+from rippletwin.figures.explained_search import plot_evidence, plot_immittance
+from rippletwin.figures.fault_posterior import plot_change, plot_severity
+from rippletwin.figures.line_drawing import plot_place
+
+DRAWN = {
+    "ripple": lambda: plot_ripple(made_numbers()),
+    "ripple, nothing found": lambda: plot_ripple(made_numbers(found=False)),
+    "residuals": lambda: plot_residuals(made_numbers()),
+    "evidence": lambda: plot_evidence(made_numbers()),
+    "immittance": lambda: plot_immittance(made_numbers()),
+    "place": lambda: plot_place(made_numbers()),
+    "place, nothing found": lambda: plot_place(made_numbers(found=False)),
+    "change": lambda: plot_change(made_change()),
+    "severity": lambda: plot_severity(made_change()),
+}
+
+
+def texts(figure):
+    """Every text of a figure that is drawn, as matplotlib artists."""
+    figure.draw_without_rendering()
+    beyond = set()  # labels of ticks outside the limits of an axis exist, and are not drawn
+    for axis in (axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)):
+        low, high = sorted(axis.get_view_interval())
+        for tick in [*axis.get_major_ticks(), *axis.get_minor_ticks()]:
+            if not low <= tick.get_loc() <= high:
+                beyond |= {tick.label1, tick.label2}
+    drawn = [t for t in figure.findobj(Text) if t.get_visible() and t not in beyond]
+    return [t for t in drawn if t.get_text().strip()]
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_no_text_is_cut_off(name):
+    """Every text that is drawn lies within the picture."""
+    figure = DRAWN[name]()
+    width, height = figure.canvas.get_width_height()
+    for text in texts(figure):
+        box = text.get_window_extent()
+        inside = box.x0 > -1 and box.y0 > -1 and box.x1 < width + 1 and box.y1 < height + 1
+        assert inside, (text.get_text(), box)
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_a_figure_asks_a_question_and_names_no_identifier(name):
+    """Its title asks what it answers, and labels are words; labels of recordings are the user's."""
+    figure = DRAWN[name]()
+    words = " ".join(t.get_text() for t in texts(figure))
+    for label in ("healthy_0", "unknown_0"):
+        words = words.replace(label, "")
+    assert "?" in words and "_" not in words
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_a_logarithmic_axis_says_so(name):
+    """Whoever reads a bar's length must know the scale."""
+    figure = DRAWN[name]()
+    words = " ".join(t.get_text() for t in texts(figure))
+    scales = {axis.get_scale() for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)}
+    assert ("logarithmic" in words) is bool(scales & {"log", "symlog"})
+
+
+def test_a_ripple_panel_says_speed_pressure_and_error():
+    """Error by hand: half of the ripple, at right angles, is 50 %; 2 % too large is 2 %."""
+    words = " ".join(t.get_text() for t in texts(plot_ripple(made_numbers())))
+    assert "1000 r/min, 95 bar" in words and "error 50 % → 2.0 %" in words
+
+
+def test_two_sensors_that_tell_no_place_say_so():
+    """In place of a flat line: a sentence. A short interval is drawn, and given in metres."""
+    far = " ".join(t.get_text() for t in texts(plot_place(made_numbers(free=(0.0, 8.9)))))
+    near = " ".join(t.get_text() for t in texts(plot_place(made_numbers(free=(2.0, 2.4)))))
+    assert "two sensors cannot tell the place" in far and "best single place" not in far
+    assert "fits best from 2.00 to 2.40 m" in near and "best single place" in near
+
+
+def test_the_ripple_in_bar_is_that_of_its_amplitudes():
+    """Against the sum of cosines, written out."""
+    angle, pressure = curve(made_numbers().points[0], AMPLITUDES[0])
+    by_hand = sum(
+        3e5 / 1e5 * w * np.cos(np.deg2rad(angle) * k)
+        for k, w in zip(ORDERS, AMPLITUDES[0].real / 3e5)
+    )
+    assert angle[-1] == pytest.approx(40.0)
+    np.testing.assert_allclose(pressure, by_hand, atol=1e-12)
+
+
+def test_numbers_behind_figures_come_back_from_their_files(tmp_path):
+    """What reports read is what figures showed."""
+    (tmp_path / "figures").mkdir()
+    explained, changed = made_numbers(), made_change()
+    explained_numbers.save(explained, tmp_path)
+    diagnosed_numbers.save([changed], tmp_path)
+    back = explained_numbers.load(tmp_path)
+    np.testing.assert_allclose(back.points[0].calibrated, explained.points[0].calibrated)
+    np.testing.assert_allclose(back.missing[0].law, explained.missing[0].law)
+    assert back.candidates == explained.candidates and back.places == explained.places
+    assert diagnosed_numbers.load(tmp_path) == {"unknown_0": changed}
+
+
+def test_a_reading_error_of_rounding_is_not_drawn(monkeypatch):
+    """A law of 1e-16 of the reading is rounding noise: it has no panel."""
+    from types import SimpleNamespace
+
+    frequency = np.array([100.0, 200.0])
+    noise = SimpleNamespace(
+        quantity="relative error of the reading", unit="1", frequency_hz=frequency,
+        law=np.full(2, 1e-16 + 0j), points=np.full(2, 1e-16 + 0j), sd=np.full(2, 1e-17),
+    )  # fmt: skip
+    real = SimpleNamespace(**vars(noise) | {"law": np.full(2, 0.1 + 0j)})
+    effects = [(SimpleNamespace(name="sensor_gain"), "sensor p1")] * 2
+    accepted = SimpleNamespace(hypothesis=effects)
+    found = iter([noise, real])
+    monkeypatch.setattr(explained_numbers, "missing_immittance", lambda *_: next(found))
+    decision = SimpleNamespace(accepted=accepted)
+    (shown,) = explained_numbers._missing(SimpleNamespace(decision=decision, observations=()))
+    assert shown.law[0] == 0.1
+
+
+def test_figures_without_a_search_or_sensors_are_left_out():
+    """Contradicting data are not searched; an impedance has no sensor along the line."""
+    numbers = made_numbers()
+    assert plot_evidence(replace(numbers, candidates=())) is None
+    assert plot_place(replace(numbers, places=replace(numbers.places, sensors=()))) is None
+    assert plot_immittance(replace(numbers, missing=())) is None

@@ -1,0 +1,48 @@
+"""Words in place of identifiers, for everything that the library can say."""
+
+import pytest
+
+from paper_rig import paper_rig
+from rippletwin.figures.words import name_effect, name_element, name_hypothesis, name_parameter
+from rippletwin.twin.effects.library import EFFECTS, candidates
+from rippletwin.twin.twin import Twin
+
+
+def test_every_effect_at_every_place_is_a_phrase():
+    """No identifier is left, and two places of an effect differ."""
+    rig = paper_rig()
+    labels = [(effect.name, str(place)) for effect, place in candidates(rig, named=True)]
+    words = [name_effect(*label) for label in labels]
+    assert len(words) > 10 and not [each for each in words if "_" in each]
+    assert len(set(words)) == len(set(labels))
+
+
+@pytest.mark.parametrize("effect", sorted(EFFECTS))
+def test_every_effect_has_words_of_its_own(effect):
+    """An effect that is added needs a line in `words`: underscores alone are no phrase."""
+    from rippletwin.figures import words
+
+    assert effect in {*words.AT_SENSOR, *words.AT_OTHER}
+
+
+def test_every_parameter_of_a_twin_is_a_phrase():
+    """Of the line, the load, the sensors and the effects."""
+    rig = paper_rig()
+    names = [p.name for p in Twin(rig).parameters]
+    for effect, place in candidates(rig, named=True):
+        names += [p.name for p in effect.parameters(rig, place)]
+    assert not [name for name in names if set("_[@") & set(name_parameter(name))]
+
+
+def test_phrases_say_the_element_where_the_name_does_not():
+    """Exact words, as they stand in figures."""
+    assert name_effect("sensor_gain", "sensor p1") == "gain of sensor p1"
+    assert name_effect("load_dynamics", "load (spool)") == "dynamics of the load (spool)"
+    assert name_hypothesis("viscoelastic_wall, segment 2 + unsteady_friction, line") == [
+        "viscoelastic wall of segment 2",
+        "unsteady friction",
+    ]
+    assert name_hypothesis("") == ["nothing missing"]
+    assert name_parameter("wave_speed[2]") == "wave speed of segment 2"
+    assert name_parameter("position[p1]") == "position of sensor p1"
+    assert name_element("between pump and p1") == "between the pump and p1"

@@ -1,0 +1,54 @@
+"""The page of a whole run: accuracies beside the paper's, attention, timings, configuration."""
+
+import pandas as pd
+from PIL import Image
+
+from made_results import write_results
+from run_script import run_script
+
+
+def test_the_page_has_what_only_a_workflow_knows(tmp_path):
+    """Mean and deviation over two seeds by hand, the paper's beside; seconds summed over jobs; the
+    picture inside the page."""
+    case = tmp_path / "made"
+    case.mkdir()
+    write_results(case)
+    rows = pd.DataFrame(
+        {"architecture": "cnn1d_341_100", "dataset": "CFD-P", "seed": [0, 1], "accuracy": [60, 70]}
+    )
+    rows.to_csv(tmp_path / "accuracy.csv", index=False)
+    theirs = {"architecture": ["cnn1d_341_100"], "dataset": "CFD-P", "mean": 37.6, "std": 25.6}
+    pd.DataFrame({"domain": "time"} | theirs).to_csv(tmp_path / "paper.csv", index=False)
+    benchmarks = tmp_path / "benchmarks" / "train"
+    benchmarks.mkdir(parents=True)
+    for name, seconds in (("one", "20.5"), ("two", "10.5")):
+        (benchmarks / f"{name}.tsv").write_text(f"s\tmax_rss\n{seconds}\t300.0\n")
+    (benchmarks / "short.tsv").write_text("s\tmax_rss\n0.01\t-\n")
+    Image.new("RGB", (4, 4)).save(tmp_path / "attention.png")
+    run_script(
+        "report_page",
+        tmp_path,
+        output={"page": str(tmp_path / "report.html")},
+        wildcards={},
+        params={
+            "recordings": "the virtual rig's",
+            "benchmarks": str(tmp_path / "benchmarks"),
+            "configuration": {"seeds": 2, "case": "<virtualrig>"},
+        },
+        rig=str(case / "rig.yaml"),
+        verdict=str(case / "explained" / "verdict.json"),
+        diagnosis=[str(case / "diagnosed" / "diagnosis.json")],
+        table=str(tmp_path / "accuracy.csv"),
+        paper=str(tmp_path / "paper.csv"),
+        attention=[str(tmp_path / "attention.png")],
+    )
+    page = (tmp_path / "report.html").read_text()
+    for words in (
+        "65.0 ± 7.1",
+        "37.6 ± 25.6",
+        "31.0</td>",
+        "data:image/png;base64,",
+        "case: &lt;virtualrig&gt;",
+        "Missing physics found and named",
+    ):
+        assert words in page, words

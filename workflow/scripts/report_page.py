@@ -1,0 +1,44 @@
+"""One page with the case, its verdict, its diagnosis, and what the whole run has found."""
+
+from base64 import b64encode
+from pathlib import Path
+
+import pandas as pd
+import yaml
+
+from job import open_log
+from rippletwin.learning.accuracy import summarise
+from rippletwin.learning.architectures import ARCHITECTURES
+from rippletwin.report.content import WorkflowPart
+from rippletwin.report.page import write_report
+from rippletwin.report.results import read_results
+from rippletwin.report.workflow_tables import accuracy_table, timing_table
+
+report_progress = open_log(snakemake)
+params, paths = snakemake.params, snakemake.input
+rows = summarise(pd.read_csv(paths.table)).to_dict("records")
+for row in rows:
+    row["title"] = ARCHITECTURES[row["architecture"]].title
+paper = pd.read_csv(paths.paper).itertuples(index=False)
+picture = "Where the networks look (Grad-CAM), on simulated and on recorded signals: {}"
+pictures = [
+    (picture.format(Path(path).stem), "data:image/png;base64," + b64encode(data).decode())
+    for path in paths.attention
+    for data in [Path(path).read_bytes()]
+]
+workflow = WorkflowPart(
+    tables=(
+        accuracy_table(rows, {(p.architecture, p.dataset): (p.mean, p.std) for p in paper}),
+        timing_table(params.benchmarks),
+    ),
+    pictures=pictures,
+    notes=[f"The recordings are {params.recordings}."],
+    configuration=yaml.safe_dump(params.configuration, sort_keys=False),
+)
+results = read_results(
+    Path(paths.rig).parent,
+    Path(paths.verdict).parent,
+    Path(paths.diagnosis[0]).parent if paths.diagnosis else None,
+)
+write_report(results, snakemake.output[0], workflow)
+report_progress(f"{len(rows)} accuracies, {len(results.missing)} things missing")
