@@ -20,7 +20,7 @@ from virtualrig.draw_population import (
     draw_sheet,
     draw_true,
 )
-from virtualrig.draw_rig import mean_flow
+from virtualrig.draw_rig import mean_flow, ripple_difference
 from virtualrig.drawn_effect import DrawnEffect, RigContext
 from virtualrig.folder import (
     prepare_folder,
@@ -30,8 +30,16 @@ from virtualrig.folder import (
     write_ripple,
     write_sheet,
 )
-from virtualrig.nuisance import true_pump
-from virtualrig.population import TOLERANCE, make_bench, record_planned, ripple_change
+from virtualrig.nuisance import seal_at, true_pump
+from virtualrig.orbit import Bench
+from virtualrig.population import (
+    TOLERANCE,
+    make_bench,
+    record_planned,
+    ripple_change,
+    ripple_of,
+)
+from virtualrig.rig import build
 
 GEOMETRY_SHARE = 2 / 3
 """Of the cases whose data sheet gives the pump's geometry; the others give the number of pistons
@@ -147,8 +155,11 @@ def _with_effects(sheet: dict, true: dict, nuisance: dict, effects: list[DrawnEf
 
 
 def record_nuisance_case(case: NuisanceCase, folder: Path, rng: np.random.Generator) -> dict:
-    """Record a case into `folder` (new or empty); returns its truth, with `change`: the norm of the
-    ripple's change by the effects over that of the ripple without, at the first operating point."""
+    """Record a case into `folder` (new or empty); returns its truth.
+
+    The truth gains `change` and `floor` (see `change_by_effects` and `floor_of`), and `seal`: the
+    true rig and its nuisance physics.
+    """
     prepare_folder(folder, None)
     drawn, entries = case.rig, []
     for plan in drawn.recordings:
@@ -162,12 +173,33 @@ def record_nuisance_case(case: NuisanceCase, folder: Path, rng: np.random.Genera
     if not case.geometry:
         sheet = sheet | {"pump": {"pistons": sheet["pump"]["pistons"]}}
     write_sheet(folder, sheet, entries)
-    rig = {"sheet": drawn.sheet, "true": drawn.true, "nuisance": drawn.nuisance}
-    return case.truth | {"seal": rig, "change": change_by_effects(drawn)}
+    seal = drawn.true | {"nuisance": drawn.nuisance}
+    return case.truth | {
+        "seal": seal,
+        "change": change_by_effects(drawn),
+        "floor": floor_of(drawn),
+    }
+
+
+def floor_of(drawn: DrawnRig) -> float:
+    """Relative error that the data sheet's pump on the true rig makes at the sensors, at the shaft
+    angle that makes it least; root mean square over the operating points."""
+    errors = []
+    for plan in drawn.recordings:
+        point, waves = plan.point, []
+        seal = seal_at(drawn.sheet, drawn.true, drawn.nuisance, plan.kelvin)
+        for pump in (seal["pump"], {}):
+            bench = Bench(build(drawn.sheet, seal | {"pump": pump}))
+            orbit = bench.settle(point.speed_rpm, point.load_pressure, tolerance=TOLERANCE)
+            waves.append(ripple_of(orbit, bench.rig.sensing))
+        pistons = drawn.sheet["pump"]["pistons"]
+        errors.append(ripple_difference(waves[1], waves[0], pistons, point))
+    return float(np.sqrt(np.mean(np.square(errors))))
 
 
 def change_by_effects(drawn: DrawnRig) -> float:
-    """Relative change of the sensors' ripple by the concealed effects, of two runs of the rig."""
+    """Norm of the change of the sensors' ripple by the concealed effects over that of the ripple
+    without them, of two runs of the rig at the first operating point."""
     if not _has_effects(drawn.true):
         return 0.0
     plan = drawn.recordings[0]
