@@ -75,7 +75,11 @@ def test_value_that_is_possible_but_unusual(tmp_path, name):
     """Possible values are read, and a warning names the field."""
     field, value, words = WARNINGS[name]
     spoilt(tmp_path, lambda c: put(c, field, value))
-    (warning,) = (w for w in load_case(tmp_path).warnings if not w.startswith("pump: "))
+    (warning,) = (
+        w
+        for w in load_case(tmp_path).warnings
+        if not w.startswith("pump: ") and "travel too" not in w
+    )
     assert warning.startswith(field) and words in warning
 
 
@@ -85,7 +89,7 @@ def test_a_good_sheet_has_no_warnings(tmp_path):
     spoilt(tmp_path, lambda c: c["pump"].update(piston_diameter=0.017))
     assert load_case(tmp_path).warnings == ()
     write_case(tmp_path, sheet())
-    (warning,) = load_case(tmp_path).warnings
+    (warning,) = (w for w in load_case(tmp_path).warnings if "travel too" not in w)
     assert "generic pump of 42 cm3" in warning
 
 

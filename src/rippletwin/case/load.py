@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from rippletwin.case import tables
+from rippletwin.case.band import band_warnings, narrow_band
 from rippletwin.case.model import (
     STATE_CODES,
     Case,
@@ -26,6 +27,11 @@ from rippletwin.case.sheet_checks import missing_files
 from rippletwin.case.signal_checks import sampling_rate, signal_errors
 from rippletwin.errors import InputError, raise_any
 
+COPIED_KEYS = (
+    "state", "speed_rpm", "load_pressure", "relative_error", "normalised",
+    "min_frequency_hz", "max_frequency_hz",
+)  # fmt: skip
+"""Keys of a recording's entry that its fields have as they are."""
 SAMPLED = ("periodic", "random")
 SMALLEST_MEAN = 1e-6  # of the largest flow; a smaller mean is none
 
@@ -34,6 +40,7 @@ def load_case(
     folder: str | Path,
     states: Collection[str] | None = None,
     progress: Callable[[str, int, int], None] | None = None,
+    band_hz: tuple[float | None, float | None] = (None, None),
 ) -> Case:
     """Read and check a case.
 
@@ -43,6 +50,7 @@ def load_case(
     states : read only recordings of these states (labels of rig.yaml, e.g. {"healthy"}); all where
         None. The sheet is checked whole in any case.
     progress : called with "reading", how many recordings have been read, and of how many.
+    band_hz : lowest and highest frequency to use of every recording, within its own band.
 
     Raises
     ------
@@ -60,13 +68,13 @@ def load_case(
     chosen = [e for e in sheet["recordings"] if states is None or e["state"] in states]
     for done, entry in enumerate(chosen, 1):
         try:
-            recordings.append(_recording(folder, entry, rig))
+            recordings.append(narrow_band(_recording(folder, entry, rig), *band_hz))
         except InputError as error:
             errors.append(error)
         if progress is not None:
             progress("reading", done, len(chosen))
     raise_any(errors)
-    warnings = unusual_values(sheet_path, sheet)
+    warnings = [*unusual_values(sheet_path, sheet), *band_warnings(rig, recordings)]
     return Case(folder=folder, rig=rig, recordings=tuple(recordings), warnings=tuple(warnings))
 
 
@@ -97,11 +105,7 @@ def _load(folder: Path, entry: dict) -> Load:
 def _recording(folder: Path, entry: dict, rig: Rig) -> Recording:
     path = folder / entry["file"]
     kind = entry.get("kind", "periodic")
-    fields = {
-        key: entry[key]
-        for key in ("state", "speed_rpm", "load_pressure", "relative_error", "normalised")
-        if key in entry
-    }
+    fields = {key: entry[key] for key in COPIED_KEYS if key in entry}
     fields.update(file=path, kind=kind, label=entry.get("label", path.stem))
     if "flow_ripple" in entry:
         ripple = tables.read_flow_ripple(folder / entry["flow_ripple"])

@@ -135,7 +135,8 @@ class Recording:
 
     Periodic and random recordings carry `pressure` (S, N), Pa; spectrum and input_impedance carry
     `frequency_hz` (F,) and `spectra` (repeats, S, F) complex: Pa, or Pa s/m3 (`normalised`: in
-    units of the first segment's characteristic impedance). What does not apply is None.
+    units of the first segment's characteristic impedance). Only `min_frequency_hz` to
+    `max_frequency_hz` is used in fits. What does not apply is None.
     """
 
     file: Path
@@ -151,6 +152,8 @@ class Recording:
     spectra: np.ndarray | None = None
     relative_error: float | None = None
     normalised: bool = False
+    min_frequency_hz: float | None = None
+    max_frequency_hz: float | None = None
 
     @property
     def state_code(self) -> str | None:

@@ -62,6 +62,8 @@ BOTH = {
     "load.back_pressure": Range("Pa", (-1.1e5, 2e8), (-1.1e5, 5e7), PRESSURES, zero=True),
     "recordings.speed_rpm": Range("r/min", (10.0, 60000.0), (200.0, 20000.0), (("Hz", 60.0),)),
     "recordings.sampling_rate_hz": Range("Hz", (100.0, 2e7), (1e3, 1e6), (("kHz", 1e3),)),
+    "recordings.min_frequency_hz": Range("Hz", (1e-2, 1e6), (1.0, 1e5), (("kHz", 1e3),)),
+    "recordings.max_frequency_hz": Range("Hz", (1e-1, 1e6), (50.0, 1e5), (("kHz", 1e3),)),
     "recordings.relative_error": Range("", (1e-8, 0.99), (1e-5, 0.5), PER_CENT),
     "uncertainty.length": Range("", (1e-8, 0.5), (1e-5, 0.2), PER_CENT, zero=True),
     "uncertainty.diameter": Range("", (1e-8, 0.5), (1e-5, 0.2), PER_CENT, zero=True),

@@ -90,6 +90,10 @@ def _recording_errors(path: Path, sheet: dict) -> Iterator[InputError]:
             if whole:  # once for all recordings
                 reported.add((key, whole))
             yield InputError(path, key if whole else f"{field}.{key}", "missing", f"{why}; give it")
+        low, high = number(entry, "min_frequency_hz"), number(entry, "max_frequency_hz")
+        if low is not None and high is not None and low >= high:
+            problem = f"{low:g} Hz is not below max_frequency_hz, {high:g} Hz"
+            yield InputError(path, f"{field}.min_frequency_hz", problem, "Correct one of them")
         if kind == "random" and len(names) == 1 and "random" not in reported:
             reported.add("random")
             yield InputError(

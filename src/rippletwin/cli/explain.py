@@ -29,6 +29,8 @@ of the data sheet."""
     help="Print the verdict as JSON and nothing else.",
 )
 @options.effects("Also try the effect that a Python file defines as EFFECT, again for more.")
+@options.frequency("--min-frequency", "Use nothing below it.")
+@options.frequency("--max-frequency", "Use nothing above it.")
 @options.processes("fit")
 @options.no_figures
 @click.option(
@@ -45,6 +47,8 @@ def command(
     out: str,
     as_json: bool,
     effects: tuple[str, ...],
+    min_frequency: float | None,
+    max_frequency: float | None,
     processes: int,
     no_figures: bool,
     bootstrap: int,
@@ -66,7 +70,7 @@ def command(
             f"{bootstrap} draws tell no threshold",
             f"give at least {MIN_DRAWS}, or leave it out",
         )
-    read = load_case(case, states={"healthy"})
+    read = load_case(case, states={"healthy"}, band_hz=(min_frequency, max_frequency))
     add_effects(effects, read.rig)
     warn(read.warnings)
     with progress_bars(as_json) as progress:

@@ -13,9 +13,9 @@ FREQUENCIES_PER_RESONANCE = 12  # of the line, whose resonances are 1/(2 delay) 
 def select_fitted_frequencies(observations: Sequence, rig, highest_hz: float | None = None) -> list:
     """The observations at the frequencies that are fitted.
 
-    Of a periodic recording the piston orders, the only ones of a healthy nominal pump. Of a dense
-    spectrum FREQUENCIES_PER_RESONANCE: the error of a model has the bandwidth of the line's
-    resonances, so that closer points are no further evidence.
+    Of a periodic recording the piston orders of its band, the only ones of a healthy nominal pump.
+    Of a dense spectrum FREQUENCIES_PER_RESONANCE: the error of a model has the bandwidth of the
+    line's resonances, so that closer points are no further evidence.
     """
     spacing = 1.0 / (2.0 * FREQUENCIES_PER_RESONANCE * rig.delay)
     prepared = []
@@ -23,6 +23,7 @@ def select_fitted_frequencies(observations: Sequence, rig, highest_hz: float | N
         o = select_below(o, highest_hz)
         if o.orders is not None:
             keep = np.asarray(o.orders) % rig.pump["pistons"] == 0
+            keep &= o.frequency_hz >= o.min_frequency_hz
         else:
             keep = np.zeros(len(o.frequency_hz), bool)
             keep[

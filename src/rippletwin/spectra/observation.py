@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from rippletwin.case.band import DEFAULT_MAX_HZ
 from rippletwin.case.model import FlowRipple, Recording, Rig, Sensor
+from rippletwin.errors import InputError
 from rippletwin.harmonics import peak_amplitudes
 from rippletwin.spectra.angular_resampling import Revolutions, cut_revolutions
+from rippletwin.spectra.frequency_selection import select_frequencies
 from rippletwin.spectra.noise import noise_cycle_scatter, noise_mad
 from rippletwin.spectra.speed_regression import harmonics_at_mean_speed, mean_speed
 from rippletwin.spectra.transfer_function import reference_spectra
@@ -25,7 +28,6 @@ __all__ = [
     "revolutions_of",
 ]
 
-MAX_FREQUENCY_HZ = 5000.0  # kept by default
 MAX_SAMPLING_SHARE = 0.4  # of the sampling rate, up to which frequencies are kept
 DEFAULT_RELATIVE_ERROR = 0.02  # of a spectrum or impedance without repeats or a stated error
 SMOOTHED_FREQUENCIES = 51  # over which the scatter of repeats is averaged
@@ -39,8 +41,9 @@ class Observation:
     (S = 1; Pa s/m3, or in units of the first segment's characteristic impedance if `normalised`).
     covariance (F, S, S) = E[e e^H] of the complex errors e of values, taken as circular: the real
     and the imaginary part each have half the variance. orders (F,) are shaft orders, None where the
-    source is not the shaft. mean (S,) is the mean pressure, Pa. `source` is what is known of the
-    flow source: "known" (impedance), "nominal" (a flow ripple or a pump model) or "free".
+    source is not the shaft. Fits use nothing below `min_frequency_hz`. mean (S,) is the mean
+    pressure, Pa. `source` is what is known of the flow source: "known" (impedance), "nominal" (a
+    flow ripple or a pump model) or "free".
     """
 
     kind: str
@@ -56,6 +59,7 @@ class Observation:
     flow_ripple: FlowRipple | None
     sensors: tuple[Sensor, ...]
     normalised: bool = False
+    min_frequency_hz: float = 0.0
 
     @property
     def variance(self) -> np.ndarray:
@@ -78,15 +82,35 @@ def observe(
     piston_harmonics_only : keep only the orders that are multiples of the number of pistons.
     revolutions : of a periodic recording, where they are known already (`revolutions_of`).
     progress : called with how many steps of a periodic recording's analysis are done, and of all.
+
+    Frequencies outside the recording's own band are not kept; of a periodic recording those below
+    it are, unless `piston_harmonics_only`: its shaft orders are analysed together. Raises
+    InputError where nothing is left.
     """
+    own = recording.max_frequency_hz
+    if own is not None:
+        max_frequency_hz = own if max_frequency_hz is None else min(own, max_frequency_hz)
     if recording.kind == "periodic":
         revolutions = revolutions or revolutions_of(recording, rig)
-        return _observe_periodic(
+        observation = _observe_periodic(
             recording, rig, revolutions, max_frequency_hz, piston_harmonics_only, progress
         )
-    if recording.kind == "random":
-        return _observe_random(recording, rig, max_frequency_hz)
-    return _observe_spectra(recording, rig, max_frequency_hz)
+    elif recording.kind == "random":
+        observation = _observe_random(recording, rig, max_frequency_hz)
+    else:
+        observation = _observe_spectra(recording, rig, max_frequency_hz)
+    low = recording.min_frequency_hz or 0.0
+    kept = observation.frequency_hz >= low
+    if not np.any(kept):
+        raise InputError(
+            recording.file,
+            "min_frequency_hz, max_frequency_hz",
+            "no frequency of the recording is between them",
+            "Give a wider band",
+        )
+    observation = replace(observation, min_frequency_hz=low)
+    together = observation.orders is not None and not piston_harmonics_only
+    return observation if together else select_frequencies(observation, kept)
 
 
 def revolutions_of(
@@ -198,5 +222,5 @@ def _relative_scatter(residual: np.ndarray, size: np.ndarray) -> np.ndarray:
 
 
 def _highest(max_frequency_hz: float | None, sampling_rate_hz: float) -> float:
-    limit = MAX_FREQUENCY_HZ if max_frequency_hz is None else max_frequency_hz
+    limit = DEFAULT_MAX_HZ if max_frequency_hz is None else max_frequency_hz
     return min(limit, MAX_SAMPLING_SHARE * sampling_rate_hz)

@@ -1,0 +1,61 @@
+"""The band of a recording that is used, and the frequencies to which plane waves are alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rippletwin.case.model import Recording, Rig
+from rippletwin.errors import InputError
+
+DEFAULT_MAX_HZ = 5000.0  # of a sampled recording whose band is not stated
+FIRST_CROSS_MODE = 1.841  # first zero of J1', for a circular section
+
+
+def plane_wave_limit(rig: Rig) -> tuple[float, int]:
+    """Frequency in Hz, and number of the segment where it is lowest, above which waves across the
+    pipe travel too: 1.841 a/(pi D) (Morse & Ingard 1968, Theoretical Acoustics, sec. 9.2)."""
+    limits = [FIRST_CROSS_MODE * s.wave_speed / (np.pi * s.diameter) for s in rig.line]
+    lowest = int(np.argmin(limits))
+    return float(limits[lowest]), lowest + 1
+
+
+def narrow_band(
+    recording: Recording, lowest_hz: float | None, highest_hz: float | None
+) -> Recording:
+    """The recording with the narrower of its own band and another.
+
+    Raises InputError where nothing is between them.
+    """
+    lows = [x for x in (recording.min_frequency_hz, lowest_hz) if x is not None]
+    highs = [x for x in (recording.max_frequency_hz, highest_hz) if x is not None]
+    low, high = max(lows, default=None), min(highs, default=None)
+    if low is not None and high is not None and low >= high:
+        raise InputError(
+            "command line",
+            "--min-frequency, --max-frequency",
+            f"nothing of {recording.label} is between {low:g} and {high:g} Hz",
+            "Give a lower and a higher frequency, in this order",
+        )
+    return replace(recording, min_frequency_hz=low, max_frequency_hz=high)
+
+
+def band_warnings(rig: Rig, recordings: Sequence[Recording]) -> Iterator[str]:
+    """A line for every recording that is used above the plane-wave limit of the rig."""
+    limit, segment = plane_wave_limit(rig)
+    for recording in recordings:
+        highest = recording.max_frequency_hz or _highest(recording)
+        if highest > limit:
+            yield (
+                f"{recording.label}: used up to {highest:.4g} Hz, but above {limit:.4g} Hz waves "
+                f"across segment {segment} travel too (1.841 a/(pi D)), which the twin does not "
+                "have; give max_frequency_hz or --max-frequency"
+            )
+
+
+def _highest(recording: Recording) -> float:
+    if recording.frequency_hz is not None:
+        return float(recording.frequency_hz[-1])
+    return min(DEFAULT_MAX_HZ, 0.4 * recording.sampling_rate_hz)

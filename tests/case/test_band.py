@@ -1,0 +1,76 @@
+"""The band of a recording that is fitted, and the warning where plane waves are not alone."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.special import jvp
+
+from case_folders import spoilt, told
+from rippletwin.case.band import FIRST_CROSS_MODE, plane_wave_limit
+from rippletwin.case.load import load_case
+from rippletwin.case.model import Fluid, Load, Rig, Segment
+from rippletwin.errors import InputError
+from rippletwin.spectra.frequency_selection import select_fitted_frequencies
+from rippletwin.spectra.observation import observe
+
+
+def banded(folder, **keys):
+    """A case whose one recording has more keys."""
+    spoilt(folder, lambda content: content["recordings"][0].update(keys))
+    return folder
+
+
+def test_the_limit_is_the_first_zero_of_j1s_slope():
+    """A wave across a circular pipe travels where J1'(pi f D/a) = 0 (Rayleigh 1896): the widest
+    slow segment decides."""
+    zero = brentq(lambda x: jvp(1, x), 1.0, 2.5)
+    assert zero == pytest.approx(FIRST_CROSS_MODE, abs=1e-3)
+    line = (Segment(1.0, 0.05, 343.0), Segment(1.0, 0.1, 343.0))
+    limit, segment = plane_wave_limit(
+        Rig(Fluid(1.2, 1.5e-5, 1.4, 0.71), {}, line, (), Load("open"))
+    )
+    assert segment == 2 and limit == pytest.approx(zero * 343.0 / (np.pi * 0.1), rel=1e-3)
+
+
+def test_only_the_band_is_fitted(tmp_path):
+    """Of the harmonics every 150 Hz those from 300 to 500 Hz are fitted; the command line narrows
+    the sheet's band and does not widen it."""
+    folder = banded(tmp_path, min_frequency_hz=200.0, max_frequency_hz=500.0)
+    for band, low, high in (((None, None), 300, 450), ((310.0, 2000.0), 450, 450)):
+        case = load_case(folder, band_hz=band)
+        observed = observe(case.recordings[0], case.rig)
+        (fitted,) = select_fitted_frequencies([observed], case.rig)
+        assert fitted.frequency_hz[0] == pytest.approx(low, rel=2e-3)
+        assert fitted.frequency_hz[-1] == pytest.approx(high, rel=2e-3)
+    assert observed.orders[0] == 1  # shaft orders below are analysed all the same
+
+
+def test_a_band_without_anything_is_bad_input(tmp_path):
+    """Ends in the wrong order, in the sheet or beside the command line; a band between lines."""
+    with pytest.raises(InputError) as caught:
+        load_case(banded(tmp_path, min_frequency_hz=900.0, max_frequency_hz=500.0))
+    told(caught.value, "rig.yaml", "recordings[0].min_frequency_hz", "not below")
+    folder = banded(tmp_path, max_frequency_hz=500.0)
+    with pytest.raises(InputError, match="--min-frequency"):
+        load_case(folder, band_hz=(600.0, None))
+    case = load_case(banded(tmp_path, min_frequency_hz=452.0, max_frequency_hz=453.0))
+    with pytest.raises(InputError, match="no frequency"):
+        observe(case.recordings[0], case.rig)
+
+
+@pytest.mark.parametrize(
+    ("diameter", "top", "warned"), [(0.02, None, False), (0.14, None, True), (0.14, 4000.0, False)]
+)
+def test_a_warning_above_the_plane_wave_limit(tmp_path, diameter, top, warned):
+    """A pipe of 14 cm has waves across from 4.2 kHz on: up to the usual 5 kHz there is a warning,
+    which names recording and segment; up to 4 kHz, or in a pipe of 2 cm, there is none."""
+
+    def widen(content):
+        content["line"]["segments"][1]["diameter"] = diameter
+        if top is not None:
+            content["recordings"][0]["max_frequency_hz"] = top
+
+    spoilt(tmp_path, widen)
+    warnings = [w for w in load_case(tmp_path).warnings if "travel too" in w]
+    assert bool(warned) == bool(warnings)
+    assert not warned or ("healthy_0" in warnings[0] and "segment 2" in warnings[0])
