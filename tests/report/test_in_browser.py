@@ -110,6 +110,17 @@ def test_the_pointer_shows_values(browser, report):
     assert page.inner_text("#ripples .readout >> nth=0") == ""
 
 
+def test_the_keyboard_shows_values(browser, report):
+    """The arrow keys step through a chart's points, whose first is at no angle."""
+    page, _ = browser(report)
+    chart = page.locator("#ripples svg.chart").first
+    chart.focus()
+    first = page.inner_text("#ripples .readout >> nth=0")
+    chart.press("ArrowRight")
+    second = page.inner_text("#ripples .readout >> nth=0")
+    assert first.startswith("shaft angle degrees 0:") and first != second
+
+
 def test_tables_sort_by_number_and_back(browser, report):
     """A click sorts by the numbers behind the text, a second one the other way."""
     page, _ = browser(report)

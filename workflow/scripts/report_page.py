@@ -20,12 +20,11 @@ rows = summarise(pd.read_csv(paths.table)).to_dict("records")
 for row in rows:
     row["title"] = ARCHITECTURES[row["architecture"]].title
 paper = pd.read_csv(paths.paper).itertuples(index=False)
-picture = "Where the networks look (Grad-CAM), on simulated and on recorded signals: {}"
-pictures = [
-    (picture.format(Path(path).stem), "data:image/png;base64," + b64encode(data).decode())
-    for path in paths.attention
-    for data in [Path(path).read_bytes()]
-]
+pictures = []
+for path in map(Path, paths.attention):
+    windows = path.stem.rpartition("_")[2]
+    picture = "data:image/png;base64," + b64encode(path.read_bytes()).decode()
+    pictures.append((f"Where the networks look (Grad-CAM): {windows} signals", picture))
 workflow = WorkflowPart(
     tables=(
         accuracy_table(rows, {(p.architecture, p.dataset): (p.mean, p.std) for p in paper}),

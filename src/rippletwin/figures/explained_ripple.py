@@ -19,7 +19,7 @@ LOOKS = {
 }
 """The thin lines show on the wide one, also where all three agree."""
 RESIDUAL_LIMITS = 0.1, 100.0
-LEAST_HEIGHT = 2.4  # inches, for the label of the colour scale
+LEAST_HEIGHT = 2.6  # inches, of a figure of one row
 
 
 def title_of(point: Point) -> str:
@@ -63,7 +63,8 @@ def plot_ripple(numbers: ExplainedNumbers) -> Figure:
     """Ripple at each sensor (rows) and operating point (columns)."""
     shown, names = numbers.points[:MAX_COLUMNS], curves_of(numbers)
     rows = max(len(p.measured) for p in shown)
-    fig, axes = style.figure(rows, len(shown), height=1.75, sharex="col", sharey="row")
+    height = max(1.75, LEAST_HEIGHT / rows)
+    fig, axes = style.figure(rows, len(shown), height=height, sharex="col", sharey="row")
     for k, (column, point) in enumerate(zip(axes.T, shown)):
         for ax in column[len(point.measured) :]:
             ax.set_visible(False)

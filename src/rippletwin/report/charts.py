@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from rippletwin.report.svg import Chart, Series
 from rippletwin.spectra.observation import revolutions_of
 
 PITCHES_OF_ORDERS = 12  # an order spectrum ends at that multiple of the pumping frequency
+SECONDS_OF_SPECTRUM = 60.0  # of a recording: enough for an amplitude, whatever its length
 RIPPLE_STEP = 2  # of the samples of a ripple one in so many is drawn
 
 
@@ -34,10 +35,12 @@ class OrderSpectrum:
 
 
 def order_spectrum(recording: Recording, rig: Rig) -> OrderSpectrum | None:
-    """The spectrum of a periodic recording averaged over its revolutions; None for other kinds."""
+    """The spectrum of a periodic recording averaged over the revolutions of its first minute; None
+    for other kinds."""
     if recording.kind != "periodic":
         return None
-    revolutions = revolutions_of(recording, rig)
+    few = recording.pressure[:, : int(SECONDS_OF_SPECTRUM * recording.sampling_rate_hz)]
+    revolutions = revolutions_of(replace(recording, pressure=few), rig)
     pistons = rig.pump["pistons"]
     mean = revolutions.windows.mean(axis=0)
     count = min(PITCHES_OF_ORDERS * pistons, mean.shape[-1] // 2 - 1)

@@ -123,7 +123,7 @@ def make_page(results: Results, workflow: WorkflowPart | None = None) -> Page:
         kind=kind,
         sentence="" if verdict is None else verdict_words.verdict_sentence(verdict),
         tiles=_tiles(results),
-        warnings=[*_generic_pump(case), *case.warnings],
+        warnings=case.warnings,
         missing=results.missing,
         columns=min(max(len(case.rig.sensors), 2), 3),
         line_wide=draw_line(places, marked, WIDE),
@@ -154,17 +154,6 @@ def _draw(drawn: Sequence[Chart]) -> list[Figure]:
             [(s.name, s.role, s.form) for s in chart.series],
         )
         for chart in drawn
-    ]
-
-
-def _generic_pump(case) -> list[str]:
-    """A warning where the pump is known by its number of pistons alone."""
-    if set(case.rig.pump) - {"pistons"} or not case.rig.pump:
-        return []
-    return [
-        "rig.yaml says no more of the pump than its number of pistons. Faults are simulated with a "
-        "generic pump of 42 cm³, not with yours: leak areas and simulated ripples are those of "
-        "that pump. Give its geometry, or a flow ripple for each recording."
     ]
 
 

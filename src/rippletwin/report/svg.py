@@ -83,7 +83,8 @@ def draw_chart(chart: Chart) -> Markup:
     }
     label = f"{chart.heading}. {chart.note}. {chart.y_label} over {chart.x_label}"
     return Markup(
-        '<svg class="chart" viewBox="0 0 {} {}" role="img" aria-label="{}" data-chart="{}">{}</svg>'
+        '<svg class="chart" viewBox="0 0 {} {}" role="img" tabindex="0" aria-label="{}" '
+        'data-chart="{}">{}</svg>'
     ).format(WIDTH, HEIGHT, label, json.dumps(numbers), Markup("").join(parts))
 
 

@@ -15,6 +15,7 @@ TITLES = {
     "unexplained": "Physics is missing that the library does not contain",
     "bad_data": "The recordings contradict themselves",
 }
+POINT = 5e-3  # m: a shorter interval is a point
 SUPPORTS = ("established", "supported", "suggested")
 
 
@@ -24,7 +25,7 @@ def verdict_title(verdict: Mapping) -> str:
 
 
 def verdict_sentence(verdict: Mapping) -> str:
-    """The verdict in one plain sentence."""
+    """The verdict in one plain sentence, and one more on what remains."""
     kind, effects = verdict["verdict"], verdict.get("effects") or []
     if kind == "consistent":
         return (
@@ -48,9 +49,26 @@ def verdict_sentence(verdict: Mapping) -> str:
             f"The rig has what its data sheet does not say: {said}, or an equivalent of it "
             f"({rivals}); these recordings cannot tell which."
         )
-    if not effects:
-        return f"Something is missing {_where(verdict)}, and no effect of the library explains it."
-    return f"The rig has what its data sheet does not say: {_effects(effects)}{_change(verdict)}."
+    if kind == "unexplained" or not effects:
+        suggested = f"; what the recordings suggest is {_effects(effects)}" if effects else ""
+        return (
+            f"Something is missing {_where(verdict)}, and no effect of the library explains it"
+            f"{suggested}."
+        )
+    left = f" {_left(verdict['remainder'])}" if verdict.get("remainder") else ""
+    said = f"{_effects(effects)}{_change(verdict)}"
+    return f"The rig has what its data sheet does not say: {said}.{left}"
+
+
+def _left(remainder: Mapping) -> str:
+    """What remains, and where, as a sentence."""
+    words = [f"What remains is {write_share(remainder['misfit'])} of the ripple"]
+    if remainder.get("element"):
+        words.append(name_place(remainder["element"]))
+    position = remainder.get("position_m")
+    if position and position[1] - position[0] > POINT:
+        words.append(f"({position[0]:.2f} to {position[1]:.2f} m from the pump)")
+    return " ".join(words) + "."
 
 
 def _effects(effects: Sequence[Mapping]) -> str:
@@ -69,7 +87,7 @@ def _where(verdict: Mapping) -> str:
     where = (verdict.get("mismatch") or {}).get("where") or {}
     words = name_place(where.get("element", "line"))
     position = where.get("position_m")
-    if position and position[1] - position[0] > 5e-3:
+    if position and position[1] - position[0] > POINT:
         words += f", {position[0]:.2f} to {position[1]:.2f} m from the pump"
     return words
 
@@ -102,13 +120,7 @@ def remaining_sentences(verdict: Mapping) -> list[str]:
         after = write_share(errors[1])
         sentences.append(f"Data that the twin has not seen are predicted with an error of {after}.")
     if remainder:
-        words = [f"What remains is {write_share(remainder['misfit'])} of the ripple"]
-        if remainder.get("element"):
-            words.append(name_place(remainder["element"]))
-        position = remainder.get("position_m")
-        if position and position[1] - position[0] > 5e-3:
-            words.append(f"({position[0]:.2f} to {position[1]:.2f} m from the pump)")
-        sentences.append(" ".join(words) + ".")
+        sentences.append(_left(remainder))
         if remainder.get("bands_hz"):
             sentences.append(f"It stands out at {_bands(remainder['bands_hz'])}.")
         if remainder.get("law"):

@@ -13,14 +13,32 @@
     const [left, width] = chart.plot;
     const [low, high] = chart.range;
 
-    function show(event) {
+    let nearest = 0;
+
+    function point(event) {
       const box = svg.getBoundingClientRect();
       const place = ((event.clientX - box.left) / box.width) * svg.viewBox.baseVal.width;
       const wanted = low + ((place - left) / width) * (high - low);
-      let nearest = 0;
       chart.x.forEach(function (x, k) {
         if (Math.abs(x - wanted) < Math.abs(chart.x[nearest] - wanted)) nearest = k;
       });
+      show();
+    }
+
+    function step(event) {
+      const by = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+      if (!by) return;
+      event.preventDefault();
+      nearest = Math.min(Math.max(nearest + by, 0), chart.x.length - 1);
+      show();
+    }
+
+    function hide() {
+      cursor.style.visibility = "hidden";
+      readout.textContent = "";
+    }
+
+    function show() {
       const at = left + ((chart.x[nearest] - low) / (high - low)) * width;
       cursor.setAttribute("x1", at);
       cursor.setAttribute("x2", at);
@@ -34,12 +52,12 @@
         " (" + chart.yLabel + ")";
     }
 
-    svg.addEventListener("pointermove", show);
-    svg.addEventListener("pointerdown", show);
-    svg.addEventListener("pointerleave", function () {
-      cursor.style.visibility = "hidden";
-      readout.textContent = "";
-    });
+    svg.addEventListener("pointermove", point);
+    svg.addEventListener("pointerdown", point);
+    svg.addEventListener("pointerleave", hide);
+    svg.addEventListener("keydown", step);
+    svg.addEventListener("focus", show);
+    svg.addEventListener("blur", hide);
   }
 
   function sortBy(header, column) {
