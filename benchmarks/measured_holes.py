@@ -1,0 +1,88 @@
+"""Missing physics of a measured air tube with side holes, and its error on a run not fitted.
+
+    python benchmarks/measured_holes.py MEASURED FOLDER
+
+MEASURED holds three runs of each state, STATE_1.txt to STATE_3.txt, of which two are fitted. FOLDER
+gets a case of each state, and verdict.json, twin.json and figures of it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from rippletwin.calibration.misfit import score_fit
+from rippletwin.case.load import load_case
+from rippletwin.case.model import Case
+from rippletwin.explanation.explain import explain
+from rippletwin.explanation.verdict.verdict_file import write_verdict
+from rippletwin.figures.explanation import draw
+from rippletwin.spectra.observation import observe
+from rippletwin.twin.forward_model import reflection
+
+DATA_SHEET = Path(__file__).resolve().parent.parent / "resources" / "hole_tube" / "rig.yaml"
+STATES = ("closed", "first_open")
+
+
+def case(measured: Path, state: str, folder: Path, runs: tuple[int, int] = (1, 2)) -> Case:
+    """The tube's case with two runs of a state."""
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.copy(DATA_SHEET, folder)
+    for k, run in enumerate(runs, 1):
+        shutil.copy(measured / f"{state}_{run}.txt", folder / f"run_{k}.txt")
+    return load_case(folder)
+
+
+def unseen_run(measured: Path, state: str, run: int, seen: Case, folder: Path):
+    """The observation of a run that is not fitted."""
+    other = case(measured, state, folder, (run, run))
+    recording = replace(other.recordings[0], spectra=other.recordings[0].spectra[:1])
+    return observe(recording, seen.rig)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("measured", type=Path)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--states", nargs="*", default=STATES, metavar="STATE")
+    parser.add_argument("--processes", type=int, default=2)
+    arguments = parser.parse_args()
+    print("| state | runs differ by | calibrated | explained | error on run 3 | effects |")
+    print("|---|---|---|---|---|---|")
+    sentences = []
+    for state in arguments.states:
+        folder = arguments.folder / state
+        fitted = case(arguments.measured, state, folder / "fitted")
+        unseen = unseen_run(arguments.measured, state, 3, fitted, folder / "unseen")
+        first, second = reflection(fitted.recordings[0].spectra[:, 0])
+        explanation = explain(fitted, processes=arguments.processes)
+        accepted = explanation.decision.accepted
+        misfits = [
+            score_fit(fit, data).misfit
+            for fit, data in (
+                (explanation.search.base, [unseen]),
+                (accepted, explanation.observations),
+                (accepted, [unseen]),
+            )
+        ]
+        between = np.linalg.norm(second - first) / np.linalg.norm(first)
+        values = accepted.twin.values()
+        effects = [
+            f"{effect.name}" + (f" at {1e3 * x:.1f} mm" if (x := values.get(key)) else "")
+            for effect, place in accepted.hypothesis
+            for key in [f"{effect.name}@{place}.position"]
+        ]
+        cells = [state, f"{between:.1%}", *(f"{x:.1%}" for x in misfits), ", ".join(effects)]
+        print("| " + " | ".join(cells) + " |", flush=True)
+        result = write_verdict(explanation, folder / "explained")
+        draw(explanation, folder / "explained", processes=arguments.processes)
+        sentences.append(f"{state}: {result['verdict']}: {result['sentence']}")
+    print("\n" + "\n\n".join(sentences))
+
+
+if __name__ == "__main__":
+    main()
