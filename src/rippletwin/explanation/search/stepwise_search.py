@@ -132,14 +132,18 @@ def _search_stepwise(workers: Workers, start: Search, candidates: Sequence, prog
     extensions = single_effect_fits
     if not any(f.hypothesis[:-1] == best.hypothesis for f in extensions):
         extensions = fit_extensions(workers, best, candidates, progress)
+    ended = set()  # labels of fits that no extension improves
     while True:
         extended = _accepted_extension(best, extensions)
         if extended is None:
             exchanged = exchange_effects(workers, best, single_effect_fits)
             moved, other_positions = move_to_best_position(workers, exchanged)
-            if moved is best:
-                break
-            best = moved if exchanged is best else _revise(workers, moved, candidates)
+            if exchanged is not best:
+                moved = _revise(workers, moved, candidates)
+            if moved is best or (exchanged is not best and moved.label in ended):
+                break  # a simpler effect is preferred to a slightly better one: no way round
+            ended.add(best.label)
+            best = moved
         else:
             if extensions is not single_effect_fits:
                 rivals = [*rivals, *extensions]
