@@ -140,9 +140,9 @@ def _search_stepwise(workers: Workers, start: Search, candidates: Sequence, prog
             moved, other_positions = move_to_best_position(workers, exchanged)
             if exchanged is not best:
                 moved = _revise(workers, moved, candidates)
+            ended.add(best.label)
             if moved is best or (exchanged is not best and moved.label in ended):
                 break  # a simpler effect is preferred to a slightly better one: no way round
-            ended.add(best.label)
             best = moved
         else:
             if extensions is not single_effect_fits:
