@@ -9,6 +9,7 @@ from scipy.stats import multivariate_normal
 from rippletwin.calibration.frequency_continuation import refine
 from rippletwin.explanation.checks.robustness import compare_beside_corrections
 from rippletwin.explanation.fit_jobs import FitJob, NearFit, Workers
+from rippletwin.explanation.localise.remainder import find_remainder
 from rippletwin.explanation.localise.smooth_corrections import (
     CORRELATION_HZ,
     NONE,
@@ -22,7 +23,7 @@ from rippletwin.spectra.frequency_selection import select_fitted_frequencies
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.twin import Twin
-from synthetic_effects import TRUTH, VOLUME
+from synthetic_effects import LEAK, TRUTH, VOLUME
 from synthetic_observations import POINTS, make
 
 
@@ -93,6 +94,9 @@ def test_a_true_effect_survives_an_unlisted_error_elsewhere(line_with_volume):
     best = max(tables[0], key=tables[0].get)
     assert best == ("sensor", 1)
     assert tables[0][best] > tables[0][NONE, None] + 20.0
+    remainder = find_remainder(fit, data)
+    assert remainder.is_significant and remainder.element == ("sensor", 1)
+    assert 0.005 < remainder.model_error < 0.1 and remainder.law is None
 
 
 def test_an_effect_that_fits_an_unlisted_error_is_not_established(line_with_volume):
@@ -105,3 +109,20 @@ def test_an_effect_that_fits_an_unlisted_error_is_not_established(line_with_volu
     assert fit.evidence > first.evidence + 8.0
     _, robustness = robustness_of_last_effect(base, data, fit)
     assert robustness.own < 0.0 or robustness.least < 8.0
+
+
+def test_the_remainder_of_an_unlisted_leak_is_a_leak_at_its_place():
+    """A leak that the fit does not have: the remainder is a shunt near it, and its law is flat."""
+    bench, recorded, truth = make(
+        np.random.default_rng(4), LEAK, TRUTH, 3, POINTS[:2], source=0.0, noise=500.0
+    )
+    data = select_fitted_frequencies(recorded, bench)
+    base = Twin(bench, data)
+    start = np.array([truth.theta[truth.index[p.name]] for p in base.parameters])
+    fit = refine(base, (), data, [start], exact=False)
+    remainder = find_remainder(fit, data)
+    kind, _ = remainder.element
+    low, high = remainder.interval
+    position = TRUTH["leak@position.position"]
+    assert kind == "shunt" and low - 0.3 <= position <= high + 0.3
+    assert "leak" in remainder.law
