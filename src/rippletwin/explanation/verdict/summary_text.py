@@ -68,9 +68,8 @@ def _named(e: Explanation, result: dict, entries: Sequence[dict]) -> list[str]:
     named = [x for x in entries if x["effect"].named]
     certain = [x for x in named if _level(levels, x) == "established"]
     names = [_effect_and_place(e, entry) for entry in certain]
-    verb = "is" if len(names) == 1 else "are"
     sentences = [
-        f"The twin lacks {join_words(names)}: {verb} established. With all effects below, the "
+        f"The twin lacks {join_words(names)}. This is established. With the effects listed, the "
         f"misfit on held-out data goes from {before:.1%} to {after:.1%} of the measured ripple."
     ]
     for entry in certain:
