@@ -34,6 +34,19 @@ def test_the_first_recording_that_is_not_healthy_decides():
     assert labels(case) == [["healthy", "slipper"], ["elsewhere", "faster"]]
 
 
+def test_close_points_are_one():
+    """7.08, 7.077 and 7.09 MPa are one setting of a valve, 1000 and 1002 r/min one of a drive;
+    7.3 MPa and 1010 r/min are others, and none is lost."""
+    case = [
+        recording("unknown", "unknown", load_pressure=7.08e6),
+        recording("healthy", "healthy", load_pressure=7.077e6, speed_rpm=1002.0),
+        recording("later", "unknown", load_pressure=7.09e6),
+        recording("loaded", "unknown", load_pressure=7.3e6),
+        recording("faster", "unknown", load_pressure=7.08e6, speed_rpm=1010.0),
+    ]
+    assert labels(case) == [["unknown", "healthy", "later"], ["loaded", "faster"]]
+
+
 def test_healthy_recordings_alone_are_those_of_the_first_point():
     """Nothing is to be diagnosed yet: the first recording decides."""
     case = [recording("a", "healthy", speed_rpm=1500.0), recording("b", "healthy")]

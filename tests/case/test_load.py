@@ -74,6 +74,20 @@ def test_every_format_gives_the_same_recording(tmp_path, name, write):
     assert case.recordings[0].sampling_rate_hz == pytest.approx(RATE, rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("keys", "pascals"),
+    [({"unit": "bar"}, 1e5), ({"unit": "kPa", "scale": -2.0}, -2e3), ({"scale": 600.0}, 600.0)],
+)
+def test_unit_and_scale_of_a_recording(tmp_path, keys, pascals):
+    """A file in bar, one of inverted half kPa and one of counts of 600 Pa each: all come in as the
+    pressure that was there."""
+    content = sheet()
+    content["recordings"][0].update(keys)
+    pressure = ripple()
+    write_case(tmp_path, content, pressure / pascals)
+    np.testing.assert_allclose(load_case(tmp_path).recordings[0].pressure, pressure, rtol=1e-9)
+
+
 def test_the_sheet_arrives_in_the_dataclasses(tmp_path):
     """Every key of a sheet is found under its own name, 9.5e6 as a number."""
     content = sheet()

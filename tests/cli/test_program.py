@@ -257,3 +257,19 @@ def test_help_imports_no_mathematics():
     command = [sys.executable, "-c", script]
     run = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT)
     assert run.stdout.splitlines()[-1] == "set()", run.stderr
+
+
+def test_recordings_of_another_point_are_told(tmp_path, capsys):
+    """Of two unknown recordings the workflow classifies one: check names the other one."""
+
+    def spoil(content):
+        first = content["recordings"][0]
+        content["recordings"] = [
+            {**first, "label": "as it was", "state": "unknown"},
+            {**first, "label": "loaded", "state": "unknown", "load_pressure": 9.9e6},
+        ]
+
+    spoilt(tmp_path, spoil)
+    assert main(["check", str(tmp_path), "--json"]) == 0
+    advice = json.loads(capsys.readouterr().out)["advice"]
+    assert [line for line in advice if "Outside it: loaded." in line]

@@ -6,6 +6,9 @@ from collections.abc import Sequence
 
 from rippletwin.case.model import Recording
 
+SAME_SPEED, SAME_PRESSURE = 0.005, 0.02
+"""Relative differences from the diagnosed point within which a recording is at that point."""
+
 
 def recordings_to_diagnose(
     recordings: Sequence[Recording],
@@ -13,18 +16,27 @@ def recordings_to_diagnose(
     """Periodic recordings at the diagnosed operating point, and those at another one.
 
     The diagnosed point, nominal speed and load pressure, is that of the first periodic recording
-    that is not healthy, or of the first periodic one where all are healthy. The order of the
-    recordings is kept. Raises ValueError where none is periodic.
+    that is not healthy, or of the first periodic one where all are healthy. A recording is at that
+    point where its speed differs by no more than SAME_SPEED and its pressure by no more than
+    SAME_PRESSURE. The order of the recordings is kept. Raises ValueError where none is periodic.
     """
     periodic = [recording for recording in recordings if recording.kind == "periodic"]
     if not periodic:
         raise ValueError("no periodic recording: there is nothing to diagnose")
-    point = _point(next((r for r in periodic if r.state != "healthy"), periodic[0]))
+    first = next((r for r in periodic if r.state != "healthy"), periodic[0])
+    near = [_is_near(recording, first) for recording in periodic]
     return (
-        [recording for recording in periodic if _point(recording) == point],
-        [recording for recording in periodic if _point(recording) != point],
+        [recording for recording, here in zip(periodic, near) if here],
+        [recording for recording, here in zip(periodic, near) if not here],
     )
 
 
-def _point(recording: Recording) -> tuple[float, float]:
-    return recording.speed_rpm, recording.load_pressure
+def _is_near(recording: Recording, other: Recording) -> bool:
+    """Whether two recordings are of one operating point, within the tolerances."""
+    pairs = (
+        (recording.speed_rpm, other.speed_rpm, SAME_SPEED),
+        (recording.load_pressure, other.load_pressure, SAME_PRESSURE),
+    )
+    return all(
+        a == b or (None not in (a, b) and abs(a / b - 1) <= tolerance) for a, b, tolerance in pairs
+    )

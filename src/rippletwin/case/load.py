@@ -21,6 +21,7 @@ from rippletwin.case.model import (
     Uncertainty,
 )
 from rippletwin.case.plausibility import unusual_values
+from rippletwin.case.pressure_units import PASCALS
 from rippletwin.case.readers.registry import read_signals
 from rippletwin.case.rig_yaml import faults, find_sheet, parse_sheet
 from rippletwin.case.sheet_checks import missing_files
@@ -118,7 +119,9 @@ def _recording(folder: Path, entry: dict, rig: Rig) -> Recording:
         return Recording(**fields, frequency_hz=frequency_hz, spectra=spectra)
     signals = read_signals(path, [sensor.name for sensor in rig.sensors])
     rate = sampling_rate(path, signals, entry.get("sampling_rate_hz"))
-    recording = Recording(**fields, pressure=signals.pressure, sampling_rate_hz=rate)
+    factor = entry.get("scale", 1.0) * PASCALS[entry.get("unit", "Pa")]
+    pressure = signals.pressure if factor == 1.0 else signals.pressure * factor
+    recording = Recording(**fields, pressure=pressure, sampling_rate_hz=rate)
     raise_any(signal_errors(recording, rig))
     return recording
 

@@ -8,6 +8,8 @@ from rippletwin.case.model import Recording, Rig
 from rippletwin.errors import InputError
 
 UNITS = (("bar", 1e5), ("MPa", 1e6), ("kPa", 1e3), ("psi", 6894.76))
+PASCALS = {"Pa": 1.0, **dict(UNITS)}
+"""Unit of a recording's `unit` in rig.yaml -> Pa."""
 LARGEST_COUNT = 2**24  # of a converter of 24 bits
 VACUUM = -1.1e5  # Pa; gauge pressure cannot be lower
 
@@ -34,10 +36,11 @@ def unit_error(recording: Recording, rig: Rig, name: str, row: np.ndarray) -> In
     unit = _unit_guess(abs(mean), load)
     looks, remedy = "", "Give pressure in Pa"
     if unit:
-        looks, remedy = f" and looks like {unit[0]}", f"{remedy}: multiply by {unit[1]:g}"
+        looks = f" and looks like {unit[0]}"
+        remedy = f"{remedy}: multiply by {unit[1]:g}, or give unit: {unit[0]} in rig.yaml"
     if counts:
         looks += f"{' or' if unit else ' and looks like'} raw counts: whole numbers only"
-        remedy += "; raw counts need the recorder's scale, Pa a count"
+        remedy += "; raw counts need the recorder's scale, Pa a count, as scale in rig.yaml"
     return InputError(recording.file, name, problem + looks, f"{remedy}; or correct load_pressure")
 
 

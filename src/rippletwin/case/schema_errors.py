@@ -99,6 +99,8 @@ def _explained(path: Path, error: jsonschema.ValidationError) -> list[InputError
     }
     if rule in limits:
         problem = f"{shown(value)} is {limits[rule]} {error.validator_value:g}"
+    elif rule == "not":
+        problem = f"{shown(value)} is not allowed"
     elif rule in ("minItems", "minLength"):
         problem = "empty"
     else:

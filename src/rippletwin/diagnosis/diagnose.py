@@ -11,6 +11,8 @@ from rippletwin.diagnosis.anchor import distance
 from rippletwin.diagnosis.diagnoser import MOST_REPEATS, Diagnoser
 from rippletwin.diagnosis.diagnosis import Diagnosis
 from rippletwin.diagnosis.faults.base import Fault
+from rippletwin.diagnosis.line_calibration import calibrate_line
+from rippletwin.diagnosis.pump_calibration import calibrate_pump, one_each_point
 from rippletwin.errors import InputError
 from rippletwin.spectra.observation import observe, revolutions_of
 from rippletwin.twin.twin import Twin
@@ -24,17 +26,29 @@ def diagnose(
     recordings: Sequence[Recording],
     faults: Sequence[Fault],
     progress: Callable[[str, int, int], None] | None = None,
+    recalibrate: bool = True,
 ) -> list[Diagnosis]:
     """Diagnose periodic recordings of a case by its twin, each anchored to the healthy recording of
     the nearest operating point, itself excepted.
+
+    recalibrate   whether the twin's line is fitted to ratios between sensors (`calibrate_line`) and
+                  its pump to the flow that the recordings ask for (`calibrate_pump`)
 
     `progress` is told what is done, how much of it, and of how much. Raises InputError where the
     twin is that of another rig, and where there is no healthy recording to anchor one to.
     """
     _check_twin(case, twin)
     healthy = {r.label: _anchors(case, r)[: 1 + MOST_REPEATS] for r in recordings}
-    diagnoser, read, found = Diagnoser(twin, faults), {}, []
+    read, found = {}, []
     with threadpool_limits(1):
+        if recalibrate:
+            beside = [r for r in case.healthy if r.kind == "periodic" and r not in recordings]
+            for each in beside:
+                read[each.label] = _read(each, case.rig)
+            healthy_ones = [read[each.label][0] for each in beside]
+            twin = calibrate_line(twin, healthy_ones)
+            twin = calibrate_pump(twin, one_each_point(healthy_ones))
+        diagnoser = Diagnoser(twin, faults)
         for k, recording in enumerate(recordings):
             if progress:
                 progress("diagnosing", k, len(recordings))

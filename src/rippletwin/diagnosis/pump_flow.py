@@ -68,6 +68,12 @@ def with_fitted_pump(twin: Twin, mean_flow: float | None = None, speed_hz: float
     )
 
 
+def load_pressure_of(twin: Twin, observation) -> float:
+    """Load pressure, Pa, of an observation: as stated, or as its sensors' means have it."""
+    point = twin.operating_point(replace(observation, source="free"))
+    return observation.load_pressure or point.load_pressure
+
+
 def _scaled(pump: Geometry, displacement: float) -> dict:
     """The pump, all its lengths changed alike, of another displacement, m3 a revolution."""
     ratio = displacement / pump.displacement

@@ -8,6 +8,11 @@ from functools import partial
 
 import numpy as np
 
+from rippletwin.case.diagnosed_point import (
+    SAME_PRESSURE,
+    SAME_SPEED,
+    recordings_to_diagnose,
+)
 from rippletwin.case.model import Case, Recording, Rig
 from rippletwin.case.recording_advice import PlannedRecording, advise
 from rippletwin.case.speed_estimate import estimate_speed
@@ -32,8 +37,23 @@ def summarise_rig(case: Case) -> dict:
         "recording_count": len(case.recordings),
         "healthy_count": len(case.healthy),
         "warnings": list(case.warnings),
-        "advice": advise(rig, [PlannedRecording.of(r) for r in case.recordings]),
+        "advice": [
+            *advise(rig, [PlannedRecording.of(r) for r in case.recordings]),
+            *_left_out(case.recordings),
+        ],
     }
+
+
+def _left_out(recordings) -> Iterator[str]:
+    """A sentence about recordings that the workflow's networks do not classify."""
+    if any(r.kind == "periodic" and r.state != "healthy" for r in recordings):
+        elsewhere = [r.label for r in recordings_to_diagnose(recordings)[1] if r.state != "healthy"]
+        if elsewhere:
+            yield (
+                "The workflow's networks classify one operating point, within "
+                f"{100 * SAME_SPEED:g} % of speed and {100 * SAME_PRESSURE:g} % of pressure. "
+                f"Outside it: {', '.join(elsewhere)}. `rippletwin diagnose` takes all of them."
+            )
 
 
 def rig_in_words(rig: dict) -> Iterator[str]:

@@ -1,0 +1,143 @@
+"""The pump's numbers from the flow that healthy recordings ask for.
+
+Through a line that is known (`line_calibration`) the sensors tell the healthy pump's flow at every
+order of the pistons. A data sheet's ports open too fast, and its oil holds too little air: the flow
+tells, and with it how a leak's pulse begins and ends. The lumped pump is fitted to it by least
+squares, its numbers about those of the data sheet (maximum a posteriori).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from rippletwin.diagnosis.anchor import alignment, even_flow, flow_at_pump
+from rippletwin.diagnosis.drifting_line import DriftingLine
+from rippletwin.diagnosis.pump_flow import (
+    TIMING_SD_DEG,
+    healthy_flow,
+    load_pressure_of,
+    with_fitted_pump,
+)
+from rippletwin.pump.geometry import Geometry
+from rippletwin.twin.twin import Twin
+
+PRIOR_SD = {
+    "bulk_modulus": 0.08,
+    "dead_volume": 0.15,
+    "port_area": 0.15,
+    "port_opening_deg": 0.5,
+    "port_overlap_deg": 0.5,
+    "discharge_coefficient": 0.07,
+    "air_fraction": 2.0,
+}
+"""Standard deviations of logarithms about the data sheet: relief grooves lengthen an opening, and
+free air is between 0.1 and 1 % (Gholizadeh, Burton and Schoenau 2011)."""
+SCALE_SD = 0.05  # of the flow's logarithm: ratios between sensors leave the line's impedance open
+HIGHEST_HZ = 2500.0  # up to which the flow is fitted
+RELATIVE_ERROR, LEAST_ERROR = 0.1, 0.03  # of the flow at an order, and over the flow's rms
+MOST_SDS = 4.0  # from the data sheet
+STEP = 0.05  # of difference quotients, in standard deviations
+EVALUATIONS = 8
+ALIGNMENT_ROUNDS = 3
+
+
+@dataclass(frozen=True)
+class _Flow:
+    """Measured healthy flow (F,) at the pistons' orders (F,), m3/s, with its errors (F,); r/min and
+    load pressure, Pa, of the recording."""
+
+    speed_rpm: float
+    pressure: float
+    orders: np.ndarray
+    values: np.ndarray
+    error: np.ndarray
+
+
+def calibrate_pump(twin: Twin, healthy: Sequence) -> Twin:
+    """The twin with its pump fitted to the flow of healthy periodic observations.
+
+    Its line must be known; the pump's numbers are no parameters (`with_fitted_pump`). It is
+    returned as it is where there is one sensor, which cannot tell the flow from the line, and where
+    the data sheet has no geometry of the pump.
+    """
+    twin = with_fitted_pump(twin)
+    pump = dict(twin.rig.pump)
+    if len(twin.rig.sensors) < 2 or set(pump) == {"pistons"} or not healthy:
+        return twin
+    flows = [_measured_flow(twin, observation) for observation in healthy]
+
+    def residuals(x: np.ndarray) -> np.ndarray:
+        numbers, scale = pump | _numbers(pump, x), np.exp(SCALE_SD * x[-1])
+        left = [_residual(numbers, twin.rig.fluid, flow, scale) for flow in flows]
+        return np.concatenate([*left, x])
+
+    start = np.zeros(len(PRIOR_SD) + 2)
+    ends = -MOST_SDS, MOST_SDS
+    found = least_squares(residuals, start, bounds=ends, diff_step=STEP, max_nfev=EVALUATIONS)
+    return _with_pump(twin, pump | _numbers(pump, found.x))
+
+
+def one_each_point(observations: Sequence, digits: int = 2) -> list:
+    """The first of the observations of each operating point, to some digits."""
+    first = {}
+    for o in observations:
+        point = tuple(f"{x or 0.0:.{digits}g}" for x in (o.speed_hz, o.load_pressure))
+        first.setdefault(point, o)
+    return list(first.values())
+
+
+def _measured_flow(twin: Twin, observation) -> _Flow:
+    speed_rpm, pressure = 60.0 * observation.speed_hz, load_pressure_of(twin, observation)
+    ripple = healthy_flow(twin.rig.pump, twin.rig.fluid, speed_rpm, pressure)
+    response = DriftingLine(twin, observation, ripple).response()
+    flow, _ = flow_at_pump(response, observation.values)
+    orders = np.asarray(observation.orders)
+    used = (orders % twin.rig.pump["pistons"] == 0) & (observation.frequency_hz <= HIGHEST_HZ)
+    flow = flow[used]
+    least = LEAST_ERROR * np.sqrt(np.mean(np.abs(flow) ** 2))
+    error = np.hypot(RELATIVE_ERROR * np.abs(flow), least)
+    return _Flow(speed_rpm, pressure, orders[used], flow, error)
+
+
+def _residual(numbers: dict, fluid, flow: _Flow, scale: float) -> np.ndarray:
+    """Real residuals (2 F,) over their errors, at the best shaft angle."""
+    pistons, orders = numbers["pistons"], flow.orders
+    ripple = healthy_flow(numbers, fluid, flow.speed_rpm, flow.pressure)
+    simulated = scale * even_flow(ripple, orders, pistons)
+    angle = alignment(simulated[None], flow.values[None], orders, 2 * np.pi / pistons)
+    for _ in range(ALIGNMENT_ROUNDS):  # the grid of angles is too coarse for differences
+        turned = simulated * np.exp(1j * orders * angle)
+        slope, left = 1j * orders * turned / flow.error, (flow.values - turned) / flow.error
+        angle += np.sum((np.conj(slope) * left).real) / np.sum(np.abs(slope) ** 2)
+    left = (flow.values - simulated * np.exp(1j * orders * angle)) / flow.error
+    return np.concatenate([left.real, left.imag])
+
+
+def _numbers(pump: dict, x: np.ndarray) -> dict:
+    """The pump's numbers at coordinates x in prior standard deviations, the timing's after those of
+    `PRIOR_SD`."""
+    sheet = Geometry.from_dict(pump)
+    found = {
+        name: getattr(sheet, name) * float(np.exp(sd * u))
+        for (name, sd), u in zip(PRIOR_SD.items(), x)
+    }
+    most = 0.5 * (179.0 - found["port_overlap_deg"])  # ports are open for half a revolution
+    found["port_opening_deg"] = min(found["port_opening_deg"], most)
+    return found | {
+        "port_timing_deg": sheet.port_timing_deg + TIMING_SD_DEG * float(x[len(PRIOR_SD)])
+    }
+
+
+def _with_pump(twin: Twin, pump: dict) -> Twin:
+    return Twin(
+        replace(twin.rig, pump=pump),
+        friction=twin.friction,
+        effects=twin.effects,
+        source_sd=twin.source_sd,
+        theta=twin.theta,
+        guessed_load=twin.guessed_load,
+    )

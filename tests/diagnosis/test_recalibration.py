@@ -1,0 +1,60 @@
+"""Line and pump as healthy recordings tell them, for a twin that has neither right.
+
+Independent truth: the pump coupled to its pipe step by step in time, of known numbers.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import leaking_pump
+from rippletwin.diagnosis.line_calibration import calibrate_line
+from rippletwin.diagnosis.pump_calibration import calibrate_pump, one_each_point
+from rippletwin.diagnosis.pump_flow import healthy_flow
+from rippletwin.harmonics import peak_amplitudes
+from rippletwin.twin.twin import Twin
+
+
+@pytest.fixture(scope="module")
+def healthy():
+    """Two healthy recordings of a line whose waves are 2 % slower than the data sheet's."""
+    rng = np.random.default_rng(3)
+    slow = 0.98 * leaking_pump.WAVE_SPEED
+    return [leaking_pump.record(n, rng=rng, wave_speed=slow) for n in ("one", "two")]
+
+
+def test_ratios_between_sensors_give_the_wave_speed_whatever_the_pump_is_said_to_be(healthy):
+    """A twin that believes in another pump, and whose diameter made up for it, finds the true wave
+    speed to 0.5 % and gives the diameter back."""
+    twin = Twin(leaking_pump.rig(), healthy)
+    theta = twin.theta.copy()
+    theta[twin.index["diameter[1]"]] = 6.0
+    bent = twin.with_(theta=theta)
+    found = calibrate_line(bent, healthy).values()
+    true = 0.98 * leaking_pump.WAVE_SPEED
+    assert found["wave_speed[1]"] == pytest.approx(true, rel=5e-3)
+    assert found["diameter[1]"] == pytest.approx(leaking_pump.DIAMETER, rel=0.05)
+
+
+def test_the_pump_s_flow_comes_nearer_to_the_true_one(healthy):
+    """A data sheet whose ports open three times too fast, over oil of too little air: the fitted
+    pump's flow errs by less than half as much at the pistons' orders, whatever numbers it takes.
+    The load pressure is not stated: the sensors' means tell it."""
+    rig = leaking_pump.rig()
+    rig = replace(rig, pump=rig.pump | {"port_opening_deg": 10.0, "air_fraction": 1e-4})
+    unstated = [replace(o, load_pressure=None) for o in healthy]
+    line = calibrate_line(Twin(rig, unstated), unstated)
+    fitted = calibrate_pump(line, one_each_point(unstated)).rig.pump
+    point = leaking_pump.OIL, leaking_pump.SPEED, leaking_pump.LOAD
+    orders = leaking_pump.PISTONS * np.arange(1, 13)
+    true, sheet, found = (
+        np.abs(peak_amplitudes(healthy_flow(pump, *point).flow)[orders])
+        for pump in (leaking_pump.TRUE, line.rig.pump, fitted)
+    )
+    assert np.linalg.norm(found - true) < 0.5 * np.linalg.norm(sheet - true)
+
+
+def test_an_operating_point_set_twice_is_fitted_once(healthy):
+    """Two recordings of one speed and load pressure."""
+    assert len(one_each_point(healthy)) == 1
