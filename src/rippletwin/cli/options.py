@@ -102,10 +102,10 @@ def out(help: str):
     return click.option("--out", required=True, metavar="DIR", type=kind, help=help)
 
 
-def out_file(help: str):
-    """--out FILE, required."""
+def out_file(help: str, required: bool = True):
+    """--out FILE."""
     kind = CheckedValue("FILE", _out_file)
-    return click.option("--out", required=True, metavar="FILE", type=kind, help=help)
+    return click.option("--out", required=required, metavar="FILE", type=kind, help=help)
 
 
 def processes(purpose: str):

@@ -16,7 +16,17 @@ from click.exceptions import Exit, NoArgsIsHelpError
 from click.shell_completion import shell_complete
 
 from rippletwin import __version__
-from rippletwin.cli import calibrate, check, completion, diagnose, explain, new, report
+from rippletwin.cli import (
+    calibrate,
+    check,
+    completion,
+    diagnose,
+    explain,
+    export,
+    new,
+    report,
+    simulate,
+)
 from rippletwin.cli.exit_codes import BAD_INPUT, CLOSED_PIPE, INTERRUPTED
 from rippletwin.errors import InputError
 
@@ -27,6 +37,8 @@ COMMANDS = {
     "calibrate": calibrate.command,
     "explain": explain.command,
     "diagnose": diagnose.command,
+    "simulate": simulate.command,
+    "export": export.command,
     "report": report.command,
     "completion": completion.command,
 }

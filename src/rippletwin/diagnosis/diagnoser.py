@@ -15,7 +15,12 @@ from rippletwin.diagnosis.evidence import ErrorPrior, StateEvidence, scatter_of,
 from rippletwin.diagnosis.faults.base import Fault
 from rippletwin.diagnosis.faults.library import state_name, states_of
 from rippletwin.diagnosis.observation_model import ObservationModel
-from rippletwin.diagnosis.pump_flow import healthy_flow, leak_flow, with_fitted_pump
+from rippletwin.diagnosis.pump_flow import (
+    healthy_flow,
+    leak_flow,
+    load_pressure_of,
+    with_fitted_pump,
+)
 from rippletwin.diagnosis.unlike import judge_residual
 from rippletwin.twin.twin import Twin
 
@@ -55,8 +60,7 @@ class Diagnoser:
 
     def model(self, observation, healthy, start: float = 0.0) -> ObservationModel:
         """The observation model of an observation, anchored to a healthy one."""
-        point = self.twin.operating_point(replace(observation, source="free"))
-        pressure = _rounded(observation.load_pressure or point.load_pressure)
+        pressure = _rounded(load_pressure_of(self.twin, observation))
         speed_rpm = _rounded(60.0 * observation.speed_hz)
         given = healthy.flow_ripple
         mean_flow = None if given is None else float(np.mean(given.flow))

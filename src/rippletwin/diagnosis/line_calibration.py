@@ -15,7 +15,7 @@ from dataclasses import replace
 from rippletwin.calibration.calibrate import calibrate
 from rippletwin.calibration.likelihood import EVENNESS, Likelihood
 from rippletwin.calibration.misfit import misfit
-from rippletwin.diagnosis.pump_flow import healthy_flow, with_fitted_pump
+from rippletwin.diagnosis.pump_flow import healthy_flow, load_pressure_of, with_fitted_pump
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
 from rippletwin.twin.twin import Twin
 
@@ -46,4 +46,5 @@ def calibrate_line(twin: Twin, healthy: Sequence) -> Twin:
 def _ripple(twin: Twin, observation):
     """The pump's own, whose mean flow settles the orifice."""
     speed_rpm = 60.0 * observation.speed_hz
-    return healthy_flow(twin.rig.pump, twin.rig.fluid, speed_rpm, observation.load_pressure)
+    pressure = load_pressure_of(twin, observation)
+    return healthy_flow(twin.rig.pump, twin.rig.fluid, speed_rpm, pressure)

@@ -16,7 +16,12 @@ from scipy.optimize import least_squares
 
 from rippletwin.diagnosis.anchor import alignment, even_flow, flow_at_pump
 from rippletwin.diagnosis.drifting_line import DriftingLine
-from rippletwin.diagnosis.pump_flow import TIMING_SD_DEG, healthy_flow, with_fitted_pump
+from rippletwin.diagnosis.pump_flow import (
+    TIMING_SD_DEG,
+    healthy_flow,
+    load_pressure_of,
+    with_fitted_pump,
+)
 from rippletwin.pump.geometry import Geometry
 from rippletwin.twin.twin import Twin
 
@@ -86,7 +91,7 @@ def one_each_point(observations: Sequence, digits: int = 2) -> list:
 
 
 def _measured_flow(twin: Twin, observation) -> _Flow:
-    speed_rpm, pressure = 60.0 * observation.speed_hz, observation.load_pressure
+    speed_rpm, pressure = 60.0 * observation.speed_hz, load_pressure_of(twin, observation)
     ripple = healthy_flow(twin.rig.pump, twin.rig.fluid, speed_rpm, pressure)
     response = DriftingLine(twin, observation, ripple).response()
     flow, _ = flow_at_pump(response, observation.values)

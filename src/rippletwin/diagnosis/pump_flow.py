@@ -64,6 +64,12 @@ def with_fitted_pump(twin: Twin, mean_flow: float | None = None, speed_hz: float
     )
 
 
+def load_pressure_of(twin: Twin, observation) -> float:
+    """Load pressure, Pa, of an observation: as stated, or as its sensors' means have it."""
+    point = twin.operating_point(replace(observation, source="free"))
+    return observation.load_pressure or point.load_pressure
+
+
 def _scaled(pump: Geometry, displacement: float) -> dict:
     """The pump, all its lengths changed alike, of another displacement, m3 a revolution."""
     ratio = displacement / pump.displacement
@@ -115,6 +121,26 @@ def healthy_flow(pump: Mapping, fluid: Fluid, speed_rpm: float, pressure: float)
     return _simulated(_key(pump), fluid, float(speed_rpm), float(pressure), None, 0.0)
 
 
+def leaking_flow(
+    pump: Mapping, fluid: Fluid, speed_rpm: float, pressure: float, fault: Fault, area: float
+) -> PumpRipple:
+    """Ripple of the pump with a fault of this leak area, m2, at piston 0; simulations are kept.
+
+    The area is of a leak with LEAK_DISCHARGE where the data sheet gives no discharge coefficient.
+    """
+    scale = 1.0
+    if not pump.get("discharge_coefficient"):
+        scale = LEAK_DISCHARGE / Geometry.discharge_coefficient
+    point = _key(pump), fluid, float(speed_rpm), float(pressure)
+    return _simulated(*point, fault, float(scale * area))
+
+
+def leak_velocity(pump: Mapping, fluid: Fluid, pressure: float) -> float:
+    """Flow of a leak over its area, m/s, under a pressure, Pa: that of a sharp-edged orifice."""
+    coefficient = pump.get("discharge_coefficient") or LEAK_DISCHARGE
+    return coefficient * np.sqrt(2.0 * pressure / fluid.density)
+
+
 def leak_flow(
     pump: Mapping, fluid: Fluid, speed_rpm: float, pressure: float, fault: Fault
 ) -> LeakFlow:
@@ -128,18 +154,13 @@ def _leak_flow(
 ) -> LeakFlow:
     pump = dict(key)
     mean = peak_amplitudes(healthy_flow(pump, fluid, speed_rpm, pressure).flow)[0].real
-    given = pump.get("discharge_coefficient")
-    coefficient = given or LEAK_DISCHARGE
-    simulated = 1.0 if given else LEAK_DISCHARGE / Geometry.discharge_coefficient
-    velocity = coefficient * np.sqrt(2.0 * pressure / fluid.density)  # of a sharp-edged orifice
-    areas = mean / pump["pistons"] / velocity * np.geomspace(fault.smallest, fault.largest, NODES)
+    one_piston = mean / pump["pistons"] / leak_velocity(pump, fluid, pressure)
+    areas = one_piston * np.geomspace(fault.smallest, fault.largest, NODES)
 
     def change(numbers: Mapping, at: np.ndarray) -> np.ndarray:
-        point = _key(numbers), fluid, speed_rpm, pressure
-        healthy = peak_amplitudes(_simulated(*point, None, 0.0).flow)
-        leaking = [
-            peak_amplitudes(_simulated(*point, fault, float(simulated * a)).flow) for a in at
-        ]
+        point = numbers, fluid, speed_rpm, pressure
+        healthy = peak_amplitudes(healthy_flow(*point).flow)
+        leaking = [peak_amplitudes(leaking_flow(*point, fault, a).flow) for a in at]
         return (np.array(leaking) - healthy)[:, : ORDERS + 1] / at[:, None]
 
     found = change(pump, areas)

@@ -101,13 +101,7 @@ def observe(
         observation = _observe_spectra(recording, rig, max_frequency_hz)
     low = recording.min_frequency_hz or 0.0
     kept = observation.frequency_hz >= low
-    if not np.any(kept):
-        raise InputError(
-            recording.file,
-            "min_frequency_hz, max_frequency_hz",
-            "no frequency of the recording is between them",
-            "Give a wider band",
-        )
+    _check_any(recording, kept)
     observation = replace(observation, min_frequency_hz=low)
     together = observation.orders is not None and not piston_harmonics_only
     return observation if together else select_frequencies(observation, kept)
@@ -132,6 +126,7 @@ def _observe_periodic(
     speed_hz = mean_speed(revolutions.speed_hz)
     highest = _highest(max_frequency_hz, recording.sampling_rate_hz)
     orders = np.arange(1, int(highest / speed_hz) + 1)
+    _check_any(recording, orders > 0)
     spectra = np.stack([peak_amplitudes(window)[:, orders] for window in revolutions.windows])
     values, covariance = harmonics_at_mean_speed(spectra, revolutions.speed_hz, orders, progress)
     if piston_harmonics_only:
@@ -152,6 +147,17 @@ def _observe_periodic(
         flow_ripple=recording.flow_ripple,
         sensors=rig.sensors,
     )
+
+
+def _check_any(recording: Recording, kept: np.ndarray) -> None:
+    """Raise InputError where no frequency is kept."""
+    if not np.any(kept):
+        raise InputError(
+            recording.file,
+            "min_frequency_hz, max_frequency_hz",
+            "no frequency of the recording is between them",
+            "Give a wider band",
+        )
 
 
 def _observe_random(recording, rig, max_frequency_hz) -> Observation:

@@ -1,0 +1,71 @@
+"""rippletwin export CASE: ripples, spectra and a twin's values for other programs."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from rippletwin.cli import options
+from rippletwin.cli.progress import progress_bars, warn
+
+
+@click.command("export", short_help="write ripples and spectra as CSV and MAT, a twin as JSON")
+@options.case
+@options.out("Folder for the files.")
+@click.option(
+    "--recording",
+    "labels",
+    multiple=True,
+    metavar="LABEL",
+    help="Export this one, again for more; all by default.",
+)
+@click.option(
+    "--twin",
+    "twin_file",
+    metavar="TWIN.json",
+    help="Also write this twin's values with their units to twin_values.json.",
+)
+@options.effects("An effect of the twin that a Python file defines as EFFECT, again for more.")
+@options.frequency("--max-frequency", "Export nothing above it; by default 5 kHz of a recording.")
+@options.json_output
+def command(
+    case: Path,
+    out: str,
+    labels: tuple[str, ...],
+    twin_file: str | None,
+    effects: tuple[str, ...],
+    max_frequency: float | None,
+    as_json: bool,
+) -> None:
+    """Write what the recordings of the folder CASE hold, for other programs.
+
+    LABEL_ripple.csv is the mean revolution, LABEL_spectrum.csv its shaft orders; LABEL.mat is both.
+    """
+    from rippletwin.case.load import load_case
+    from rippletwin.errors import InputError
+    from rippletwin.report.data_export import export_observation, export_twin
+    from rippletwin.spectra.observation import observe
+    from rippletwin.twin.twin_file import load_covariance, load_twin
+
+    twin = None if twin_file is None else load_twin(twin_file, effects)
+    read = load_case(case, band_hz=(None, max_frequency))
+    known = {recording.label: recording for recording in read.recordings}
+    for label in set(labels) - set(known):
+        raise InputError(
+            "command line", "--recording", f"no recording {label}", f"there are {', '.join(known)}"
+        )
+    warn(read.warnings)
+    written = []
+    chosen = [known[label] for label in dict.fromkeys(labels or known)]
+    with progress_bars(as_json) as progress:
+        for done, recording in enumerate(chosen, 1):
+            observation = observe(recording, read.rig)
+            written += export_observation(observation, out)
+            progress("exporting", done, len(chosen))
+    if twin is not None:
+        covariance = load_covariance(twin_file)
+        written.append(export_twin(twin, covariance, Path(out) / "twin_values.json"))
+    files = [str(path) for path in written]
+    print(json.dumps({"files": files}) if as_json else "\n".join(files))

@@ -1,0 +1,98 @@
+"""Ripples, spectra and a twin's values as files that other programs read: CSV, MAT and JSON."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+from scipy.io import savemat
+
+from rippletwin.harmonics import one_period
+from rippletwin.spectra.observation import Observation
+from rippletwin.twin.twin import Twin
+
+SAMPLES_AN_ORDER = 4  # at least, of an exported ripple's highest order
+
+
+def ripple_of(observation: Observation) -> tuple[np.ndarray, np.ndarray] | None:
+    """Time (M,), s, and pressure (S, M), Pa gauge, of one revolution at the mean speed, made of the
+    observation's mean and shaft orders; None where it has no shaft orders."""
+    if observation.orders is None:
+        return None
+    count = SAMPLES_AN_ORDER * int(observation.orders[-1])
+    orders = np.append(0, observation.orders)
+    spectrum = np.column_stack([observation.mean, observation.values])
+    time = np.arange(count) / count / observation.speed_hz
+    return time, one_period(spectrum, count, orders)
+
+
+def export_observation(observation: Observation, folder: str | Path) -> list[Path]:
+    """Write LABEL_spectrum.csv, LABEL.mat and, of a periodic recording, LABEL_ripple.csv.
+
+    Spectra are complex peak amplitudes in Pa, an impedance is in Pa s/m3 or relative as the
+    recording states it; `sd` is the standard deviation of the complex error.
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    names = [sensor.name for sensor in observation.sensors]
+    if len(names) != len(observation.values):  # an impedance has no sensors
+        names = ["impedance"]
+    sd, ripple = np.sqrt(observation.variance), ripple_of(observation)
+    columns = {"frequency_hz": observation.frequency_hz}
+    if observation.orders is not None:
+        columns["order"] = observation.orders
+    for name, values, error in zip(names, observation.values, sd):
+        columns |= {f"{name}_re": values.real, f"{name}_im": values.imag, f"{name}_sd": error}
+    data = {
+        "label": observation.label,
+        "kind": observation.kind,
+        "sensors": np.array(names, dtype=object),
+        "frequency_hz": observation.frequency_hz,
+        "spectrum": observation.values,
+        "spectrum_sd": sd,
+        "mean": observation.mean,
+    }
+    spectrum_file = folder / f"{observation.label}_spectrum.csv"
+    _write_csv(spectrum_file, columns)
+    written = [spectrum_file]
+    if ripple is not None:
+        time, pressure = ripple
+        data |= {"order": observation.orders, "speed_hz": observation.speed_hz}
+        data |= {"time_s": time, "ripple": pressure}
+        written.append(folder / f"{observation.label}_ripple.csv")
+        _write_csv(written[-1], {"time_s": time, **dict(zip(names, pressure))})
+    written.append(folder / f"{observation.label}.mat")
+    savemat(written[-1], data, oned_as="row")
+    return written
+
+
+def export_twin(twin: Twin, covariance: np.ndarray | None, path: str | Path) -> Path:
+    """Write the twin's values with units and, where `covariance` (P, P) of its theta is known, the
+    standard deviations to first order."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    values = {}
+    for k, (parameter, u) in enumerate(zip(twin.parameters, twin.theta)):
+        entry = {"value": float(parameter.value(u)), "unit": parameter.unit}
+        if covariance is not None:
+            entry["sd"] = float(parameter.value_sd(u, np.sqrt(covariance[k, k])))
+        values[parameter.name] = entry
+    result = {
+        "friction": twin.friction_law,
+        "effects": [{"name": effect.name, "place": str(place)} for effect, place in twin.effects],
+        "values": values,
+    }
+    path.write_text(json.dumps(result, indent=1) + "\n")
+    return path
+
+
+def _write_csv(path: Path, columns: dict[str, Sequence]) -> None:
+    """Columns of equal length under their names; numbers keep all their digits."""
+    rows: Iterable = zip(*(np.asarray(column).tolist() for column in columns.values()))
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(rows)
