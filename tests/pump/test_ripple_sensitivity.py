@@ -126,9 +126,11 @@ def test_derivatives():
 
 
 def test_fit_finds_both_values():
-    """Recordings of a pump simulated with other values: a fit of all eight numbers finds both within
-    two of its standard deviations, which are at most two fifths of the prior's for the modulus and
-    a fifth for the timing, and leaves a seventh of the misfit of a fit with the nominal ripple."""
+    """Recordings of a pump simulated with other values: a fit of all eight numbers finds both.
+
+    Each is within two of its standard deviations, which are at most two fifths of the prior's for
+    the modulus and a fifth for the timing. A seventh of the misfit with the nominal ripple is left.
+    """
     data = observations()
     other = [
         replace(o, flow_ripple=ripple(speed_rpm, pressure, modulus=MODULUS, timing=TIMING))
