@@ -161,8 +161,8 @@ def _ripple_error(fit: dict) -> list[str]:
     if misfit < RIPPLE_ERROR_RATIO * model_error:
         return []
     return [
-        f"With the pump's nominal ripple the twin misses {misfit:.0%} of the reading. Nearly all of "
-        "that is an error of the ripple, and not of the line."
+        f"With the pump's nominal ripple the twin misses {misfit:.0%} of the reading. Nearly all "
+        "of that is an error of the ripple, and not of the line."
     ]
 
 
