@@ -87,10 +87,11 @@ def _complex(rng, *shape) -> np.ndarray:
 def best_of_each(rig, observations, processes: int) -> dict[str, tuple[float, str]]:
     """Name -> (log evidence that it adds to the line, place) of each effect at its best place."""
     with open_workers(Twin(rig, observations), observations, processes) as pool:
-        base, singles = fit_single_effects(pool, applicable_candidates(rig, observations))
+        base, _, singles = fit_single_effects(pool, applicable_candidates(rig, observations))
     best = {}
     for fit in singles:  # best first
-        best.setdefault(fit.names[0], (fit.evidence - base.evidence, str(fit.hypothesis[0][1])))
+        gain, place = fit.evidence - base.evidence, str(fit.hypothesis[-1][1])
+        best.setdefault(fit.names[-1], (gain, place))
     return best
 
 

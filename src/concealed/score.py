@@ -34,7 +34,8 @@ def score_case(
         alarm            the verdict is not one of SILENT_VERDICTS
         effects_found    number of true effects that are named
         right            every true effect is named, and there is one
-        wrong            named effects that count for no true effect, as text
+        wrong            named effects that count for no true effect, nor for nuisance physics that
+                         is there, as text
         places_right     for each found effect, whether its place is right
         where_right      whether the verdict's `where` is the place of a true effect
         intervals_hold   for each interval of a right effect, whether it holds the true value
@@ -49,10 +50,17 @@ def score_case(
         seconds          run time of the tool
     """
     true, named = truth["effects"], named_effects(verdict)
+    nuisance = truth.get("nuisance", [])
     classes = [set(names) for names in [*verdict["equivalents"], *truth["classes"]]]
     claims = assign_claims(true, named, classes)
     found = [(effect, claim) for effect, claim in zip(true, claims) if claim is not None]
-    right = [any(claim is each for each in claims) for claim in named]
+    rest = [claim for claim in named if not any(claim is each for each in claims)]
+    there = [
+        claim
+        for effect, claim in zip(nuisance, assign_claims(nuisance, rest, []))
+        if claim is not None and is_place_right(effect, claim, truth["length"])
+    ]
+    right = [any(claim is each for each in [*claims, *there]) for claim in named]
     wrong = [claim["name"] for claim, ok in zip(named, right) if not ok]
     log_evidence = {each["effect"]: each["evidence"] for each in verdict["without"]}
     fit = verdict["fit"]
@@ -105,8 +113,10 @@ def score_case(
 
 
 def named_effects(verdict: dict) -> list[dict]:
-    """The effects that a verdict names; none unless it is `named` or `ambiguous`."""
-    return verdict["effects"] if verdict["verdict"] in ("named", "ambiguous") else []
+    """The effects that a verdict establishes; none unless it is `named` or `ambiguous`."""
+    if verdict["verdict"] not in ("named", "ambiguous"):
+        return []
+    return [e for e in verdict["effects"] if e.get("support", "established") == "established"]
 
 
 def same_or_equivalent(name: str, other: str, classes: Sequence[set]) -> bool:

@@ -80,10 +80,10 @@ def score_table(rows: list[dict]) -> list[Score]:
     named_rightly = [row for row in rows if row["right"] and not row["wrong"]]
     deviations = [error["z"] for row in rows for error in row["line_errors"]["corrected"]]
     return [
-        Score("No effect, nominal values within tolerance: alarm", "at most 2 %",
-              _alarms(cases("none"))),
-        Score("No effect, nominal values 2 to 3 standard deviations off: alarm", "at most 2 %",
-              _alarms(cases("off"))),
+        Score("No effect, nominal values within tolerance: established, not there", "at most 2 %",
+              rate_of(bool(row["wrong"]) for row in cases("none"))),
+        Score("No effect, nominal values 2 to 3 standard deviations off: established, not there",
+              "at most 2 %", rate_of(bool(row["wrong"]) for row in cases("off"))),
         Score("Plain single effects: alarm", "", _alarms(singles)),
         Score("Plain single effects: effect or its class named", "at least 90 %",
               rate_of(row["right"] for row in singles)),
@@ -102,10 +102,8 @@ def score_table(rows: list[dict]) -> list[Score]:
               rate_of(row["effects_found"] > 0 and not row["wrong"] for row in pairs)),
         Score("Pairs: both effects named", "at least 65 %",
               rate_of(row["effects_found"] == 2 for row in pairs)),
-        Score("Plain effects outside the library: verdict `unexplained`", "at least 90 %",
-              rate_of(row["verdict"] == "unexplained" for row in outside if plain(row))),
-        Score("All effects outside the library: given a name", "at most 5 %",
-              rate_of(bool(row["named"]) for row in outside)),
+        Score("Effects outside the library: established, not there", "at most 5 %",
+              rate_of(bool(row["wrong"]) for row in outside)),
         Score("Effects declared indistinguishable: class or effect named, no wrong name", "",
               rate_of(row["right"] and not row["wrong"] for row in cases("indistinguishable"))),
         Score("95 % intervals of rightly named effects: true value inside", "92 to 97 %",

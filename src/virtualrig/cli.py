@@ -29,6 +29,7 @@ from virtualrig.folder import (
     write_sheet,
     write_truth,
 )
+from virtualrig.nuisance_case import draw_nuisance_case, record_nuisance_case
 from virtualrig.population import record_rig
 from virtualrig.recorder import Point, nominal_ripple, record
 from virtualrig.rig import SEAL, SHEET, Rig, RigError, read_rig, read_yaml
@@ -96,6 +97,12 @@ def _parser() -> argparse.ArgumentParser:
     check.set_defaults(run=_check)
     hide = commands.add_parser("conceal", help="record one case drawn at random and seal its truth")
     hide.add_argument("--case", type=int, required=True, help="which of the cases, from 0")
+    hide.add_argument(
+        "--bench",
+        choices=("nuisance", "clean"),
+        default="nuisance",
+        help="rigs with nuisance physics beside the effect, or without",
+    )
     hide.set_defaults(run=_conceal)
     drawn = commands.add_parser("population", help="record one rig of a population, states unknown")
     drawn.add_argument("--rig", type=int, required=True, help="which of the rigs, from 0")
@@ -173,9 +180,14 @@ def _conceal(options: argparse.Namespace) -> None:
     if not 0 <= options.case < options.cases:
         raise RigError(f"--case {options.case}: there are {options.cases} cases, from 0")
     trial = (options.commit, options.number)
-    drawn = draw_case(options.cases, *trial, options.case)
     rng = random_generator(*trial, "recording", options.case)
-    _write_seal(options, record_concealed_case(drawn, options.out, rng))
+    if options.bench == "nuisance":
+        case = draw_nuisance_case(options.cases, *trial, options.case)
+        truth = record_nuisance_case(case, options.out, rng)
+    else:
+        drawn = draw_case(options.cases, *trial, options.case)
+        truth = record_concealed_case(drawn, options.out, rng)
+    _write_seal(options, truth)
 
 
 def _population(options: argparse.Namespace) -> None:

@@ -85,7 +85,7 @@ def draw_case(count: int, commit: str, number: int | str, index: int) -> DrawnCa
         float(np.mean([mean_flow(sheet, point) for point in points])),
         float(np.mean([point.load_pressure for point in points])),
     )
-    effects, classes = _draw_effects(
+    effects, classes = draw_effects(
         kind, running, context, random_generator(commit, number, "effects")
     )
     true["effects"] = [effect.entry for effect in effects]
@@ -98,7 +98,7 @@ def draw_case(count: int, commit: str, number: int | str, index: int) -> DrawnCa
             entry["volume"] *= factor
     truth = {
         "kind": kind,
-        "effects": [_truth_of_effect(effect, sheet, true) for effect in effects],
+        "effects": [truth_of_effect(effect, sheet, true) for effect in effects],
         "classes": classes,
         "segments": [
             {
@@ -117,7 +117,7 @@ def draw_case(count: int, commit: str, number: int | str, index: int) -> DrawnCa
     return DrawnCase(sheet, true, points, truth)
 
 
-def _draw_effects(
+def draw_effects(
     kind: str, running: int, context: RigContext, order: np.random.Generator
 ) -> tuple[list[DrawnEffect], list[list[str]]]:
     """Effects of a case, and the classes declared beforehand.
@@ -142,7 +142,7 @@ def _draw_effects(
     return [], []
 
 
-def _truth_of_effect(effect: DrawnEffect, sheet: dict, true: dict) -> dict:
+def truth_of_effect(effect: DrawnEffect, sheet: dict, true: dict) -> dict:
     """The truth of an effect; its position also in metres of the data sheet's line."""
     described = effect.to_dict()
     if effect.position is not None:

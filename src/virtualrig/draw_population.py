@@ -63,10 +63,10 @@ class DrawnRig:
 def draw_rig(commit: str, number: int | str, rig: int) -> DrawnRig:
     """Rig `rig` of a trial."""
     rng = random_generator(commit, number, "population", rig)
-    sheet = _draw_sheet(rng)
-    true = _draw_true(sheet, rng)
+    sheet = draw_sheet(rng)
+    true = draw_true(sheet, rng)
     nuisance = draw_nuisance(rng, len(sheet["sensors"]))
-    points = _draw_points(rng)
+    points = draw_points(rng)
     plans = [
         PlannedRecording(replace(points[0], label=f"healthy_0_{k}"), "healthy")
         for k in range(HEALTHY_REPEATS)
@@ -84,7 +84,7 @@ def draw_rig(commit: str, number: int | str, rig: int) -> DrawnRig:
     return DrawnRig(sheet, true, nuisance, tuple(plans))
 
 
-def _draw_sheet(rng: np.random.Generator) -> dict:
+def draw_sheet(rng: np.random.Generator) -> dict:
     """A data sheet with a pump of 13 to 60 cm3 a revolution; its sensors are clear of joints."""
     sheet = draw_data_sheet(rng)
     pump = sheet["pump"]
@@ -109,19 +109,19 @@ def _draw_sheet(rng: np.random.Generator) -> dict:
     return sheet
 
 
-def _draw_true(sheet: dict, rng: np.random.Generator) -> dict:
-    """True fluid, line and sensors, within the sheet's tolerances, the sensors clear of joints."""
+def draw_true(sheet: dict, rng: np.random.Generator, off: bool = False) -> dict:
+    """True fluid, line and sensors, the sensors clear of joints; `off` as in `draw_true_rig`."""
     while True:
-        true = draw_true_rig(sheet, rng, off=False)
+        true = draw_true_rig(sheet, rng, off=off)
         joints = np.cumsum([0.0, *(s["length"] for s in true["line"]["segments"])])
         if abs(np.array(true["sensors"])[:, None] - joints).min() > 0.5 * CLEARANCE:
             kept = {key: true[key] for key in ("fluid", "line", "sensors")}
             return kept | {"seed": int(rng.integers(2**31))}
 
 
-def _draw_points(rng: np.random.Generator) -> list[Point]:
-    """Two or three operating points that differ in speed and pressure."""
-    count = int(rng.integers(2, 4))
+def draw_points(rng: np.random.Generator, fewest: int = 2) -> list[Point]:
+    """`fewest` to three operating points that differ in speed and pressure."""
+    count = int(rng.integers(fewest, 4))
     speeds = rng.permutation([800.0, 1000.0, 1250.0, 1500.0])[:count] + rng.integers(-9, 10) * 10.0
     pressures = rng.permutation([6e6, 9e6, 12e6, 15e6])[:count] + rng.integers(-10, 11) * 1e5
     pairs = zip(speeds, pressures, strict=True)

@@ -15,11 +15,14 @@ LONGEST_PIECE = 0.8  # m; within a piece the temperature is one
 NUMERICS = {"frequency": 5000.0, "points": 6.0, "degree": 6}
 
 
-def seal_at(sheet: dict, true: dict, nuisance: dict, kelvin: float = 0.0) -> dict:
+def seal_at(
+    sheet: dict, true: dict, nuisance: dict, kelvin: float = 0.0, numerics: dict | None = None
+) -> dict:
     """The seal (`virtualrig.rig.build`) of the rig when it is `kelvin` warmer than on average.
 
-    `true` has fluid, line and sensors as the seal has them, and may have branches: a list of
-    arguments of the effect `side_branch`.
+    `true` has fluid, line and sensors as the seal has them. It may have branches, a list of
+    arguments of the effect `side_branch`, and `effects`, entries of a seal, which come last: they
+    replace what the nuisance physics says of the same sensor.
     """
     segments = cut_with_gradient(
         true["line"]["segments"],
@@ -29,7 +32,7 @@ def seal_at(sheet: dict, true: dict, nuisance: dict, kelvin: float = 0.0) -> dic
         kelvin,
     )
     for piece in segments:
-        piece["wall"] = (nuisance["wall_compliance"], nuisance["wall_time"])
+        piece.setdefault("wall", (nuisance["wall_compliance"], nuisance["wall_time"]))
     effects = [{"name": "unsteady_friction"}]
     for k, position in enumerate(true["sensors"]):
         effects += [
@@ -52,6 +55,7 @@ def seal_at(sheet: dict, true: dict, nuisance: dict, kelvin: float = 0.0) -> dic
             "seed": true["seed"],
         },
         {"name": "speed_fluctuation", "order": 1, "amplitude": nuisance["speed_ripple"]},
+        *true.get("effects", []),
     ]
     return {
         "fluid": true["fluid"],
@@ -59,7 +63,7 @@ def seal_at(sheet: dict, true: dict, nuisance: dict, kelvin: float = 0.0) -> dic
         "line": {"segments": segments},
         "sensors": true["sensors"],
         "effects": effects,
-        "numerics": NUMERICS,
+        "numerics": numerics or NUMERICS,
     }
 
 

@@ -124,17 +124,32 @@ def instrument_of(nuisance: dict) -> Instrument:
     return Instrument(offset=tuple(nuisance["offset"]), **{name: nuisance[name] for name in names})
 
 
-def ripple_change(before: Orbit, after: Orbit, sensing: tuple) -> float:
-    """Norm of the change of the sensed ripple over that of the ripple before."""
-    return ripple_norm(after, sensing, before) / ripple_norm(before, sensing)
+def ripple_change(
+    before: Orbit, after: Orbit, sensing: tuple, sensing_after: tuple | None = None
+) -> float:
+    """Norm of the change of the sensed ripple over that of the ripple before.
+
+    `sensing_after` is that of the orbit after, where the sensors change too.
+    """
+    ripples = [
+        ripple_of(before, sensing),
+        ripple_of(after, sensing if sensing_after is None else sensing_after),
+    ]
+    return float(np.linalg.norm(ripples[1] - ripples[0]) / np.linalg.norm(ripples[0]))
 
 
 def ripple_norm(orbit: Orbit, sensing: tuple, less: Orbit | None = None) -> float:
     """Norm of the sensed ripple of an orbit, `less` that of another one."""
-    pressure = sensed_pressure(orbit, sensing)
+    ripple = ripple_of(orbit, sensing)
     if less is not None:
-        pressure = pressure - sensed_pressure(less, sensing)
-    return float(np.linalg.norm(pressure - pressure.mean(axis=1, keepdims=True)))
+        ripple = ripple - ripple_of(less, sensing)
+    return float(np.linalg.norm(ripple))
+
+
+def ripple_of(orbit: Orbit, sensing: tuple) -> np.ndarray:
+    """Sensed pressure (sensors, records) of an orbit without its mean."""
+    pressure = sensed_pressure(orbit, sensing)
+    return pressure - pressure.mean(axis=1, keepdims=True)
 
 
 def equivalent_areas(drawn: DrawnRig, plan: PlannedRecording) -> dict[str, float]:

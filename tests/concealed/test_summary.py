@@ -70,11 +70,13 @@ def test_a_missed_effect_counts_only_where_the_data_support_it(rows):
 def test_every_kind_counts_in_its_own_scores(rows):
     """Alarms without an effect, pairs, and names outside the library, by hand."""
     rates = {score.what: score.rate for score in score_table(rows)}
-    assert rates["No effect, nominal values within tolerance: alarm"] == Rate(0, 1)
-    assert rates["No effect, nominal values 2 to 3 standard deviations off: alarm"] == Rate(1, 1)
+    within = "No effect, nominal values within tolerance: established, not there"
+    off = "No effect, nominal values 2 to 3 standard deviations off: established, not there"
+    assert rates[within] == Rate(0, 1)
+    assert rates[off] == Rate(1, 1)
     assert rates["Pairs: at least one effect named, no wrong name"] == Rate(1, 1)
     assert rates["Pairs: both effects named"] == Rate(0, 1)
-    assert rates["All effects outside the library: given a name"] == Rate(1, 1)
+    assert rates["Effects outside the library: established, not there"] == Rate(1, 1)
 
 
 def test_bins_hold_every_case_once(rows):

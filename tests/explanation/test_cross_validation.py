@@ -1,70 +1,14 @@
-"""Cross-validation: when an explanation holds, and which effects are dropped by it."""
-
-from dataclasses import replace
-from types import SimpleNamespace
+"""Cross-validation: the folds, and the scores before and after."""
 
 import numpy as np
-import pytest
 
-from made_fits import made_fit
 from rippletwin.calibration.misfit import Score
-from rippletwin.explanation import fit_jobs
 from rippletwin.explanation.checks import cross_validation
-from rippletwin.explanation.checks.cross_validation import Validation, prune_by_cross_validation
+from rippletwin.explanation.checks.cross_validation import Validation
 from rippletwin.explanation.fit_jobs import FitJob, PlainCalibration, Workers, job_from
-from rippletwin.twin.effects.base import Place
-from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.twin import Twin
 from synthetic_effects import TRUTH, VOLUME
 from synthetic_observations import POINTS, make
-
-HOSE = (EFFECTS["viscoelastic_wall"], Place("segment 1", 0))
-GAIN = (EFFECTS["sensor_gain"], Place("sensor p1", 0))
-FRICTION = (replace(EFFECTS["unsteady_friction"], certain=True), Place("line"))
-
-
-def validation(before, after, disagreement=0.0):
-    """Held-out misfits and the largest difference between folds."""
-    scores = ({"held_out": Score(misfit, 0.0)} for misfit in (before, after))
-    return Validation(*scores, (), disagreement)
-
-
-@pytest.mark.parametrize(
-    ("after", "disagreement", "passes"),
-    [(0.09, 0.0, True), (0.09, 9.0, False), (0.03, 9.0, True), (0.11, 0.0, False)],
-)
-def test_folds_may_disagree_if_most_of_the_held_out_misfit_is_gone(after, disagreement, passes):
-    """Of a held-out misfit of 10 %, 9 % passes if the folds agree and 3 % passes anyway; more than
-    10 % never does."""
-    assert validation(0.10, after, disagreement).passes is passes
-
-
-def test_effects_that_do_not_transfer_are_dropped_weakest_first(monkeypatch):
-    """Of hose, gain and friction the gain costs least evidence and does not help on held-out data.
-
-    It is dropped. The hose is tried next and helps; the always-present friction is never tried.
-    With decisive evidence nothing is tried."""
-    losses, tried = {HOSE: 12.0, GAIN: 9.0, FRICTION: 1.0}, []
-
-    def fit(jobs):
-        return [
-            made_fit(-sum(x for e, x in losses.items() if e not in j.hypothesis), *j.hypothesis)
-            for j in jobs
-        ]
-
-    def cross_validate(workers, reduced, best, late):
-        (effect,) = set(best.hypothesis) - set(reduced.hypothesis)
-        tried.append(effect)
-        return validation(0.02, 0.03 if effect is GAIN else 0.01)
-
-    monkeypatch.setattr(cross_validation, "cross_validate", cross_validate)
-    monkeypatch.setattr(fit_jobs, "transfer_theta", lambda *_: None)
-    workers = SimpleNamespace(base=None, fit=fit)
-    best = prune_by_cross_validation(workers, made_fit(0.0, HOSE, GAIN, FRICTION))
-    assert best.hypothesis == (HOSE, FRICTION) and tried == [GAIN, HOSE]
-    losses[HOSE] = losses[GAIN] = 50.0
-    assert prune_by_cross_validation(workers, made_fit(0.0, HOSE, GAIN)).hypothesis == (HOSE, GAIN)
-    assert tried == [GAIN, HOSE]
 
 
 def test_before_is_the_better_of_base_and_plain_calibration():

@@ -1,4 +1,4 @@
-"""The decision: from fits and checks to a verdict."""
+"""The decision: from the support of effects and the alarms to a verdict."""
 
 from dataclasses import replace
 
@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 
 from made_fits import made_fit
-from rippletwin.calibration.misfit import Score
 from rippletwin.explanation.checks.alarms import Alarms
-from rippletwin.explanation.checks.cross_validation import Validation
+from rippletwin.explanation.checks.robustness import Robustness
+from rippletwin.explanation.checks.support import Support, support_level
 from rippletwin.explanation.localise.source_free_fits import compare_evidence
 from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.thresholds import (
-    DECISIVE_LOG_BAYES_FACTOR,
     EQUIVALENT_LOG_BAYES_FACTOR,
-    MAX_MODEL_ERROR_TO_NAME,
     MIN_LOG_BAYES_FACTOR,
     PULL_ALARM,
 )
@@ -26,89 +24,93 @@ from rippletwin.explanation.verdict.decision import (
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
 
-MISFIT_RAISED = Alarms(0.03, (1.0, "diameter[1]"), (1.0, "length[1]"), (1.0, ""))
-NO_ALARM = replace(MISFIT_RAISED, misfit=0.004)
+MISFIT_RAISED = Alarms(50.0, (1.0, "diameter[1]"), (1.0, "length[1]"), (1.0, ""))
+NO_ALARM = replace(MISFIT_RAISED, misfit=0.0)
+OFF_SHEET = replace(NO_ALARM, pull=(5.0, "diameter[1]"))
 HOSE = (EFFECTS["viscoelastic_wall"], Place("segment 1", 0))
 VOLUME = (EFFECTS["line_volume"], Place("position"))
 NETWORK = (EFFECTS["passive_network"], Place("position", form="shunt"))
-STRONG, WEAK = DECISIVE_LOG_BAYES_FACTOR + 1, DECISIVE_LOG_BAYES_FACTOR - 1
+ENOUGH, TOO_LITTLE = MIN_LOG_BAYES_FACTOR + 1.0, MIN_LOG_BAYES_FACTOR - 1.0
 
 
-def validation(held_out, disagreement=1.0, in_sample=0.01):
-    """Of a misfit of 2 % both in sample and held out, `in_sample` and `held_out` are left."""
-    before = {"in_sample": Score(0.02, 0.01), "held_out": Score(0.02, 0.01)}
-    after = {
-        "in_sample": Score(in_sample, 0.5 * in_sample),
-        "held_out": Score(held_out, 0.5 * held_out),
-    }
-    return Validation(before, after, ("recording 1",), disagreement)
+def support(level, name="viscoelastic_wall", place="segment 1"):
+    """Of one effect at a level."""
+    return Support(name, place, level, Robustness(50.0, 50.0, ("source", None), 50.0), 1.0, 0.0)
 
 
 @pytest.mark.parametrize(
-    ("evidence", "held_out", "disagreement", "alarms", "verdict"),
+    ("plain", "least", "own", "held_out", "pull", "level"),
     [
-        (WEAK, 0.01, 1.0, NO_ALARM, "named"),
-        (WEAK, 0.03, 1.0, NO_ALARM, "consistent"),  # the line fits, held-out data contradict
-        (STRONG, 0.03, 1.0, NO_ALARM, "consistent"),  # the same, whatever the evidence in sample
-        (STRONG, 0.015, 9.0, NO_ALARM, "unexplained"),  # decisive evidence, but folds disagree
-        (STRONG, 0.03, 1.0, MISFIT_RAISED, "unexplained"),  # the line alone does not fit either
+        (ENOUGH, ENOUGH, 0.1, 0.1, 0.0, "established"),
+        (TOO_LITTLE, ENOUGH, 0.1, 0.1, 0.0, "suggested"),  # a free data sheet does as well
+        (ENOUGH, ENOUGH, 0.1, -0.1, 0.0, "suggested"),  # held-out data speak against it
+        (ENOUGH, TOO_LITTLE, 0.1, 0.1, 0.0, "supported"),  # an error elsewhere does as well
+        (ENOUGH, ENOUGH, -0.1, 0.1, 0.0, "supported"),  # its law is not what is there
+        (ENOUGH, ENOUGH, 0.1, 0.1, 1.1 * PULL_ALARM, "supported"),  # it is implausible
     ],
 )
-def test_an_explanation_must_hold_on_held_out_data(
-    evidence, held_out, disagreement, alarms, verdict
+def test_an_effect_is_established_if_it_passes_every_check(
+    plain, least, own, held_out, pull, level
 ):
-    """An explanation that fails cross-validation is never named."""
-    base, best = made_fit(0.0), made_fit(evidence, HOSE)
-    decision = decide(Search(base, [best], best), alarms, validation(held_out, disagreement))
-    assert decision.verdict == verdict
-    assert decision.accepted is (base if verdict == "consistent" else best)
+    """Each check alone lowers the level."""
+    robustness = Robustness(plain, least, ("source", None), own)
+    assert support_level(robustness, held_out, pull) == level
 
 
 @pytest.mark.parametrize(
-    ("in_sample", "alarms", "verdict"),
+    ("level", "alarms", "verdict"),
     [
-        (0.021, NO_ALARM, "calibration_only"),
-        (0.019, NO_ALARM, "consistent"),  # it fits better in sample, but not held out
-        (0.021, MISFIT_RAISED, "unexplained"),  # the line alone does not fit either
+        ("established", NO_ALARM, "named"),
+        ("established", MISFIT_RAISED, "named"),  # whatever remains
+        ("supported", NO_ALARM, "unexplained"),
+        ("suggested", MISFIT_RAISED, "unexplained"),
+        ("suggested", NO_ALARM, "calibration_only"),  # its evidence is that of the data sheet
     ],
 )
-def test_evidence_without_a_better_fit_points_to_the_data_sheet(in_sample, alarms, verdict):
-    """Decisive evidence that comes from the priors alone means that nominal values are off."""
-    base, best = made_fit(0.0), made_fit(DECISIVE_LOG_BAYES_FACTOR + 10, HOSE)
-    decision = decide(
-        Search(base, [best], best), alarms, validation(held_out=0.03, in_sample=in_sample)
-    )
+def test_only_what_is_established_is_named(level, alarms, verdict):
+    """The twin takes the description of what is missing, named or not."""
+    base, best = made_fit(0.0), made_fit(100.0, HOSE)
+    decision = decide(Search(base, [best], best), alarms, [support(level)])
     assert decision.verdict == verdict
-    assert decision.accepted is (best if verdict == "unexplained" else base)
+    assert decision.accepted is (base if verdict == "calibration_only" else best)
+
+
+def test_a_spurious_companion_does_not_take_the_true_effect_with_it():
+    """One effect is established and another is not: the verdict is named."""
+    base, best = made_fit(0.0), made_fit(100.0, HOSE, VOLUME)
+    supports = [support("established"), support("supported", "line_volume", "position")]
+    decision = decide(Search(base, [best], best), MISFIT_RAISED, supports)
+    assert decision.verdict == "named" and decision.established == ("viscoelastic_wall",)
 
 
 @pytest.mark.parametrize(
-    ("model_error", "coordinate", "verdict"),
-    [
-        (0.9 * MAX_MODEL_ERROR_TO_NAME, 0.9 * PULL_ALARM, "named"),
-        (1.1 * MAX_MODEL_ERROR_TO_NAME, 0.0, "unexplained"),
-        (0.004, 1.1 * PULL_ALARM, "unexplained"),
-    ],
+    ("alarms", "verdict"),
+    [(NO_ALARM, "consistent"), (OFF_SHEET, "calibration_only"), (MISFIT_RAISED, "unexplained")],
 )
-def test_a_similar_effect_gets_no_name(model_error, coordinate, verdict):
-    """Too large a model error or an implausible parameter prevents a name, whatever the evidence.
-
-    The twin takes the description all the same."""
+def test_without_an_effect_the_alarms_decide(alarms, verdict):
+    """Nothing is accepted: the alarms say whether the line alone accounts for the data."""
     base = made_fit(0.0)
-    best = made_fit(1000.0, HOSE, model_error=model_error, coordinate=coordinate)
-    decision = decide(Search(base, [best], best), MISFIT_RAISED, validation(0.001, in_sample=0.001))
-    assert decision.verdict == verdict and decision.accepted is best
+    assert decide(Search(base, [], base), alarms).verdict == verdict
 
 
 @pytest.mark.parametrize("margin", [-1.0, 1.0])
-def test_a_passive_network_must_clearly_exceed_a_poor_named_fit(margin):
-    """A network takes the place of a poor named fit only beyond the equivalence margin."""
-    base, best = made_fit(0.0), made_fit(100.0, HOSE, model_error=0.007)
-    network = made_fit(100.0 + EQUIVALENT_LOG_BAYES_FACTOR + margin, NETWORK)
+def test_a_passive_network_stands_in_for_what_remains(margin):
+    """A network beside the effects is the twin's where it adds enough evidence, and the established
+    effect keeps its name."""
+    base, best = made_fit(0.0), made_fit(100.0, HOSE, model_error=0.05)
+    network = made_fit(100.0 + EQUIVALENT_LOG_BAYES_FACTOR + margin, HOSE, NETWORK)
     search = Search(base, [best], best, passive_networks=[network])
-    decision = decide(search, MISFIT_RAISED, validation(0.001, in_sample=0.001))
-    assert decision.verdict == ("unexplained" if margin > 0 else "named")
+    decision = decide(search, MISFIT_RAISED, [support("established")])
+    assert decision.verdict == "named"
     assert decision.accepted is (network if margin > 0 else best)
+
+
+def test_a_network_alone_is_unexplained():
+    """Something without a name accounts for what is missing."""
+    base, network = made_fit(0.0, model_error=0.05), made_fit(100.0, NETWORK)
+    search = Search(base, [], base, passive_networks=[network])
+    decision = decide(search, MISFIT_RAISED)
+    assert decision.verdict == "unexplained" and decision.accepted is network
 
 
 def test_equivalent_effects_are_ambiguous():
@@ -116,16 +118,16 @@ def test_equivalent_effects_are_ambiguous():
     base, best, other = made_fit(0.0), made_fit(50.0, HOSE), made_fit(49.0, VOLUME)
     search = Search(base, [best, other], best, [best, other])
     assert equivalent_effects(search) == (("line_volume", "viscoelastic_wall"),)
-    decision = decide(search, NO_ALARM, validation(0.001))
-    assert decision.verdict == "ambiguous"
+    assert decide(search, NO_ALARM, [support("established")]).verdict == "ambiguous"
     far = replace(search, rivals=[best, made_fit(40.0, VOLUME)])
-    assert decide(far, NO_ALARM, validation(0.001)).verdict == "named"
+    assert decide(far, NO_ALARM, [support("established")]).verdict == "named"
 
 
 def test_contradicting_data_end_in_bad_data_whatever_the_evidence():
     """A contradiction comes before everything else, and the base is what later stages use."""
     base, best = made_fit(0.0), made_fit(1000.0, HOSE)
-    decision = decide(Search(base, [best], best), NO_ALARM, validation(0.001), "p3 is dead")
+    supports = [support("established")]
+    decision = decide(Search(base, [best], best), NO_ALARM, supports, "p3 is dead")
     assert (decision.verdict, decision.contradiction) == ("bad_data", "p3 is dead")
     assert decision.accepted is base
 

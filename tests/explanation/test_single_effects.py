@@ -22,6 +22,6 @@ def test_a_little_air_gets_the_evidence_of_the_truth(seed):
     bench, data, truth = make(np.random.default_rng(seed), AIR, values, **one)
     workers = Workers(Twin(bench, data), data)
     known = refine(workers.base, AIR, data, [truth.theta])
-    base, (air,) = fit_single_effects(workers, AIR)
+    base, _, (air,) = fit_single_effects(workers, AIR)
     assert known.evidence - base.evidence > MIN_LOG_BAYES_FACTOR
     assert air.evidence == pytest.approx(known.evidence, abs=0.5)

@@ -126,7 +126,7 @@ def test_poor_fits_are_also_started_near_the_fit_without_the_effect(
     monkeypatch, model_error, is_asked
 ):
     """Where fits from nominal values leave a large `model_error`, every effect is also started near
-    the base, and near the best fit when it is added to one."""
+    the base. An effect that is added to a fit always starts near it."""
     monkeypatch.setattr(single_effects, "transfer_theta", lambda *_: None)
     started_near = []
 
@@ -143,7 +143,7 @@ def test_poor_fits_are_also_started_near_the_fit_without_the_effect(
         fit=lambda jobs, report=None: [fit_one(job) for job in jobs],
         observations=("point 1", "point 2"),
     )
-    base, fits = fit_single_effects(workers, [HOSE, VOLUME])
+    base, _, fits = fit_single_effects(workers, [HOSE, VOLUME])
     assert base.evidence == 0.0
     assert started_near == ([(HOSE,), (VOLUME,)] if is_asked else [])
     assert [f.evidence for f in fits] == ([50.0, 50.0] if is_asked else [10.0, 10.0])
@@ -151,8 +151,8 @@ def test_poor_fits_are_also_started_near_the_fit_without_the_effect(
     started_near.clear()
     best = made_fit(10.0, HOSE, model_error=0.3)
     extensions = fit_extensions(workers, best, [HOSE, VOLUME], None)
-    assert started_near == ([(HOSE, VOLUME)] if is_asked else [])
-    assert extensions[0].evidence == (50.0 if is_asked else 10.0)
+    assert (HOSE, VOLUME) in started_near
+    assert extensions[0].evidence == 50.0
 
 
 def test_needless_effects_are_dropped_weakest_first(monkeypatch):

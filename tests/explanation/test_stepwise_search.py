@@ -71,7 +71,6 @@ def test_the_search_names_the_effect_and_it_holds_on_held_out_points(small_libra
     search = search_effects(workers)
     assert search.best.names == ("sensor_gain",)
     validation = cross_validate(workers, search.base, search.best)
-    assert validation.passes
     measured = np.concatenate([o.values for o in observations], axis=1)
     true_misfit = relative_misfit(measured, np.concatenate(truth.predict(observations), axis=1))
     assert validation.after["held_out"].misfit < 1.25 * true_misfit

@@ -10,16 +10,24 @@ from rippletwin.explanation.verdict.summary_text import liquid_like_air, summary
 SPREAD = ShaftOrders(0.02, 1e-9, 0.95, "piston_spread", 0.03, interval=(0.025, 0.036))
 
 
-def summarise(verdict, shaft_orders=None, raised=(), pull=(0.1, "load"), pump=None, **decision):
+def summarise(
+    verdict, shaft_orders=None, raised=(), pull=(0.1, "load"), pump=None, remainder=None, **decision
+):
     """The sentence of a verdict without effects in the line; its misfits are 2 %."""
     twin = SimpleNamespace(parameters=(), theta=())
     e = SimpleNamespace(
         shaft_orders=shaft_orders,
         alarms=SimpleNamespace(raised=raised, pull=pull, drift=(1e-9, "recording 1")),
-        decision=SimpleNamespace(accepted=SimpleNamespace(hypothesis=(), twin=twin), **decision),
+        decision=SimpleNamespace(
+            accepted=SimpleNamespace(hypothesis=(), twin=twin),
+            supports=(),
+            established=(),
+            **decision,
+        ),
     )
     fit = {"before": {"held_out": 0.02}, "after": {"held_out": 0.02}}
     result = {"verdict": verdict, "fit": fit, "next_recording": None, "pump": pump or {}}
+    result["remainder"] = remainder
     return summary_text(e, result, [])
 
 
@@ -34,7 +42,7 @@ def test_shaft_orders_alone_are_named_without_an_effect_of_the_line():
 def test_an_unexplained_verdict_mentions_the_shaft_orders():
     """They are an observation, which holds though no effect is established."""
     sentence = summarise("unexplained", SPREAD)
-    assert "no effect of the library explains" in sentence
+    assert "Something is missing, and nothing is established" in sentence
     assert "indicate a spread of the pistons" in sentence
 
 
@@ -61,9 +69,27 @@ def test_the_pump_is_mentioned_if_it_differs_from_the_data_sheet():
     modulus = {"value": 1.21e9, "sheet": 1.25e9, "ci95": [1.15e9, 1.27e9], "unit": "Pa"}
     timing = {"value": 0.5, "sheet": 0.0, "ci95": [0.4, 0.6], "unit": "deg"}
     pump = {"bulk_modulus": modulus, "port_timing": timing}
-    assert "ports that open 0.50 deg late" in summarise("consistent", pump=pump)
+    assert "of the pump: port timing 0.5 deg (data sheet 0)." in summarise("consistent", pump=pump)
     timing["ci95"] = [-0.1, 1.1]
-    assert "ports" not in summarise("consistent", pump=pump)
+    assert "port" not in summarise("consistent", pump=pump)
+
+
+def test_what_remains_is_told_with_place_and_law():
+    """Its size, element, interval and law, and the network that stands in for it."""
+    remainder = {
+        "misfit": 0.08,
+        "model_error": 0.069,
+        "element": "segment 1",
+        "position_m": [0.12, 0.14],
+        "law": "proportional to jw, like a compliance or an inertance",
+        "stand_in": {"form": "shunt one-port", "passive": True},
+    }
+    sentence = summarise("unexplained", remainder=remainder)
+    assert "What then remains is 6.9% of the reading" in sentence
+    assert "belongs to segment 1 (0.12 to 0.14 m from the pump) and is proportional" in sentence
+    assert "A shunt one-port (passive) stands in for it in the twin." in sentence
+    nowhere = summarise("unexplained", remainder=remainder | {"element": None})
+    assert "no single element accounts for it" in nowhere
 
 
 @pytest.mark.parametrize(

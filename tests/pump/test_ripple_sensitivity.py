@@ -126,9 +126,11 @@ def test_derivatives():
 
 
 def test_fit_finds_both_values():
-    """Recordings of a pump simulated with other values: a fit finds both within two of its standard
-    deviations, which are at most a fifth of the priors', and leaves a seventh of the misfit of a
-    fit with the nominal ripple."""
+    """Recordings of a pump simulated with other values: a fit of all eight numbers finds both.
+
+    Each is within two of its standard deviations, which are at most two fifths of the prior's for
+    the modulus and a fifth for the timing. A seventh of the misfit with the nominal ripple is left.
+    """
     data = observations()
     other = [
         replace(o, flow_ripple=ripple(speed_rpm, pressure, modulus=MODULUS, timing=TIMING))
@@ -157,7 +159,7 @@ def test_fit_finds_both_values():
     off = fit.twin.theta[own] - (MODULUS, TIMING)
     print(off, fit.sd[own])
     assert np.all(np.abs(off) < 2 * fit.sd[own])
-    assert np.all(fit.sd[own] < 0.2)
+    assert np.all(fit.sd[own] < (0.4, 0.2))
 
 
 def test_both_domains_agree():

@@ -45,9 +45,10 @@ rule conceal:
         number=config["concealed"]["number"],
         cases=config["concealed"]["cases"],
         case=lambda wildcards: int(wildcards.hidden),
+        bench=config["concealed"]["bench"],
     shell:
         "virtualrig conceal --commit {params.commit} --number {params.number}"
-        " --cases {params.cases} --case {params.case} --out {output.case}"
+        " --bench {params.bench} --cases {params.cases} --case {params.case} --out {output.case}"
         " --seal {output.seal} --key {output.key} > {log} 2>&1"
 
 

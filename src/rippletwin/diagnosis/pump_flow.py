@@ -21,7 +21,6 @@ from rippletwin.harmonics import peak_amplitudes
 from rippletwin.pump.geometry import Geometry
 from rippletwin.pump.outlets import ConstantPressure
 from rippletwin.pump.simulation import PumpRipple, simulate
-from rippletwin.twin.parameters import angle_parameter
 from rippletwin.twin.twin import Twin
 
 STEPS = 3072  # a revolution: the change moves by 0.3 % when they are doubled, 1 % at 1e-8 m2
@@ -39,7 +38,6 @@ UNCERTAIN = {
 }
 """Relative standard deviations of the numbers of a pump about those of its data sheet."""
 TIMING_SD_DEG = 0.5  # of the port plate
-FITTED = ("bulk_modulus", "port_timing")  # the twin's names of the pump's fitted numbers
 
 
 def with_fitted_pump(twin: Twin, mean_flow: float | None = None, speed_hz: float = 1.0) -> Twin:
@@ -52,12 +50,10 @@ def with_fitted_pump(twin: Twin, mean_flow: float | None = None, speed_hz: float
     pump = {key: value for key, value in twin.rig.pump.items() if value is not None}
     if set(pump) == {"pistons"} and mean_flow is not None:
         pump = _scaled(Geometry.from_dict(pump), mean_flow / speed_hz)
-    dropped = {angle_parameter(label).name for label in twin.labels}
-    if twin.uncertain_pump:
-        values = twin.values()
-        pump["bulk_modulus"], pump["port_timing_deg"] = (values[name] for name in FITTED)
-        dropped.update(FITTED)
-    kept = [name not in dropped for name in twin.index]
+    own = {p.name for p in twin.parameters if p.place == "pump"}
+    own.update(f"{kind}[{label}]" for label in twin.labels for kind in ("angle", "state"))
+    pump |= {key: value for key, value in twin.fitted_pump().items() if value is not None}
+    kept = [name not in own for name in twin.index]
     return Twin(
         replace(twin.rig, pump=pump),
         friction=twin.friction,

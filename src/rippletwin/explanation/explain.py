@@ -8,7 +8,7 @@ The steps of the method, each with the module that takes it:
  4. Search: stepwise selection of effects                         search.stepwise_search
  5. Search again with the modulation by the explained line        localise.phase_modulation
  6. Couple the pump to the line and resume the search             twin.pump_line_coupling
- 7. Drop effects that fail on held-out data                       checks.cross_validation
+ 7. Judge the support of each effect, drop what has none          checks.support
  8. Find the intervals of the effects' parameters                 checks.profile_intervals
  9. Fit passive networks, which need no name                      search.passive_networks
 10. Find swapped sensors and inverted signs                       checks.sensor_wiring
@@ -18,7 +18,8 @@ The steps of the method, each with the module that takes it:
 14. Draw the null distribution of the evidence, if asked for      checks.bootstrap
 15. Decide                                                        verdict.decision
 16. Test the data sheet: prior sensitivity of accepted effects    checks.prior_sensitivity
-17. Locate the mismatch with free corrections                     localise.free_corrections
+17. Locate the mismatch and what remains, by free corrections     localise.free_corrections,
+                                                                  localise.remainder
 18. Analyse the shaft orders by the explained line                localise.shaft_orders
 
 `verdict.verdict_file` writes the result.
@@ -39,14 +40,12 @@ from rippletwin.case.model import Case, Recording, Rig
 from rippletwin.errors import InputError
 from rippletwin.explanation.checks.alarms import fit_each_observation, read_alarms
 from rippletwin.explanation.checks.bootstrap import bootstrap_null
-from rippletwin.explanation.checks.cross_validation import (
-    cross_validate,
-    prune_by_cross_validation,
-)
+from rippletwin.explanation.checks.cross_validation import cross_validate
 from rippletwin.explanation.checks.data_contradictions import find_contradictions
 from rippletwin.explanation.checks.prior_sensitivity import compare_without_each_effect
 from rippletwin.explanation.checks.profile_intervals import add_profile_intervals
 from rippletwin.explanation.checks.sensor_wiring import find_swapped_sensors
+from rippletwin.explanation.checks.support import judge_effects
 from rippletwin.explanation.fit_jobs import FitJob, PlainCalibration, open_workers
 from rippletwin.explanation.localise.free_corrections import locate_mismatch
 from rippletwin.explanation.localise.phase_modulation import (
@@ -54,13 +53,14 @@ from rippletwin.explanation.localise.phase_modulation import (
     modulation_differs,
     with_phase_modulation,
 )
+from rippletwin.explanation.localise.remainder import find_remainder
 from rippletwin.explanation.localise.shaft_order_interval import add_amplitude_interval
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders, analyse_shaft_orders
 from rippletwin.explanation.localise.source_free_fits import refit_source_free
 from rippletwin.explanation.search.passive_networks import best_explanation, fit_passive_networks
 from rippletwin.explanation.search.stepwise_search import Search, resume_search, search_effects
 from rippletwin.explanation.thresholds import MODULATION_SHARE, ROUGH_MODULATION_SHARE
-from rippletwin.explanation.verdict.decision import decide, withdraw_refuted_name
+from rippletwin.explanation.verdict.decision import decide
 from rippletwin.explanation.verdict.explanation import Explanation
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
 from rippletwin.spectra.observation import Observation, observe, revolutions_of
@@ -129,17 +129,18 @@ def explain_observations(
     early = _select_fitted(early, rig, state.modulation)
     late = _select_fitted(late, rig, state.modulation)
     held_out = late if len(data) == 1 and late else None
+    supports, without = (), ()
     with open_workers(base, data, processes) as workers:
         if not contradiction:
             # Steps 7 to 10: the best explanation and its competitors
-            best = prune_by_cross_validation(workers, search.best, held_out)
+            best, supports, without = judge_effects(workers, search.base, search.best, held_out)
             best = add_profile_intervals(workers, best)
             networks = fit_passive_networks(workers, best)
             search = replace(search, best=best, passive_networks=networks)
             contradiction = find_swapped_sensors(base, data, search)
         # Steps 11 to 14: checks
         point_fits = fit_each_observation(workers, search.base)
-        alarms = read_alarms(search.base, point_fits, early, late, rig.delay)
+        alarms = read_alarms(search.base, data, point_fits, early, late, rig.delay)
         source_free_fits = refit_source_free(workers, search.leading_fits)
         explanation = best_explanation(search)
         calibrated = None
@@ -150,17 +151,13 @@ def explain_observations(
         if draws and search.best.hypothesis:
             null_distribution = bootstrap_null(search.base, data, draws, processes, progress)
         # Steps 15 and 16: decision
-        decision = decide(
-            search,
-            alarms,
-            validation if explanation.hypothesis else None,
-            contradiction,
-            null_distribution,
-        )
-        sensitivity = compare_without_each_effect(workers, search.base, decision.accepted)
-        decision = withdraw_refuted_name(decision, sensitivity)
+        decision = decide(search, alarms, supports, contradiction, null_distribution)
+        sensitivity = ()
+        if decision.supports:
+            sensitivity = compare_without_each_effect(workers, search.best, without)
     # Steps 17 and 18: where the mismatch is
     location = locate_mismatch(search.base, data)
+    remainder = None if contradiction else find_remainder(decision.accepted, data)
     shaft_orders = add_amplitude_interval(
         _analyse_shaft_orders(decision.accepted, observations),
         decision.accepted,
@@ -180,6 +177,7 @@ def explain_observations(
         prior_sensitivity=sensitivity,
         shaft_orders=shaft_orders,
         location=location,
+        remainder=remainder,
         null_distribution=null_distribution,
     )
 
@@ -228,7 +226,7 @@ def prepare_base(
     data = select_fitted_frequencies(
         with_phase_modulation(observations, modulation), rig, highest_hz
     )
-    base = Twin(rig, data, uncertain_pump=True)
+    base = Twin(rig, data, uncertain_pump=True, changing_state=True)
     # Simulate the pump before the worker processes start: the twin keeps the result.
     ForwardModel(base, data)
     return base, data
@@ -275,7 +273,7 @@ def _search_with_coupled_pump(
     coupled = couple_pump_to_line(search.best.twin, state.observations)
     if coupled is None:
         return state, search
-    base = Twin(state.base.rig, coupled, uncertain_pump=True)
+    base = Twin(state.base.rig, coupled, uncertain_pump=True, changing_state=True)
     with open_workers(base, coupled, processes) as workers:
         search = resume_search(workers, search, progress)
     return _State(base, coupled, state.modulation), search

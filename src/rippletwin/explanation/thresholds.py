@@ -16,9 +16,6 @@ MIN_LOG_BAYES_FACTOR = 8.0
 """An effect is accepted if it adds at least this. It is above the largest value in parametric
 bootstraps of cases without an effect, with refitting (docs/explanation/explain.md)."""
 
-DECISIVE_LOG_BAYES_FACTOR = 2.0 * MIN_LOG_BAYES_FACTOR
-"""From this value on something is missing even where the explanation fails cross-validation."""
-
 EQUIVALENT_LOG_BAYES_FACTOR = 3.0  # two explanations closer than this are equivalent: 20 to 1
 
 MIN_LOG_BAYES_FACTOR_ALWAYS_PRESENT = -3.0
@@ -27,13 +24,9 @@ data are 20 to 1 against it."""
 
 FALSE_ALARM_RATE = 0.02  # of cases without an effect, for the threshold of a bootstrap
 
-# Relative model error: what source and sensor errors do not account for
-
-GOOD_MODEL_ERROR = 1.25 * MIN_MODEL_ERROR  # up to here no effect can improve the fit noticeably
-MAX_MODEL_ERROR_TO_NAME = 2.0 * MIN_MODEL_ERROR
-"""Above this no effect is named. With the true effect the model error falls to its minimum; with a
-similar effect it stays above (docs/explanation/explain.md)."""
-MISFIT_ALARM = 3.0 * MIN_MODEL_ERROR  # of the base fit
+GOOD_MODEL_ERROR = 1.25 * MIN_MODEL_ERROR
+"""Relative model error up to which no effect can improve a fit noticeably: it saves work, and no
+verdict depends on it."""
 
 # Parameters and data of several recordings
 
@@ -44,11 +37,6 @@ WIDE_PRIOR_MISFIT_RATIO = 2.0
 """Between the accepted fit and a fit without an effect with wide priors. A fit that misfits less
 than this times the accepted misfit is a rival; one that misfits less by this factor refutes the
 effect."""
-
-# Cross-validation
-
-SMALL_HELD_OUT_SHARE = 1 / 3  # of the base's held-out misfit
-MAX_FOLD_DIFFERENCE = 3.5  # standard deviations between an effect's parameter in a fold and overall
 
 # Shaft orders that are no multiples of the number of pistons
 

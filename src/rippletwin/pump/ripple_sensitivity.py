@@ -1,10 +1,11 @@
-"""Second-order sensitivity of the flow ripple to the pump's bulk modulus and port timing.
+"""Second-order sensitivity of the flow ripple to numbers of the pump.
 
 A chamber that opens to delivery takes in a backflow until it is compressed. Its amount depends on
 the bulk modulus of the liquid in the chamber, which air and heat lower by some per cent. Its onset
 depends on the angle between port plate and swash plate, hence on play and mounting (Edge & Darling
 1989, J. Dyn. Sys. Meas. Control 111, 307; Ivantysyn & Ivantysynova 2001, Hydrostatic Pumps and
-Motors, ch. 2). No drawing gives either to a per cent; both are the same at all operating points.
+Motors, ch. 2). How fast the port opens and how the chambers fill follow from relief grooves, edges
+and free air. No drawing gives these to a per cent; all are the same at all operating points.
 """
 
 from __future__ import annotations
@@ -20,7 +21,16 @@ from rippletwin.harmonics import peak_amplitudes
 from rippletwin.pump.outlets import ConstantPressure
 from rippletwin.pump.simulation import PumpRipple, simulate
 
-KEYS = {"bulk_modulus": "bulk_modulus", "port_timing": "port_timing_deg"}
+KEYS = {
+    "bulk_modulus": "bulk_modulus",
+    "port_timing": "port_timing_deg",
+    "dead_volume": "dead_volume",
+    "discharge_coefficient": "discharge_coefficient",
+    "port_opening": "port_opening_deg",
+    "port_overlap": "port_overlap_deg",
+    "air_fraction": "air_fraction",
+    "case_leakage": "case_leakage",
+}
 """Names of the uncertain parameters -> keys of `Geometry`."""
 
 STEPS_PER_REVOLUTION = 6144  # enough for differences between runs, whose errors are alike

@@ -231,6 +231,7 @@ class DifferentiableForward(ForwardModel):
                 self.s, density=density, viscosity=v.viscosity, diameter=d, friction=twin.friction
             )
             network.shunt[k] = shunt_admittance(self.s, density=density, wave_speed=a, diameter=d)
+        network.shunt *= self._state_factor(coordinates)
         state = self.line_state(v)
         for effect, place, own in twin.effect_values(coordinates):
             own = {name: x[:, None] for name, x in own.items()}

@@ -138,6 +138,7 @@ class ForwardModel:
                 for a, d in zip(v.wave_speeds, v.diameters)
             ]
         )
+        shunt = shunt * self._state_factor(theta)
         source, source_admittance = self.source.at(theta)
         network = FrequencyDomainLine(
             s=self.s,
@@ -154,6 +155,19 @@ class ForwardModel:
             for effect, place, values in twin.effect_values(theta):
                 effect.apply(network, state, values, place)
         return network
+
+    def _state_factor(self, theta: np.ndarray) -> np.ndarray:
+        """What the state of each recording makes of shunt admittances, (..., F); `theta` may be
+        (P, B)."""
+        if not self.twin.changing_state:
+            return 1.0
+        factor = np.ones((*np.shape(theta)[1:], len(self.s)))
+        for o, part in zip(self.observations, self.slices):
+            k = self.twin.index.get(f"state[{o.label}]")
+            if k is not None:
+                speed = self.twin.parameters[k].value(theta[k])
+                factor[..., part] = np.asarray(speed**-2.0)[..., None]
+        return factor
 
     def line_state(self, v: Arrays) -> LineState:
         """The numbers of the line that effects need, with `v` of `Twin.arrays`."""

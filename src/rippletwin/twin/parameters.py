@@ -67,8 +67,19 @@ def coordinates(parameters: Sequence[Parameter], by_name: Mapping[str, float]) -
 
 
 GUESSED_LOAD_SD = 1.0  # relative, of the load where its mean flow is guessed (`operating_point`)
-BULK_MODULUS_SD = 0.1  # relative, of the liquid in the chambers: air and heat lower it
 PORT_TIMING_SD = 1.0  # deg, of the port plate's angle to the swash plate
+PUMP_SDS = {
+    "bulk_modulus": 0.1,  # of the liquid in the chambers: air and heat lower it
+    "dead_volume": 0.15,  # cavities of pistons and ports are not on the drawing of the stroke
+    "discharge_coefficient": 0.1,  # with the ports' area, of which it is a factor
+    "port_opening": 0.3,  # relief grooves and edges
+    "port_overlap": 0.7,
+    "air_fraction": 1.0,
+    "case_leakage": 0.7,  # the cube of clearances
+}
+"""Relative standard deviations of the pump's numbers about the data sheet. Sources of the orders of
+magnitude: docs/diagnosis_trial.md, nuisance physics."""
+PUMP_UNITS = {"bulk_modulus": "Pa", "dead_volume": "m3", "case_leakage": "m3/(Pa s)"}
 ANGLE_SCALE = 0.01  # rad of shaft angle a coordinate: a few degrees of phase at the 9th harmonic
 
 
@@ -103,16 +114,34 @@ def line_parameters(rig: Rig, guessed_load: bool) -> list[Parameter]:
 
 
 def pump_parameters(rig: Rig) -> list[Parameter]:
-    """Bulk modulus and port timing of a pump whose geometry is known."""
+    """Uncertain numbers of a pump whose geometry is known; one that the data sheet says to be zero
+    is none."""
     from rippletwin.pump.geometry import Geometry
+    from rippletwin.pump.ripple_sensitivity import KEYS
 
-    geometry = Geometry.from_dict(rig.pump)
-    modulus = lognormal(geometry.bulk_modulus, BULK_MODULUS_SD)
-    timing = normal(geometry.port_timing_deg, PORT_TIMING_SD)
-    return [
-        Parameter("bulk_modulus", "Pa", modulus, place="pump"),
-        Parameter("port_timing", "deg", timing, place="pump"),
-    ]
+    geometry, parameters = Geometry.from_dict(rig.pump), []
+    for name, key in KEYS.items():
+        nominal = getattr(geometry, key)
+        if name == "port_timing":
+            prior = normal(nominal, PORT_TIMING_SD)
+        elif nominal > 0.0:
+            prior = lognormal(nominal, PUMP_SDS[name])
+        else:
+            continue
+        unit = "deg" if key.endswith("_deg") else PUMP_UNITS.get(name, "1")
+        parameters.append(Parameter(name, unit, prior, place="pump"))
+    return parameters
+
+
+RECORDING_STATE_SD = 0.005
+"""Relative, of all wave speeds between recordings: they fall by 0.3 % a kelvin (Gholizadeh, Burton
+and Schoenau 2011, Int. J. Fluid Power 12(3):5), and a line is not at one temperature for long."""
+
+
+def state_parameter(label: str) -> Parameter:
+    """Factor on all wave speeds while a recording was made, about their common value."""
+    prior = lognormal(1.0, RECORDING_STATE_SD)
+    return Parameter(f"state[{label}]", "1", prior, place=f"recording {label}")
 
 
 def angle_parameter(label: str) -> Parameter:

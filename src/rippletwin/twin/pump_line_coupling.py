@@ -62,9 +62,8 @@ def _couple(twin: Twin, observation):
 
 def _pump(twin: Twin) -> tuple[dict, float]:
     """The pump's numbers as fitted, and the angle of its port plate from the data sheet's, rad."""
-    values, pump = twin.values(), dict(twin.rig.pump)
+    pump = twin.fitted_pump()
     if not twin.uncertain_pump:
         return pump, 0.0
-    sheet = twin.parameters[twin.index["port_timing"]].nominal
-    pump |= {"bulk_modulus": values["bulk_modulus"], "port_timing_deg": values["port_timing"]}
-    return pump, float(np.radians(values["port_timing"] - sheet))
+    timing = twin.parameters[twin.index["port_timing"]]
+    return pump, float(np.radians(pump["port_timing_deg"] - timing.nominal))

@@ -8,8 +8,10 @@ and every prior is N(0, 1). Its entries, in this order (segments and recordings 
     viscosity                               kinematic
     load                                    factor on the orifice's coefficient or on the measured
                                             load impedance; absent for other loads
-    bulk_modulus, port_timing               of the pump, where `uncertain_pump` says so
+    bulk_modulus, port_timing, ...          of the pump, where `uncertain_pump` says so
     angle[LABEL]                            shaft angle at a recording's first sample, rad; no prior
+    state[LABEL]                            factor on all wave speeds while a recording was made,
+                                            where `changing_state` says so
     LABEL.NAME                              parameters of the effects, with their own priors
 
 An effect at its place is a pair (effect, place) of `rippletwin.twin.effects`; its LABEL is
@@ -38,6 +40,7 @@ from rippletwin.twin.parameters import (
     effect_parameters,
     line_parameters,
     pump_parameters,
+    state_parameter,
 )
 
 SOURCE_SD = 0.05
@@ -68,9 +71,11 @@ class Twin:
     theta : coordinates of the twin's own values, (P,); nominal by default.
     guessed_load : whether the orifice's coefficient is only guessed; by default it is where an
         observation has neither a flow ripple nor a coefficient from which the mean flow follows.
-    uncertain_pump : whether the pump's bulk modulus and port timing are parameters. They can be
-        only where recordings have a nominal source and the data sheet gives the pump's geometry,
-        from which the lumped model calculates how they change the ripple.
+    uncertain_pump : whether numbers of the pump are parameters. They can be only where recordings
+        have a nominal source and the data sheet gives the pump's geometry, from which the lumped
+        model calculates how they change the ripple.
+    changing_state : whether the line's temperature differs between recordings, where there are two
+        or more.
 
     Raises ValueError for an unknown friction or a theta of the wrong length.
     """
@@ -85,6 +90,7 @@ class Twin:
         theta: np.ndarray | None = None,
         guessed_load: bool | None = None,
         uncertain_pump: bool = False,
+        changing_state: bool = False,
     ):
         if friction not in FRICTION_LAWS:
             raise ValueError(f"friction must be one of {FRICTION_LAWS}, not {friction!r}")
@@ -101,11 +107,13 @@ class Twin:
             )
         self.guessed_load = bool(guessed_load)
         self.uncertain_pump = bool(uncertain_pump and self.labels and len(rig.pump) > 1)
+        self.changing_state = bool(changing_state and len(self.labels) > 1)
         self._effect_parameters = [effect.parameters(rig, place) for effect, place in self.effects]
         self.parameters = (
             *line_parameters(rig, self.guessed_load),
             *(pump_parameters(rig) if self.uncertain_pump else ()),
             *(angle_parameter(label) for label in self.labels),
+            *(state_parameter(label) for label in self.labels if self.changing_state),
             *effect_parameters(self.effects, self._effect_parameters),
         )
         self.index = {p.name: k for k, p in enumerate(self.parameters)}
@@ -205,12 +213,21 @@ class Twin:
             "source_sd": self.source_sd,
             "guessed_load": self.guessed_load,
             "uncertain_pump": self.uncertain_pump,
+            "changing_state": self.changing_state,
             "theta": None if "effects" in changes else self.theta,
         }
         labels = [OperatingCondition(label) for label in self.labels]
         twin = Twin(self.rig, labels, **{**state, **changes})
         twin._ripples = self._ripples
         return twin
+
+    def fitted_pump(self) -> dict:
+        """The data sheet's pump, keys as in rig.yaml, with the fitted values of its parameters."""
+        from rippletwin.pump.ripple_sensitivity import KEYS
+
+        values, pump = self.values(), dict(self.rig.pump)
+        fitted = {p.name for p in self.parameters if p.place == "pump"}
+        return pump | {KEYS[name]: values[name] for name in fitted}
 
     def calibrated_rig(self) -> Rig:
         """The rig with the twin's own values, for the method of characteristics.
@@ -237,8 +254,9 @@ class Twin:
         from rippletwin.pump.ripple_sensitivity import ripple_change
 
         rig, changes = self.rig, []
-        for k in (self.index["bulk_modulus"], self.index["port_timing"]):
-            p = self.parameters[k]
+        for k, p in enumerate(self.parameters):
+            if p.place != "pump":
+                continue
             ends = p.value(1.0), p.value(-1.0)
             change = ripple_change(
                 rig.pump, rig.fluid, 60.0 * speed_hz, load_pressure, p.name, ends

@@ -29,6 +29,7 @@ def to_dict(twin: Twin) -> dict:
         "source_sd": twin.source_sd,
         "guessed_load": twin.guessed_load,
         "uncertain_pump": twin.uncertain_pump,
+        "changing_state": twin.changing_state,
         "effects": [_effect(e, place) for e, place in twin.effects],
         "theta": twin.theta.tolist(),
         "values": twin.values(),
@@ -50,6 +51,7 @@ def from_dict(data: dict) -> Twin:
         source_sd=data["source_sd"],
         guessed_load=data["guessed_load"],
         uncertain_pump=data.get("uncertain_pump", False),
+        changing_state=data.get("changing_state", False),
         theta=np.array(data["theta"]),
     )
 

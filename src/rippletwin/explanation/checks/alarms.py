@@ -1,10 +1,10 @@
 """Alarms: does the line without effects fail to explain the data?
 
-Refitting hides what is missing, so a good fit proves nothing. Four alarms look at the base fit: the
-misfit left after refitting, the pull of the parameters away from the data sheet (where an absorbed
-effect shows), the disagreement between fits of single operating points, and drift within a
-recording. The verdict rests on the evidence of the best effect; the alarms decide where no effect
-is accepted.
+Refitting hides what is missing, so a good fit proves nothing. Four alarms look at the base fit:
+what a free correction of one element would add to it, the pull of the parameters away from the data
+sheet (where an absorbed effect shows), the disagreement between fits of single operating points,
+and drift within a recording. The verdict rests on the support of the effects; the alarms decide
+where no effect is accepted.
 """
 
 from __future__ import annotations
@@ -18,10 +18,15 @@ from scipy.special import chdtrc
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.posterior import MIN_MODEL_ERROR
 from rippletwin.explanation.fit_jobs import FitJob, FromTheta, Workers
+from rippletwin.explanation.localise.smooth_corrections import (
+    NONE,
+    SmoothCorrections,
+    elements_of,
+)
 from rippletwin.explanation.thresholds import (
     DISAGREEMENT_ALARM,
     DRIFT_SIGNIFICANCE,
-    MISFIT_ALARM,
+    MIN_LOG_BAYES_FACTOR,
     PULL_ALARM,
 )
 from rippletwin.spectra.frequency_selection import select_frequencies
@@ -35,7 +40,8 @@ HALVES_MODEL_ERROR = 0.5 * MIN_MODEL_ERROR  # relative, between the two halves o
 class Alarms:
     """What each alarm measures, and whether it is raised.
 
-    misfit         relative model error of the base fit
+    misfit         log Bayes factor of the best free correction of one element of the line
+                   (`localise.smooth_corrections`)
     pull           largest |coordinate| of a parameter with a prior, and the parameter's name
     disagreement   largest difference between operating points in standard deviations, and the
                    parameter's name
@@ -51,7 +57,7 @@ class Alarms:
     def raised(self) -> tuple[str, ...]:
         """Names of the alarms that are raised."""
         states = {
-            "misfit": self.misfit > MISFIT_ALARM,
+            "misfit": self.misfit >= MIN_LOG_BAYES_FACTOR,
             "pull": self.pull[0] > PULL_ALARM,
             "disagreement": self.disagreement[0] > DISAGREEMENT_ALARM,
             "drift": self.drift[0] < DRIFT_SIGNIFICANCE,
@@ -60,14 +66,23 @@ class Alarms:
 
 
 def read_alarms(
-    base: Fit, point_fits: Sequence[Fit], early: Sequence, late: Sequence, delay: float
+    base: Fit,
+    observations: Sequence,
+    point_fits: Sequence[Fit],
+    early: Sequence,
+    late: Sequence,
+    delay: float,
 ) -> Alarms:
-    """The alarms of the base fit, its fits to single observations, and the halves of recordings.
+    """The alarms of the base fit to `observations`, its fits to single ones, and the halves of
+    recordings.
 
     `delay` (s) is that of the line.
     """
+    table = SmoothCorrections(base, observations).by_element(
+        elements_of(base.twin.rig, observations)
+    )
     return Alarms(
-        base.model_error,
+        max(table.values()) - table[NONE, None],
         largest_pull(base),
         largest_disagreement(point_fits),
         drift_p_value(early, late, delay),
@@ -91,19 +106,6 @@ def largest_pull(fit: Fit) -> tuple[float, str]:
         if not p.flat and "@" not in p.name
     ]
     return max(pulls, default=(0.0, ""))
-
-
-def largest_effect_pull(fit: Fit) -> float:
-    """Largest |coordinate| of a parameter of the effects.
-
-    A position has no pull: its prior is uniform.
-    """
-    pulls = [
-        abs(float(u))
-        for p, u in zip(fit.twin.parameters, fit.twin.theta)
-        if "@" in p.name and p.prior.kind != "uniform"
-    ]
-    return max(pulls, default=0.0)
 
 
 def largest_disagreement(fits: Sequence[Fit]) -> tuple[float, str]:

@@ -98,7 +98,7 @@ def _largest_log_bayes_factor(job: tuple[Fit, tuple, int, int]) -> float:
     drawn = draw_without_effects(base, observations, np.random.default_rng([seed, k]))
     twin = base.twin.with_(theta=np.zeros_like(base.twin.theta))
     candidates = applicable_candidates(twin.rig, drawn)
-    refitted_base, fits = fit_single_effects(Workers(twin, drawn), candidates)
+    refitted_base, _, fits = fit_single_effects(Workers(twin, drawn), candidates)
     return max((fit.evidence - refitted_base.evidence for fit in fits), default=-np.inf)
 
 

@@ -12,12 +12,7 @@ import numpy as np
 
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.misfit import Score, score_fit
-from rippletwin.explanation.fit_jobs import Workers, job_from, job_without_effect
-from rippletwin.explanation.thresholds import (
-    DECISIVE_LOG_BAYES_FACTOR,
-    MAX_FOLD_DIFFERENCE,
-    SMALL_HELD_OUT_SHARE,
-)
+from rippletwin.explanation.fit_jobs import Workers, job_from
 from rippletwin.spectra.frequency_selection import select_frequencies
 
 UNDETERMINED_VARIANCE = 0.5  # of a coordinate in a fold; its prior has 1
@@ -50,32 +45,6 @@ class Validation:
         candidates = [self.before] if self.calibrated is None else [self.before, self.calibrated]
         return min(candidates, key=lambda scores: scores["in_sample"].misfit)
 
-    @property
-    def passes(self) -> bool:
-        """Whether the explanation holds on held-out data.
-
-        Either most of the held-out misfit is gone, or it improves and the folds agree on the
-        parameters. A fold of one operating point may misplace a parameter, but nothing that only
-        absorbs error removes most of the held-out misfit.
-        """
-        before, after = (which["held_out"].misfit for which in (self.before, self.after))
-        return after < SMALL_HELD_OUT_SHARE * before or (
-            after < before and self.disagreement < MAX_FOLD_DIFFERENCE
-        )
-
-    @property
-    def transfers(self) -> bool:
-        """Whether the explanation fits held-out data better than the base."""
-        return self.after["held_out"].misfit < self.before["held_out"].misfit
-
-    @property
-    def fits_better(self) -> bool:
-        """Whether the explanation fits better than the base, in sample or held out.
-
-        Evidence without a better fit means only that line parameters stay closer to the data sheet.
-        """
-        return any(self.after[k].misfit < self.before[k].misfit for k in ("in_sample", "held_out"))
-
 
 def cross_validate(
     workers: Workers,
@@ -86,82 +55,76 @@ def cross_validate(
 ) -> Validation:
     """Cross-validate the base and the best fit, and the plain calibration if there is one.
 
-    The folds are operating points. With a single one, `late`, its late windows, are held out, or
-    else blocks of frequencies. Every fold starts from the modes of the whole fits: the folds differ
-    in their data only.
+    The folds are those of `make_folds`. Every fold starts from the modes of the whole fits: the
+    folds differ in their data only.
     """
     fits = [base, best] if calibrated is None else [base, best, calibrated]
-    observations = workers.observations
-    count = len(observations)
-    if count > 1:
-        folds = [tuple(k for k in range(count) if k != left) for left in range(count)]
-        held_out = [[observations[left]] for left in range(count)]
-        left_out = tuple(f"recording {o.label}" for o in observations)
-        refitted = _refit_folds(workers, fits, folds)
-    elif late is not None:
-        held_out, left_out = [list(late)], ("the second half of the recording",)
-        refitted = _refit_folds(workers, fits, [(0,)])
+    folds = make_folds(workers, late)
+    jobs = [job_from(f, observations=fold.indices) for fold in folds for f in fits]
+    if all(fold.workers is workers for fold in folds):
+        flat = workers.fit(jobs)  # all folds side by side
     else:
-        held_out, left_out, refitted = _refit_frequency_folds(workers, fits)
+        flat = [fit for fold in folds for fit in fold.workers.fit([job_from(f) for f in fits])]
+    refitted = [flat[len(fits) * k : len(fits) * (k + 1)] for k in range(len(folds))]
     scores = []
     for which, fit in enumerate(fits):
-        folds = [score_fit(fold[which], h, turn=True) for fold, h in zip(refitted, held_out)]
-        outside = Score(_rms([s.misfit for s in folds]), _rms([s.theil for s in folds]))
-        scores.append({"in_sample": score_fit(fit, observations), "held_out": outside})
+        each = [score_fit(r[which], fold.held_out, turn=True) for r, fold in zip(refitted, folds)]
+        outside = Score(_rms([s.misfit for s in each]), _rms([s.theil for s in each]))
+        scores.append({"in_sample": score_fit(fit, workers.observations), "held_out": outside})
     return Validation(
         scores[0],
         scores[1],
-        left_out,
+        tuple(fold.left_out for fold in folds),
         max((_largest_difference(best, fold[1]) for fold in refitted), default=0.0),
         None if calibrated is None else scores[2],
     )
 
 
-def prune_by_cross_validation(workers: Workers, best: Fit, late: Sequence | None = None) -> Fit:
-    """`best` without the effects that do not improve the fit of held-out data.
+@dataclass(frozen=True)
+class Fold:
+    """Data to fit and data that are held out.
 
-    The effect with the least evidence is tried first. Always-present effects stay, and so do those
-    with decisive evidence: misfits weight all harmonics alike, while evidence weights each by its
-    error.
+    workers    run fits of the fold's data, those with `indices` of their observations (None: all)
+    held_out   the observations that are not fitted
+    left_out   what they are, in words
     """
-    while len(best.hypothesis) > 1:
-        jobs = [
-            job_without_effect(best, k, workers.base)
-            for k, (effect, _) in enumerate(best.hypothesis)
-            if not effect.certain
+
+    workers: Workers
+    indices: tuple[int, ...] | None
+    held_out: list
+    left_out: str
+
+
+def make_folds(workers: Workers, late: Sequence | None = None) -> list[Fold]:
+    """The folds of the observations of `workers`.
+
+    Each operating point is held out in turn. With a single one, `late`, its late windows, are held
+    out, or else every second block of frequencies.
+    """
+    observations = workers.observations
+    count = len(observations)
+    if count > 1:
+        return [
+            Fold(
+                workers,
+                tuple(k for k in range(count) if k != left),
+                [observations[left]],
+                f"recording {observations[left].label}",
+            )
+            for left in range(count)
         ]
-        reduced = max(workers.fit(jobs), key=lambda fit: fit.evidence, default=None)
-        if reduced is None or best.evidence - reduced.evidence > DECISIVE_LOG_BAYES_FACTOR:
-            break
-        if cross_validate(workers, reduced, best, late).passes:
-            break
-        best = reduced
-    return best
-
-
-def _refit_folds(
-    workers: Workers, fits: Sequence[Fit], folds: Sequence[tuple[int, ...]]
-) -> list[list[Fit]]:
-    """The fits refitted to the observations with the indices of each fold."""
-    flat = workers.fit([job_from(f, observations=fold) for fold in folds for f in fits])
-    return [flat[len(fits) * k : len(fits) * (k + 1)] for k in range(len(folds))]
-
-
-def _refit_frequency_folds(workers: Workers, fits: Sequence[Fit]) -> tuple:
-    """(held-out observations, what they are, refitted fits) of two folds over a single spectrum.
-
-    Each fold holds out every second block of frequencies.
-    """
-    observation = workers.observations[0]
-    count = len(observation.frequency_hz)
-    block = np.floor(FREQUENCY_BLOCKS * np.arange(count) / count)
-    held_out, refitted = [], []
-    for parity in (0, 1):
+    if late is not None:
+        return [Fold(workers, None, list(late), "the second half of the recording")]
+    (observation,) = observations
+    frequencies = len(observation.frequency_hz)
+    block = np.floor(FREQUENCY_BLOCKS * np.arange(frequencies) / frequencies)
+    folds = []
+    for parity, words in enumerate(("odd", "even")):
         inside = block % 2 == parity
-        fold = Workers(workers.base, [select_frequencies(observation, inside)])
-        held_out.append([select_frequencies(observation, ~inside)])
-        refitted.append(fold.fit([job_from(f) for f in fits]))
-    return held_out, ("odd eighths of the band", "even eighths of the band"), refitted
+        own = Workers(workers.base, [select_frequencies(observation, inside)])
+        held_out = [select_frequencies(observation, ~inside)]
+        folds.append(Fold(own, None, held_out, f"{words} eighths of the band"))
+    return folds
 
 
 def _largest_difference(whole: Fit, fold: Fit) -> float:

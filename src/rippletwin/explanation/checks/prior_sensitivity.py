@@ -23,6 +23,7 @@ from rippletwin.explanation.fit_jobs import (
     FromTheta,
     Workers,
     common_coordinates,
+    job_without_effect,
 )
 from rippletwin.explanation.thresholds import (
     MIN_LOG_BAYES_FACTOR,
@@ -64,25 +65,45 @@ class PriorSensitivity:
     refutes: bool
 
 
-def compare_without_each_effect(
-    workers: Workers, base: Fit, accepted: Fit
-) -> tuple[PriorSensitivity, ...]:
-    """`PriorSensitivity` of every accepted effect; `base` is the fit without any.
+@dataclass(frozen=True)
+class WithoutEffect:
+    """The fits without one effect: with priors as stated, and with wide ones, and its misfit."""
 
-    The hypothesis without the effect is first fitted with priors as stated, by continuation, which
-    finds the local mode. From there and from the accepted fit it is refitted with wide priors.
+    stated: Fit
+    wide: Fit
+    wide_misfit: float
+
+
+def fit_without_each_effect(
+    workers: Workers, base: Fit, accepted: Fit
+) -> tuple[WithoutEffect, ...]:
+    """The fits without each accepted effect; `base` is the fit without any.
+
+    With priors as stated the hypothesis is fitted from the accepted fit and by continuation, which
+    finds another local mode. From there it is refitted with wide priors.
     """
     rests = [accepted.without(k) for k in range(len(accepted.hypothesis))]
-    stated_fits = [base]
-    if len(rests) > 1:
-        stated_fits = workers.fit(
-            [FitJob(rest, Continuation((common_coordinates(accepted, rest),))) for rest in rests]
-        )
-    accepted_misfit = score_fit(accepted, workers.observations).misfit
+    jobs = [job_without_effect(accepted, k, workers.base) for k in range(len(rests))]
+    jobs += [FitJob(rest, Continuation((common_coordinates(accepted, rest),))) for rest in rests]
+    fits = workers.fit(jobs)
+    stated_fits = [max(p, key=lambda f: f.evidence) for p in zip(fits, fits[len(rests) :])]
+    if len(rests) == 1:
+        stated_fits = [max(base, stated_fits[0], key=lambda f: f.evidence)]
     wide_fits = refit_with_wide_priors(workers, stated_fits, accepted)
+    return tuple(
+        WithoutEffect(s, wide, misfit) for s, (misfit, wide) in zip(stated_fits, wide_fits)
+    )
+
+
+def compare_without_each_effect(
+    workers: Workers, accepted: Fit, without: Sequence[WithoutEffect]
+) -> tuple[PriorSensitivity, ...]:
+    """`PriorSensitivity` of every accepted effect, given the fits without each."""
+    accepted_misfit = score_fit(accepted, workers.observations).misfit
     line = workers.base
     results = []
-    for (effect, _), stated, (misfit, wide) in zip(accepted.hypothesis, stated_fits, wide_fits):
+    for (effect, _), each in zip(accepted.hypothesis, without):
+        stated, wide, misfit = each.stated, each.wide, each.wide_misfit
         theta = coordinates(line.parameters, wide.twin.values())
         pull, name = alarms.largest_pull(replace(wide, twin=line.with_(theta=theta)))
         parameter = line.parameters[line.index[name]]
@@ -124,6 +145,7 @@ def refit_with_wide_priors(
             source_sd=twin.source_sd,
             guessed_load=twin.guessed_load,
             uncertain_pump=twin.uncertain_pump,
+            changing_state=twin.changing_state,
         )
         parameters = base.with_(effects=fit.hypothesis).parameters
         for start in (twin, accepted.twin):

@@ -19,9 +19,9 @@ def fit_passive_networks(workers: Workers, best: Fit) -> list[Fit]:
         return []
     rig = workers.base.rig
     networks = library.candidates(rig, named=False)
-    jobs = [FitJob((network,)) for network in networks]
-    if best.hypothesis:
-        jobs += [extension_job(best, network, rig) for network in networks]
+    jobs = [extension_job(best, network) for network in networks]
+    if not best.hypothesis:
+        jobs += [FitJob((network,)) for network in networks]
     return rank_by_evidence(workers.fit(jobs))
 
 

@@ -1,4 +1,8 @@
-"""First step of the search: the line without effects, and every effect at every place alone."""
+"""First step of the search: the line without effects, the usual effects, and each other one alone.
+
+Boundary layers are in nearly every real line. A line without them fits so badly that nothing else
+can be judged. So they are tried first, and the other effects beside those that the data show.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +21,12 @@ from rippletwin.explanation.fit_jobs import (
     rank_by_evidence,
     transfer_theta,
 )
-from rippletwin.explanation.search.stepwise_moves import rank_at_exact_modes
-from rippletwin.explanation.thresholds import GOOD_MODEL_ERROR
+from rippletwin.explanation.search.stepwise_moves import (
+    LOST_MODEL_ERROR,
+    fit_extensions,
+    rank_at_exact_modes,
+)
+from rippletwin.explanation.thresholds import GOOD_MODEL_ERROR, MIN_LOG_BAYES_FACTOR
 
 DRAWS_PER_MODE = 800  # random starts around each mode below a frequency limit
 BASE_RESTARTS = 5  # best single-effect fits from whose lines the base is refitted
@@ -27,10 +35,44 @@ POOR_FITS_REFITTED = 3  # of the best single-effect fits
 
 def fit_single_effects(
     workers: Workers, candidates: Sequence, progress=None
+) -> tuple[Fit, Fit, list[Fit]]:
+    """The base, the fit with the usual effects that the data show, and the fits of each other of
+    `candidates` beside these, best first.
+
+    The second is the base where the data show none; the fits then are of each effect alone.
+    """
+    usual = [c for c in candidates if c[0].usual]
+    jobs = [FitJob(()), *(FitJob((c,)) for c in usual)]
+    base, *fits = workers.fit(jobs, progress_callback(progress, "usual effects", len(jobs)))
+    start = _add_usual_effects(workers, base, fits)
+    if not start.hypothesis:
+        base, fits = _fit_each_alone(workers, base, fits, candidates, progress)
+        return base, base, fits
+    base = _best_restart(workers, base, [start])
+    others = [c for c in candidates if c not in start.hypothesis]
+    extensions = fit_extensions(workers, start, others, progress)
+    return base, start, rank_by_evidence([start, *extensions])
+
+
+def _add_usual_effects(workers: Workers, base: Fit, fits: Sequence[Fit]) -> Fit:
+    """`base` with every usual effect that adds enough evidence; `fits` are those of one each."""
+    best, left = base, rank_by_evidence(fits)
+    while left and left[0].evidence > best.evidence + MIN_LOG_BAYES_FACTOR:
+        best, rest = left[0], [f.hypothesis[-1] for f in left[1:]]
+        left = rank_by_evidence(
+            workers.fit([FitJob((*best.hypothesis, c), NearFit(best)) for c in rest])
+        )
+    return best
+
+
+def _fit_each_alone(
+    workers: Workers, base: Fit, known: Sequence[Fit], candidates: Sequence, progress
 ) -> tuple[Fit, list[Fit]]:
-    """The base, and the fits of each of `candidates` alone, best first."""
-    report = progress_callback(progress, "single effects", len(candidates) + 1)
-    base, *fits = workers.fit([FitJob(()), *(FitJob((c,)) for c in candidates)], report)
+    """The base, and the fits of each of `candidates` alone, best first; `known` are some."""
+    fitted = {f.hypothesis[0] for f in known}
+    rest = [c for c in candidates if c not in fitted]
+    report = progress_callback(progress, "single effects", len(rest))
+    fits = [*known, *workers.fit([FitJob((c,)) for c in rest], report)]
     base = _refit_base(workers, base, fits)
     if (
         base.model_error <= GOOD_MODEL_ERROR
@@ -53,13 +95,18 @@ def _refit_base(workers: Workers, base: Fit, fits: Sequence[Fit]) -> Fit:
     operating point, whose lowest harmonics say least, they are also random draws around the modes
     below each frequency limit.
     """
-    jobs = [
-        FitJob((), FromTheta(transfer_theta(fit, (), workers.base)))
-        for fit in rank_by_evidence(fits)[:BASE_RESTARTS]
+    jobs = []
+    if base.model_error > LOST_MODEL_ERROR and len(workers.observations) == 1:
+        jobs = [FitJob((), Continuation(draws=DRAWS_PER_MODE))]
+    return _best_restart(workers, base, rank_by_evidence(fits)[:BASE_RESTARTS], jobs)
+
+
+def _best_restart(workers: Workers, base: Fit, fits: Sequence[Fit], jobs: Sequence = ()) -> Fit:
+    """The best of `base`, its refits from the lines of `fits`, and the fits of further `jobs`."""
+    from_lines = [
+        FitJob((), FromTheta(transfer_theta(fit, (), workers.base), exact=False)) for fit in fits
     ]
-    if base.model_error > GOOD_MODEL_ERROR and len(workers.observations) == 1:
-        jobs = [FitJob((), Continuation(draws=DRAWS_PER_MODE)), *jobs]
-    return max([base, *workers.fit(jobs)], key=lambda fit: fit.evidence)
+    return max([base, *workers.fit([*jobs, *from_lines])], key=lambda fit: fit.evidence)
 
 
 def refit_poor_fits(workers: Workers, fits: list[Fit]) -> list[Fit]:
@@ -69,7 +116,7 @@ def refit_poor_fits(workers: Workers, fits: list[Fit]) -> list[Fit]:
     whole line also starts from random draws: it is as free as the line itself.
     """
     poor = [
-        f for f in fits[:POOR_FITS_REFITTED] if f.model_error > GOOD_MODEL_ERROR and f.hypothesis
+        f for f in fits[:POOR_FITS_REFITTED] if f.model_error > LOST_MODEL_ERROR and f.hypothesis
     ]
     jobs = []
     for fit in poor:

@@ -30,10 +30,12 @@ from rippletwin.twin.effects.library import is_limit, next_instance
 
 MAX_EFFECTS = 4  # different ones in one hypothesis
 MAX_OF_ONE_EFFECT = 4  # at free positions
-EXCHANGE_ROUNDS = 2
 SUBSTITUTES_TRIED = 10  # best single effects tried in the place of another
 MAX_MODEL_ERROR_FOR_EXACT_MODE = 10.0 * MIN_MODEL_ERROR
 """Relative model error below which derivatives of the nonlinear compliance lead to the mode."""
+LOST_MODEL_ERROR = 0.1
+"""Relative model error above which a line is probably in a wrong local mode."""
+RESTARTED = 3  # extensions of a fit that are also fitted from the data sheet
 MIN_IMPROVEMENT = 1.0  # log evidence by which an exchange or another position must be better
 
 
@@ -44,13 +46,17 @@ def fit_extensions(workers: Workers, best: Fit, candidates: Sequence, progress) 
     a candidate.
     """
     rig = workers.base.rig
-    jobs = [extension_job(best, c, rig) for c in _additions(best.hypothesis, candidates)]
+    jobs = [extension_job(best, c) for c in _additions(best.hypothesis, candidates)]
     report = progress_callback(progress, f"{len(best.hypothesis) + 1} effects", len(jobs))
     fits = rank_by_evidence(workers.fit(jobs, report))
-    if fits and best.model_error > GOOD_MODEL_ERROR and fits[0].model_error > GOOD_MODEL_ERROR:
-        # The present effects may be correct but incomplete: start near their fit too.
-        near = workers.fit([FitJob(f.hypothesis, NearFit(best)) for f in fits])
-        fits = rank_by_evidence([max(pair, key=lambda f: f.evidence) for pair in zip(fits, near)])
+    if fits and fits[0].model_error > GOOD_MODEL_ERROR:
+        # What is missing may have led the line into a wrong local mode: start again from the data
+        # sheet with the effect in the model. A line that is lost says nothing of which effect.
+        lost = fits[0].model_error > LOST_MODEL_ERROR
+        again = fits if lost else fits[:RESTARTED]
+        restarted = workers.fit([restart_job(best, f.hypothesis, rig) for f in again])
+        better = [max(pair, key=lambda f: f.evidence) for pair in zip(again, restarted)]
+        fits = rank_by_evidence([*better, *fits[len(again) :]])
     return rank_at_exact_modes(workers, best, fits)
 
 
@@ -73,16 +79,9 @@ def _exchanges(hypothesis: Hypothesis, k: int, candidates: Sequence) -> list[Hyp
     return [(*rest, instance) for instance in instances if instance is not None]
 
 
-def extension_job(best: Fit, candidate, rig) -> FitJob:
-    """The job that adds a candidate to a fit.
-
-    A good fit is extended from its mode. The parameters of a poor fit are biased by what is
-    missing, so the extension starts from nominal values again.
-    """
-    hypothesis = (*best.hypothesis, candidate)
-    if best.model_error > GOOD_MODEL_ERROR:
-        return restart_job(best, hypothesis, rig)
-    return FitJob(hypothesis, NearFit(best))
+def extension_job(best: Fit, candidate) -> FitJob:
+    """The job that adds a candidate to a fit, from its mode."""
+    return FitJob((*best.hypothesis, candidate), NearFit(best))
 
 
 def restart_job(best: Fit, hypothesis: Hypothesis, rig) -> FitJob:
@@ -93,26 +92,23 @@ def restart_job(best: Fit, hypothesis: Hypothesis, rig) -> FitJob:
 
 
 def exchange_effects(workers: Workers, best: Fit, single_effect_fits: Sequence[Fit]) -> Fit:
-    """Exchange one effect for another as long as that is better and the fit is poor.
+    """Exchange one effect for another if that is better and the fit is poor.
 
     The first effect of a search stands in for everything that is missing. Once others are present
     it may be the wrong one. The substitutes are the best single effects.
     """
-    for _ in range(EXCHANGE_ROUNDS):
-        if len(best.hypothesis) < 2 or best.model_error <= GOOD_MODEL_ERROR:
-            break
-        substitutes = [f.hypothesis[0] for f in single_effect_fits[:SUBSTITUTES_TRIED]]
-        jobs = []
-        for k in range(len(best.hypothesis)):
-            jobs += [
-                restart_job(best, hypothesis, workers.base.rig)
-                for hypothesis in _exchanges(best.hypothesis, k, substitutes)
-            ]
-        fits = rank_by_evidence(workers.fit(jobs))
-        if not fits or fits[0].evidence < best.evidence + MIN_IMPROVEMENT:
-            break
-        best = fits[0]
-    return best
+    if len(best.hypothesis) < 2 or best.model_error <= GOOD_MODEL_ERROR:
+        return best
+    substitutes = [f.hypothesis[-1] for f in single_effect_fits[:SUBSTITUTES_TRIED]]
+    jobs = [
+        FitJob(hypothesis, NearFit(best))
+        for k in range(len(best.hypothesis))
+        for hypothesis in _exchanges(best.hypothesis, k, substitutes)
+    ]
+    fits = rank_by_evidence(workers.fit(jobs))
+    if not fits or fits[0].evidence < best.evidence + MIN_IMPROVEMENT:
+        return best
+    return fits[0]
 
 
 def fit_substitutes(workers: Workers, best: Fit, candidates: Sequence) -> list[Fit]:

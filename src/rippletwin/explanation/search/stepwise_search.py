@@ -1,7 +1,8 @@
 """Stepwise search over hypotheses: single effects, then up to four together, by evidence.
 
-Each round adds the best candidate, drops, exchanges and simplifies what it made needless, and moves
-effects along the line. The search ends when no extension adds enough evidence.
+Each round adds the best candidate, and drops and simplifies what it made needless. Where no
+extension adds enough evidence, effects are exchanged and moved along the line; the search ends when
+that is no better either.
 """
 
 from __future__ import annotations
@@ -69,7 +70,8 @@ class Search:
     """Result of the search.
 
     base                the line without effects, fitted
-    single_effect_fits  every effect at every place alone, best first
+    single_effect_fits  every effect at every place alone, or beside the usual effects that the data
+                        show; best first
     best                the accepted hypothesis, which may be the base
     rivals              fits of every round in which an effect was or could have been accepted
     passive_networks    passive networks without a name that compete with `best`, best first
@@ -100,8 +102,8 @@ def search_effects(
 ) -> Search:
     """Search the effect library stepwise, from the line without effects."""
     candidates = applicable_candidates(workers.base.rig, workers.observations)
-    base, fits = fit_single_effects(workers, candidates, progress)
-    return _search_stepwise(workers, Search(base, fits, base, fits), candidates, progress)
+    base, start, fits = fit_single_effects(workers, candidates, progress)
+    return _search_stepwise(workers, Search(base, fits, start, fits), candidates, progress)
 
 
 def resume_search(workers: Workers, past: Search, progress=None) -> Search:
@@ -119,7 +121,7 @@ def resume_search(workers: Workers, past: Search, progress=None) -> Search:
     single_effect_fits = rank_by_evidence(refits[:count])
     best, rivals = refits[count], rank_by_evidence(refits[count + 1 :])
     candidates = applicable_candidates(workers.base.rig, workers.observations)
-    best = _revise(workers, best, single_effect_fits, candidates)
+    best = _revise(workers, best, candidates)
     search = Search(base, single_effect_fits, best, rivals)
     return _search_stepwise(workers, search, candidates, progress)
 
@@ -128,19 +130,24 @@ def _search_stepwise(workers: Workers, start: Search, candidates: Sequence, prog
     """Go on from `start.best` until no candidate and no other position adds enough evidence."""
     single_effect_fits, best, rivals = start.single_effect_fits, start.best, start.rivals
     extensions = single_effect_fits
-    if best.hypothesis:
+    if not any(f.hypothesis[:-1] == best.hypothesis for f in extensions):
         extensions = fit_extensions(workers, best, candidates, progress)
+    ended = set()  # labels of fits that no extension improves
     while True:
         extended = _accepted_extension(best, extensions)
         if extended is None:
-            moved, other_positions = move_to_best_position(workers, best)
-            if moved is best:
-                break
+            exchanged = exchange_effects(workers, best, single_effect_fits)
+            moved, other_positions = move_to_best_position(workers, exchanged)
+            if exchanged is not best:
+                moved = _revise(workers, moved, candidates)
+            ended.add(best.label)
+            if moved is best or (exchanged is not best and moved.label in ended):
+                break  # a simpler effect is preferred to a slightly better one: no way round
             best = moved
         else:
             if extensions is not single_effect_fits:
                 rivals = [*rivals, *extensions]
-            best = _revise(workers, extended, single_effect_fits, candidates)
+            best = _revise(workers, extended, candidates)
         extensions = fit_extensions(workers, best, candidates, progress)
     substitutes = fit_substitutes(workers, best, candidates)
     if substitutes and substitutes[0].evidence > best.evidence + MIN_IMPROVEMENT:
@@ -154,10 +161,9 @@ def _search_stepwise(workers: Workers, start: Search, candidates: Sequence, prog
     )
 
 
-def _revise(workers: Workers, best: Fit, single_effect_fits: list[Fit], candidates) -> Fit:
-    """Drop, exchange and simplify effects of a new hypothesis, and refit it at its exact mode."""
+def _revise(workers: Workers, best: Fit, candidates: Sequence) -> Fit:
+    """Drop and simplify effects of a new hypothesis, and refit it at its exact mode."""
     best = drop_needless_effects(workers, best)
-    best = exchange_effects(workers, best, single_effect_fits)
     best = simplify_effects(workers, best, candidates)
     return refit_at_exact_mode(workers, best)
 

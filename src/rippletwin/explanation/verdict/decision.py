@@ -1,31 +1,26 @@
 """The decision: from the fits and checks to one of six verdicts, with abstention.
 
-A name is given only to an explanation that leaves no more than the model error, has plausible
-parameters and holds on held-out data. Otherwise nothing is missing, or the verdict is
-`unexplained`.
+A name is given to what is established (`checks.support`), whatever remains beside it. Where
+something is missing and nothing is established, the verdict is `unexplained`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from rippletwin.calibration.fit import Fit
-from rippletwin.explanation.checks.alarms import Alarms, largest_effect_pull
+from rippletwin.explanation.checks.alarms import Alarms
 from rippletwin.explanation.checks.bootstrap import NullDistribution
-from rippletwin.explanation.checks.cross_validation import Validation
-from rippletwin.explanation.checks.prior_sensitivity import PriorSensitivity
+from rippletwin.explanation.checks.support import Support
 from rippletwin.explanation.search.position_search import equivalent_positions
 from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.thresholds import (
-    DECISIVE_LOG_BAYES_FACTOR,
     EQUIVALENT_LOG_BAYES_FACTOR,
     GOOD_MODEL_ERROR,
-    MAX_MODEL_ERROR_TO_NAME,
     MIN_LOG_BAYES_FACTOR,
-    PULL_ALARM,
 )
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import is_limit
@@ -39,73 +34,58 @@ class Decision:
 
     verdict        one of VERDICTS
     accepted       the fit whose twin later stages use
+    supports       of the effects of the explanation
     equivalents    classes of effect names that fit equally well
     contradiction  for `bad_data`: what contradicts what, in words
     """
 
     verdict: str
     accepted: Fit
+    supports: tuple[Support, ...] = ()
     equivalents: tuple[tuple[str, ...], ...] = ()
     contradiction: str = ""
+
+    @property
+    def established(self) -> tuple[str, ...]:
+        """Names of the effects that are established."""
+        return tuple(s.name for s in self.supports if s.level == "established")
 
 
 def decide(
     search: Search,
     alarms: Alarms,
-    validation: Validation | None,
+    supports: Sequence[Support] = (),
     contradiction: str = "",
     null_distribution: NullDistribution | None = None,
 ) -> Decision:
-    """Compare the best explanation with the base, the passive networks and the checks.
+    """Decide by the support of the effects of the best explanation, and by the alarms.
 
-    validation         of the best explanation; None if nothing is explained
-    contradiction      why the data contradict themselves, if they do
-    null_distribution  of the evidence without an effect, if it was asked for
+    supports          of the effects of `search.best`
+    contradiction     why the data contradict themselves, if they do
+    null_distribution of the evidence without an effect, if it was asked for
     """
     best = search.best
     if contradiction:
         return Decision("bad_data", search.base, contradiction=contradiction)
     network = search.passive_networks[0] if search.passive_networks else None
-    if network is not None:
-        if network.evidence > best.evidence + evidence_needed_by_network(best):
-            return Decision("unexplained", network)
+    if network is not None and network.evidence <= best.evidence + evidence_needed_by_network(best):
+        network = None
+    if null_distribution is not None and best.hypothesis:
+        if search.log_bayes_factor(best) < null_distribution.threshold:
+            return _nothing_missing(search.base, alarms)
+    accepted, supports = network or best, tuple(supports)
+    levels = {support.level for support in supports}
+    if "established" in levels:
+        classes = equivalent_effects(search)
+        return Decision("ambiguous" if classes else "named", accepted, supports, classes)
+    if "supported" in levels or network is not None:
+        return Decision("unexplained", accepted, supports)
     if not best.hypothesis:
         return _nothing_missing(best, alarms)
-    log_bayes_factor = search.log_bayes_factor(best)
-    if null_distribution is not None and log_bayes_factor < null_distribution.threshold:
-        return _nothing_missing(search.base, alarms)
-    fails = validation is not None and not validation.passes
-    if fails and "misfit" not in alarms.raised:
-        weak = log_bayes_factor < DECISIVE_LOG_BAYES_FACTOR
-        if not weak and not validation.fits_better:
-            # The evidence comes from the data sheet alone, which may be off.
-            return _nothing_missing(search.base, alarms, "calibration_only")
-        if weak or not validation.transfers:
-            # The line fits without this effect and held-out data contradict it: it only absorbs
-            # error.
-            return _nothing_missing(search.base, alarms)
-    is_implausible = (
-        best.model_error > MAX_MODEL_ERROR_TO_NAME or largest_effect_pull(best) > PULL_ALARM
-    )
-    if is_implausible or fails:
-        # The twin takes the best description all the same.
-        use_network = network is not None and network.evidence > best.evidence
-        return Decision("unexplained", network if use_network else best)
-    classes = equivalent_effects(search)
-    return Decision("ambiguous" if classes else "named", best, classes)
-
-
-def withdraw_refuted_name(
-    decision: Decision, prior_sensitivity: Sequence[PriorSensitivity]
-) -> Decision:
-    """`decision` without names if a fit with wide priors refutes one of them.
-
-    The residual was attributed to the ripple's error, but moving one line parameter far from the
-    data sheet explains it better. Neither the data sheet nor the library says what is missing.
-    """
-    is_named = decision.verdict in ("named", "ambiguous")
-    if is_named and any(sensitivity.refutes for sensitivity in prior_sensitivity):
-        return replace(decision, verdict="unexplained", equivalents=())
+    # What the search suggests comes from the data sheet alone, or does not transfer.
+    decision = _nothing_missing(search.base, alarms, "calibration_only")
+    if decision.verdict == "unexplained":
+        return Decision("unexplained", best, supports)
     return decision
 
 

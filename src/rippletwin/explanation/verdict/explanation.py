@@ -11,6 +11,7 @@ from rippletwin.explanation.checks.bootstrap import NullDistribution
 from rippletwin.explanation.checks.cross_validation import Validation
 from rippletwin.explanation.checks.prior_sensitivity import PriorSensitivity
 from rippletwin.explanation.localise.free_corrections import MismatchLocation
+from rippletwin.explanation.localise.remainder import Remainder
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders
 from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
@@ -32,6 +33,7 @@ class Explanation:
     prior_sensitivity  fits with wide priors without each accepted effect
     shaft_orders       ripple at orders that are no multiples of the number of pistons
     location           where the base lacks something; None where that cannot be said
+    remainder          what the accepted fit leaves; None where it leaves nothing
     null_distribution  of the evidence without an effect, if it was asked for
     calibrated         plain calibration without effects; None where nothing is explained
     """
@@ -47,6 +49,7 @@ class Explanation:
     prior_sensitivity: tuple[PriorSensitivity, ...] = ()
     shaft_orders: ShaftOrders | None = None
     location: MismatchLocation | None = None
+    remainder: Remainder | None = None
     null_distribution: NullDistribution | None = None
     calibrated: Fit | None = None
 

@@ -146,6 +146,7 @@ def transfer_twin(fit: Fit, rig: Rig, observation: Observation) -> Twin:
         source_sd=old.source_sd,
         guessed_load=old.guessed_load and rig.load.kind == "orifice",
         uncertain_pump=old.uncertain_pump,
+        changing_state=old.changing_state,
     )
     theta = [old.theta[old.index[p.name]] if p.name in old.index else 0.0 for p in twin.parameters]
     return twin.with_(theta=np.array(theta))

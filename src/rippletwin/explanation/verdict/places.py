@@ -27,6 +27,26 @@ def element_and_extent(rig, effect, place, parameters: dict) -> tuple[str, list[
     return place.element, list(element_extent(rig, place.element))
 
 
+def element_in_words(rig, element: tuple, interval) -> tuple[str, list[float]]:
+    """Element and interval along the line (m) of an element of `localise.smooth_corrections`."""
+    kind, where = element
+    length = float(rig.length)
+    if kind == "source":
+        return "source", [0.0, 0.0]
+    if kind == "sensor":
+        sensor = rig.sensors[where]
+        return f"sensor {sensor.name}", [float(sensor.position)] * 2
+    if kind.startswith("segment"):
+        name = f"segment {where + 1}"
+        return name, list(element_extent(rig, name))
+    low, high = interval
+    if where == 0.0:
+        return "source", [low, high]
+    if where == length:
+        return "load", [low, high]
+    return stretch_between_sensors(rig, low, high), [low, high]
+
+
 def stretch_between_sensors(rig, low: float, high: float) -> str:
     """The stretch between pump, sensors and load that contains an interval."""
     marks = [("pump", 0.0), *((s.name, s.position) for s in rig.sensors), ("load", rig.length)]

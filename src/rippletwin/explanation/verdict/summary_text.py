@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from rippletwin.explanation.checks.alarms import largest_pull
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders
 from rippletwin.explanation.localise.source_free_fits import compare_evidence
-from rippletwin.explanation.thresholds import MAX_MODEL_ERROR_TO_NAME, PULL_ALARM
+from rippletwin.explanation.thresholds import PULL_ALARM
 from rippletwin.explanation.verdict.decision import equivalent_places
 from rippletwin.explanation.verdict.explanation import Explanation
 from rippletwin.explanation.verdict.places import element_and_extent, join_words
@@ -19,6 +19,12 @@ OPENINGS = {
     "calibration_only": "No physics is missing, but nominal values of the line are outside their "
     "stated tolerances: use the calibrated values and check the data sheet.",
 }
+LESSER = {
+    "supported": "an unlisted error of another element, or a free law at the same place, would do "
+    "as well",
+    "suggested": "a free data sheet would do as well, or data that were left out speak against it",
+}
+"""What it means that an effect is not established, by its support."""
 
 
 def summary_text(e: Explanation, result: dict, entries: Sequence[dict]) -> str:
@@ -37,7 +43,7 @@ def summary_text(e: Explanation, result: dict, entries: Sequence[dict]) -> str:
         sentences.append(OPENINGS[verdict])
     elif verdict == "unexplained":
         sentences += _unexplained(e, result, entries)
-    elif entries:
+    elif e.decision.established:
         sentences += _named(e, result, entries)
     else:  # what is named acts at shaft orders alone
         sentences.append("At the piston orders nothing is missing.")
@@ -47,6 +53,7 @@ def summary_text(e: Explanation, result: dict, entries: Sequence[dict]) -> str:
         if equivalent_places(e.search):
             sentences.append("Its place or form is not determined: see equivalents.")
         sentences += _source_free(e)
+    sentences += _remainder(result["remainder"])
     sentences += _pump(result["pump"])
     sentences += _shaft_orders(e.shaft_orders)
     sentences += _drift(e)
@@ -55,15 +62,17 @@ def summary_text(e: Explanation, result: dict, entries: Sequence[dict]) -> str:
 
 
 def _named(e: Explanation, result: dict, entries: Sequence[dict]) -> list[str]:
-    """Which effects are missing, their parameters, and what else would fit."""
+    """Which effects are established, their parameters, and what else would fit."""
     before, after = (result["fit"][which]["held_out"] for which in ("before", "after"))
-    names = [_effect_and_place(e, entry) for entry in entries]
-    pronoun = "it" if len(names) == 1 else "them"
+    levels = {(s.name, s.place): s.level for s in e.decision.supports}
+    named = [x for x in entries if x["effect"].named]
+    certain = [x for x in named if _level(levels, x) == "established"]
+    names = [_effect_and_place(e, entry) for entry in certain]
     sentences = [
-        f"The twin lacks {join_words(names)}. With {pronoun} the misfit on held-out data goes from "
-        f"{before:.1%} to {after:.1%} of the measured ripple."
+        f"The twin lacks {join_words(names)}. This is established. With the effects listed, the "
+        f"misfit on held-out data goes from {before:.1%} to {after:.1%} of the measured ripple."
     ]
-    for entry in entries:
+    for entry in certain:
         sentences += [_parameter(name, p) for name, p in entry["parameters"].items()]
         if entry["effect"].certain:
             sentences.append(
@@ -71,9 +80,10 @@ def _named(e: Explanation, result: dict, entries: Sequence[dict]) -> list[str]:
                 "unless the data contradict it."
             )
     sentences = list(dict.fromkeys(sentences))  # two effects may act through one parameter
+    sentences += _lesser(e, [x for x in named if x not in certain], levels)
     sentences += _data_sheet_rivals(e)
     sentences += liquid_like_air(
-        [entry["effect"].name for entry in entries], [o.load_pressure for o in e.observations]
+        [entry["effect"].name for entry in certain], [o.load_pressure for o in e.observations]
     )
     if result["verdict"] == "ambiguous":
         classes = "; ".join(join_words(names) for names in result["equivalents"])
@@ -81,25 +91,67 @@ def _named(e: Explanation, result: dict, entries: Sequence[dict]) -> list[str]:
     return sentences
 
 
+def _level(levels: Mapping[tuple[str, str], str], entry: dict) -> str:
+    """Support of an entry; one without is suggested."""
+    return levels.get((entry["effect"].name, str(entry["place"])), "suggested")
+
+
+def _lesser(e: Explanation, entries: Sequence[dict], levels: Mapping) -> list[str]:
+    """The effects that are supported or suggested, and what that means."""
+    sentences = []
+    for level, why in LESSER.items():
+        names = [_effect_and_place(e, x) for x in entries if _level(levels, x) == level]
+        if names:
+            verb = "is" if len(names) == 1 else "are"
+            sentences.append(f"{_capital(join_words(names))} {verb} {level} only: {why}.")
+    return sentences
+
+
 def _unexplained(e: Explanation, result: dict, entries: Sequence[dict]) -> list[str]:
     """Where something is missing, and what describes it best."""
     before, after = (result["fit"][which]["held_out"] for which in ("before", "after"))
     where = f" (location: {_place(e, entries[0])})" if entries else ""
-    sentences = [f"Something is missing that no effect of the library explains{where}."]
-    misfits = f"the misfit on held-out data goes from {before:.1%} to {after:.1%}"
-    if "stand_in" in result:
-        network = result["stand_in"]
-        passive = "passive" if network["passive"] else "not passive"
-        sentences.append(f"A {network['form']} ({passive}) takes its place in the twin: {misfits}.")
-        sentences.append(f"The missing quantity against frequency: {network['follows']}.")
-    elif entries:
-        names = join_words([_effect_and_place(e, entry) for entry in entries])
-        rest = ""
-        if e.decision.accepted.model_error > MAX_MODEL_ERROR_TO_NAME:
-            rest = "; errors of the pump's ripple and of the sensors do not account for the rest"
-        sentences.append(f"The best description in the library is {names}: {misfits}{rest}.")
+    sentences = [f"Something is missing, and nothing is established{where}."]
+    named = [entry for entry in entries if entry["effect"].named]
+    if entries:
+        sentences.append(
+            f"With the best description the misfit on held-out data goes from {before:.1%} to "
+            f"{after:.1%}."
+        )
+    if named:
+        levels = {(s.name, s.place): s.level for s in e.decision.supports}
+        names = join_words([_effect_and_place(e, entry) for entry in named])
+        sentences.append(f"In the library {names} comes nearest.")
+        sentences += _lesser(e, named, levels)
         sentences += _data_sheet_rivals(e)
     return sentences
+
+
+def _remainder(remainder: dict | None) -> list[str]:
+    """What remains, where and by which law, and what stands in for it."""
+    if remainder is None:
+        return []
+    rest = (
+        f"What then remains is {remainder['model_error']:.1%} of the reading beside errors of the "
+        "pump's ripple"
+    )
+    if remainder["element"] is None:
+        return [f"{rest}; no single element accounts for it."]
+    low, high = remainder["position_m"]
+    where = f"{low:.2f} to {high:.2f} m from the pump" if high > low else f"{low:.2f} m"
+    sentence = f"{rest}. It belongs to {remainder['element']} ({where})"
+    if remainder["law"] is not None:
+        sentence += f" and is {remainder['law']}"
+    sentences = [sentence + "."]
+    network = remainder["stand_in"]
+    if network is not None:
+        passive = "passive" if network["passive"] else "not passive"
+        sentences.append(f"A {network['form']} ({passive}) stands in for it in the twin.")
+    return sentences
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def _parameter(name: str, parameter: dict) -> str:
@@ -111,16 +163,14 @@ def _parameter(name: str, parameter: dict) -> str:
 
 
 def _pump(parameters: dict) -> list[str]:
-    """The pump's parameters, if one of their intervals excludes the data sheet's value."""
-    if all(p["ci95"][0] <= p["sheet"] <= p["ci95"][1] for p in parameters.values()):
-        return []
-    modulus, timing = parameters["bulk_modulus"], parameters["port_timing"]
-    late = timing["value"] - timing["sheet"]
-    return [
-        f"The ripple indicates a bulk modulus of {modulus['value']:.3g} Pa in the pump (data sheet "
-        f"{modulus['sheet']:.3g} Pa) and ports that open {abs(late):.2f} deg "
-        f"{'late' if late > 0 else 'early'}."
+    """The pump's parameters whose intervals exclude the data sheet's value."""
+    off = [
+        f"{_words(name)} {p['value']:.3g}{'' if p['unit'] == '1' else ' ' + p['unit']} (data sheet "
+        f"{p['sheet']:.3g})"
+        for name, p in parameters.items()
+        if not p["ci95"][0] <= p["sheet"] <= p["ci95"][1]
     ]
+    return [f"The ripple indicates of the pump: {join_words(off)}."] if off else []
 
 
 def _data_sheet_rivals(e: Explanation) -> list[str]:

@@ -25,7 +25,11 @@ from rippletwin.explanation.verdict.next_experiment import (
     propose_recording,
     propose_sensor_position,
 )
-from rippletwin.explanation.verdict.places import element_and_extent, stretch_between_sensors
+from rippletwin.explanation.verdict.places import (
+    element_and_extent,
+    element_in_words,
+    stretch_between_sensors,
+)
 from rippletwin.explanation.verdict.summary_text import summary_text
 from rippletwin.twin import twin_file
 from rippletwin.twin.effects.library import generalisations
@@ -44,14 +48,13 @@ def verdict_dict(explanation: Explanation) -> dict:
     entries = []
     if verdict in ("named", "ambiguous", "unexplained"):
         entries = effect_intervals(decision.accepted)
-    effects = shaft_effects
-    if verdict in ("named", "ambiguous"):
-        effects = [*_line_effects(e, entries), *shaft_effects]
+    effects = [*_line_effects(e, entries), *shaft_effects]
     places = equivalent_places(e.search) if verdict in ("named", "ambiguous") else ()
     result = {
         "verdict": verdict,
         "mismatch": _mismatch(e, verdict, entries),
         "effects": effects,
+        "remainder": _remainder(e, entries),
         "equivalents": [list(names) for names in (*decision.equivalents, *places)],
         "next_recording": _next_recording(e, places),
         "fit": _fit_scores(e),
@@ -59,14 +62,13 @@ def verdict_dict(explanation: Explanation) -> dict:
         "pump": pump_intervals(decision.accepted),
         "sentence": "",
     }
-    if verdict == "unexplained" and entries and not entries[-1]["effect"].named:
-        result["stand_in"] = _stand_in(e, entries[-1])
     result["sentence"] = summary_text(e, result, entries)
     return result
 
 
 def _line_effects(e: Explanation, entries: list[dict]) -> list[dict]:
-    """The named effects of the accepted fit."""
+    """The effects of the explanation, each with its support."""
+    levels = {(s.name, s.place): s.level for s in e.decision.supports}
     probabilities = posterior_probabilities(e.search, e.decision.accepted)
     return [
         {
@@ -74,6 +76,7 @@ def _line_effects(e: Explanation, entries: list[dict]) -> list[dict]:
             "element": entry["place"].element,
             "parameters": entry["parameters"],
             "probability": probabilities[entry["effect"].name],
+            "support": levels[entry["effect"].name, str(entry["place"])],
             "limit_of": generalisations(entry["effect"], entry["place"]),
         }
         for entry in entries
@@ -84,18 +87,17 @@ def _line_effects(e: Explanation, entries: list[dict]) -> list[dict]:
 def _shaft_effects(e: Explanation) -> list[dict]:
     """The effect at shaft orders, if there is one.
 
-    Data that contradict themselves establish no effect, and neither do shaft orders while something
-    else is unexplained: the twin that interprets them is incomplete.
+    Data that contradict themselves show no effect. While something else is unexplained, shaft
+    orders establish none: the twin that interprets them is incomplete.
     """
     shaft_orders = e.shaft_orders
-    if shaft_orders is None or shaft_orders.name is None:
+    if shaft_orders is None or shaft_orders.name is None or e.decision.verdict == "bad_data":
         return []
-    if e.decision.verdict in ("bad_data", "unexplained"):
-        return []
-    return [_shaft_effect(shaft_orders)]
+    unexplained = e.decision.verdict == "unexplained"
+    return [_shaft_effect(shaft_orders, "supported" if unexplained else "established")]
 
 
-def _shaft_effect(shaft_orders: ShaftOrders) -> dict:
+def _shaft_effect(shaft_orders: ShaftOrders, support: str) -> dict:
     """It has no `probability`: no evidence was calculated for it."""
     amplitude = {"value": shaft_orders.value}
     if shaft_orders.interval is not None:
@@ -105,6 +107,7 @@ def _shaft_effect(shaft_orders: ShaftOrders) -> dict:
         "name": shaft_orders.name,
         "element": "source",
         "parameters": {"amplitude": amplitude},
+        "support": support,
     }
 
 
@@ -141,7 +144,7 @@ def _where(e: Explanation, entries: list[dict]) -> dict:
         element, position = element_and_extent(
             e.rig, first["effect"], first["place"], first["parameters"]
         )
-    elif _shaft_effects(e):
+    elif any(effect["support"] == "established" for effect in _shaft_effects(e)):
         element, position = "source", [0.0, 0.0]
     elif location is not None:
         element, position = location.element, list(location.position)
@@ -187,11 +190,41 @@ def _next_recording(e: Explanation, places: tuple) -> str | None:
     return None if proposal is None else str(proposal)
 
 
+def _remainder(e: Explanation, entries: list[dict]) -> dict | None:
+    """What remains beside the explanation, and the network that stands in for it in the twin."""
+    stand_in = None
+    if entries and not entries[-1]["effect"].named:
+        stand_in = _stand_in(e, entries[-1])
+    r = e.remainder
+    if r is None and stand_in is None:
+        return None
+    if stand_in is not None:
+        element, position = stand_in.pop("element"), stand_in["parameters"]["position"]["ci95"]
+        law = stand_in.pop("follows")
+    elif r.element is None:
+        element = position = law = None
+    else:
+        element, position = element_in_words(e.rig, r.element, r.interval)
+        law = r.law
+    return {
+        "misfit": float(e.validation.after["in_sample"].misfit) if r is None else r.misfit,
+        "model_error": float(e.decision.accepted.model_error),
+        "element": element,
+        "position_m": position,
+        "bands_hz": [] if r is None else r.bands_hz,
+        "conditions": [] if r is None else r.conditions,
+        "law": law,
+        "stand_in": stand_in,
+    }
+
+
 def _stand_in(e: Explanation, entry: dict) -> dict:
     """The passive network of the corrected twin."""
     missing = missing_immittance(e.decision.accepted, e.observations)
+    element, _ = element_and_extent(e.rig, entry["effect"], entry["place"], entry["parameters"])
     return {
         "form": f"{entry['place'].form} one-port",
+        "element": element,
         "passive": is_passive(e.decision.accepted),
         "parameters": entry["parameters"],
         "follows": None if missing is None else missing.law_in_words,

@@ -114,6 +114,7 @@ class Effect:
     named       False for a passive network that represents physics without a name
     certain     always present in real lines: accepted with any other effect unless the data
                 contradict it
+    usual       in nearly all real lines: the search tries it before all others
     friction    law by which it replaces the line's, as in `series_impedance`
     limits      (name, form) of effects that this one becomes at a limit of its parameters or at an
                 end of the line; what those are limits of, it is too
@@ -130,6 +131,7 @@ class Effect:
     apply: Callable[[object, LineState, Mapping[str, object], Place], None]
     apply_in_time: Callable[[object, LineState, Mapping[str, float], Place], None] | None = None
     certain: bool = False
+    usual: bool = False
     named: bool = True
     friction: str | None = None
     limits: tuple[tuple[str, str | None], ...] = ()

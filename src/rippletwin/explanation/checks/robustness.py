@@ -1,0 +1,46 @@
+"""Does an effect keep its evidence if any element of the line may err without a law?
+
+A real line is never made of the library alone. What the library lacks leaves a remainder, and an
+effect that is not there may be accepted because it fits some of it. So each effect is judged beside
+a free, smooth correction (`localise.smooth_corrections`) of one element in turn: the log evidence
+of the line with the effect is compared with that of the line without it, with the same correction
+in both. (Brynjarsdottir and O'Hagan 2014, Inverse Problems 30:114007, on why a discrepancy must be
+modelled, and must have structure.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from rippletwin.explanation.localise.smooth_corrections import NONE
+
+
+@dataclass(frozen=True)
+class Robustness:
+    """What remains of an effect's log evidence if an element may err without a law.
+
+    plain      log Bayes factor without any correction
+    least      the least over the corrections of all elements but its own
+    element    the element (kind, where) whose correction leaves the least
+    own        with a free correction at its own place: from 0 on its law suffices there
+    """
+
+    plain: float
+    least: float
+    element: tuple
+    own: float
+
+
+def compare_beside_corrections(
+    present: Mapping[tuple, float], absent: Sequence[Mapping[tuple, float]], own: tuple
+) -> Robustness:
+    """`Robustness` of an effect: its model against the best of several models without it.
+
+    present, absent   log evidence by element, of `SmoothCorrections.by_element`
+    own               the effect's own element
+    """
+    factors = {e: value - max(each[e] for each in absent) for e, value in present.items()}
+    others = {e: factor for e, factor in factors.items() if e != own}
+    element = min(others, key=others.get)
+    return Robustness(factors[(NONE, None)], others[element], element, factors[own])

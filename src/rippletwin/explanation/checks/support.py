@@ -1,0 +1,155 @@
+"""How well each accepted effect is supported: established, supported or suggested.
+
+suggested     The search accepted it.
+supported     It also keeps its evidence with a free data sheet, and predicts held-out data better.
+established   It also keeps its evidence beside a free correction of any other element, with a free
+              correction at its own place its law is not needless, and its parameters are plausible.
+
+Effects are judged one by one: the others stay in both models.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rippletwin.calibration.fit import Fit
+from rippletwin.calibration.levenberg_marquardt import descend
+from rippletwin.calibration.posterior import Posterior
+from rippletwin.calibration.shaft_angles import fit_shaft_angles
+from rippletwin.explanation.checks.cross_validation import Fold, make_folds
+from rippletwin.explanation.checks.prior_sensitivity import WithoutEffect, fit_without_each_effect
+from rippletwin.explanation.checks.robustness import Robustness, compare_beside_corrections
+from rippletwin.explanation.fit_jobs import FitJob, FromTheta, Workers, transfer_theta
+from rippletwin.explanation.localise.smooth_corrections import (
+    SmoothCorrections,
+    elements_of,
+    own_element,
+)
+from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR, PULL_ALARM
+
+HELD_OUT_STEPS = 8  # of the descent in shaft angle and state of a recording that was left out
+
+
+@dataclass(frozen=True)
+class Support:
+    """What supports one accepted effect.
+
+    name, place   of the effect
+    level         one of LEVELS
+    robustness    its log Bayes factors beside free corrections
+    held_out      log predictive probability of held-out data that it adds, over all folds
+    pull          prior standard deviations between its parameters and their medians, at most
+    """
+
+    name: str
+    place: str
+    level: str
+    robustness: Robustness
+    held_out: float
+    pull: float
+
+
+def judge_effects(
+    workers: Workers, base: Fit, best: Fit, late: Sequence | None = None
+) -> tuple[Fit, tuple[Support, ...], tuple[WithoutEffect, ...]]:
+    """`best` without the effects that only the search suggests, the support of each that is left,
+    and the fits without each.
+
+    A suggested effect is dropped only if another is left: the last one says what comes nearest.
+    An always-present effect stays.
+    """
+    while True:
+        without = fit_without_each_effect(workers, base, best)
+        supports = _judge_each(workers, best, without, late)
+        weak = [
+            k
+            for k, support in enumerate(supports)
+            if support.level == "suggested" and not best.hypothesis[k][0].certain
+        ]
+        if not weak or len(best.hypothesis) == 1:
+            return best, supports, without
+        weakest = min(weak, key=lambda k: supports[k].robustness.plain)
+        best = without[weakest].stated
+
+
+def _judge_each(
+    workers: Workers, best: Fit, without: Sequence[WithoutEffect], late: Sequence | None
+) -> tuple[Support, ...]:
+    """`Support` of every effect of `best`."""
+    folds = make_folds(workers, late)
+    held_out = _held_out_gains(best, without, folds)
+    rig, values = best.twin.rig, best.twin.effect_values(best.twin.theta)
+    owns = [own_element(effect, place, value, rig) for effect, place, value in values]
+    elements = elements_of(rig, workers.observations, owns)
+    jobs = [(best, None, elements)]
+    for each in without:
+        start = transfer_theta(best, each.stated.hypothesis, workers.base)
+        jobs += [(each.stated, None, elements), (each.wide, None, elements)]
+        jobs += [(each.stated, start, elements)]
+    tables = workers.map(evaluate_corrections, jobs)
+    present, absent = tables[0], tables[1:]
+    supports = []
+    for k, (effect, place) in enumerate(best.hypothesis):
+        robustness = compare_beside_corrections(present, absent[3 * k : 3 * k + 3], owns[k])
+        pull = _largest_pull(best, f"{effect.name}@{place}.")
+        level = support_level(robustness, held_out[k], pull)
+        supports.append(Support(effect.name, str(place), level, robustness, held_out[k], pull))
+    return tuple(supports)
+
+
+def _largest_pull(fit: Fit, label: str) -> float:
+    """Largest |coordinate| of the parameters of one effect; a position has no pull."""
+    pulls = [
+        abs(float(u))
+        for p, u in zip(fit.twin.parameters, fit.twin.theta)
+        if p.name.startswith(label) and p.prior.kind != "uniform"
+    ]
+    return max(pulls, default=0.0)
+
+
+def evaluate_corrections(base, observations: Sequence, job: tuple) -> dict[tuple, float]:
+    """Log evidence of a model with a correction of each element; `job` is (fit, theta, elements),
+    for `Workers.map`."""
+    fit, theta, elements = job
+    return SmoothCorrections(fit, observations, theta).by_element(elements)
+
+
+def support_level(robustness: Robustness, held_out: float, pull: float) -> str:
+    """Level of an effect with these results of the checks."""
+    if robustness.plain < MIN_LOG_BAYES_FACTOR or held_out <= 0.0:
+        return "suggested"
+    survives = robustness.least >= MIN_LOG_BAYES_FACTOR and robustness.own >= 0.0
+    return "established" if survives and pull <= PULL_ALARM else "supported"
+
+
+def _held_out_gains(
+    best: Fit, without: Sequence[WithoutEffect], folds: Sequence[Fold]
+) -> list[float]:
+    """Log predictive probability of the held-out data that each effect adds, over all folds."""
+    gains = np.zeros(len(without))
+    for fold in folds:
+        jobs = [
+            FitJob(f.hypothesis, FromTheta(f.twin.theta, exact=False), observations=fold.indices)
+            for f in (best, *(each.stated for each in without))
+        ]
+        present, *absent = (_log_predictive(fit, fold.held_out) for fit in fold.workers.fit(jobs))
+        gains += present - np.array(absent)
+    return [float(g) for g in gains]
+
+
+def _log_predictive(fit: Fit, observations: Sequence) -> float:
+    """Log probability of observations under a fit to others.
+
+    Shaft angles and the state of each recording are free, and the sizes of the errors are those
+    that suit the observations best: another operating point has other errors.
+    """
+    posterior = Posterior(fit.twin, observations, None, fit.source_free)
+    labels = {f"{kind}[{o.label}]" for o in observations for kind in ("angle", "state")}
+    theta = fit_shaft_angles(posterior, fit.twin.theta)
+    fixed = [k for k, p in enumerate(fit.twin.parameters) if p.name not in labels]
+    theta, _ = descend(posterior, theta, HELD_OUT_STEPS, fixed)
+    r, log_determinant = posterior.whitened(posterior.predict(theta))
+    return -float(np.sum(np.abs(r) ** 2)) - log_determinant

@@ -1,0 +1,33 @@
+"""The stepwise search comes to an end where an exchange and a simplification undo each other."""
+
+from types import SimpleNamespace
+
+from made_fits import made_fit
+from rippletwin.explanation.search import stepwise_search
+from rippletwin.explanation.search.stepwise_search import Search, _search_stepwise
+from rippletwin.twin.effects.base import Place
+from rippletwin.twin.effects.library import EFFECTS
+
+VOLUME = (EFFECTS["line_volume"], Place("position"))
+BRANCH = (EFFECTS["side_branch"], Place("position"))
+
+
+def test_an_exchange_that_simplifying_undoes_ends_the_search(monkeypatch):
+    """A branch is a little better than the volume that it contains, so the exchange takes it and
+    the simplification takes it back. The search ends with the volume after one round."""
+    rounds = []
+    volume, branch = made_fit(100.0, VOLUME), made_fit(103.0, BRANCH)
+
+    def exchange(workers, best, fits):
+        rounds.append(best.label)
+        return branch if best.hypothesis == (VOLUME,) else best
+
+    monkeypatch.setattr(stepwise_search, "exchange_effects", exchange)
+    monkeypatch.setattr(stepwise_search, "_revise", lambda *_: made_fit(100.0, VOLUME))
+    monkeypatch.setattr(stepwise_search, "move_to_best_position", lambda w, fit: (fit, []))
+    monkeypatch.setattr(stepwise_search, "fit_extensions", lambda *_: [])
+    monkeypatch.setattr(stepwise_search, "fit_substitutes", lambda *_: [])
+    base = made_fit(0.0)
+    start = Search(base, [], volume)
+    found = _search_stepwise(SimpleNamespace(), start, [VOLUME, BRANCH], None)
+    assert found.best.hypothesis == (VOLUME,) and len(rounds) == 1

@@ -1,0 +1,128 @@
+"""Free, smooth corrections: their likelihood, and what they tell of effects that are not there."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from rippletwin.calibration.frequency_continuation import refine
+from rippletwin.explanation.checks.robustness import compare_beside_corrections
+from rippletwin.explanation.fit_jobs import FitJob, NearFit, Workers
+from rippletwin.explanation.localise.remainder import find_remainder
+from rippletwin.explanation.localise.smooth_corrections import (
+    CORRELATION_HZ,
+    NONE,
+    SmoothCorrections,
+    _log_likelihood,
+    elements_of,
+    own_element,
+    smooth_basis,
+)
+from rippletwin.spectra.frequency_selection import select_fitted_frequencies
+from rippletwin.twin.effects.base import Place
+from rippletwin.twin.effects.library import EFFECTS
+from rippletwin.twin.twin import Twin
+from synthetic_effects import LEAK, TRUTH, VOLUME
+from synthetic_observations import POINTS, make
+
+
+def test_likelihood_is_that_of_the_dense_covariance():
+    """Woodbury's identity against scipy's multivariate normal density."""
+    rng = np.random.default_rng(0)
+    columns, r = rng.normal(size=(5, 30)), rng.normal(size=30)
+    scale = np.array([1.0, 1.0, 0.3, 0.3, 2.0])
+    scaled = columns * scale[:, None]
+    dense = multivariate_normal(np.zeros(30), np.eye(30) + scaled.T @ scaled).logpdf(r)
+    value = _log_likelihood(r, columns @ columns.T, columns @ r, scale)
+    assert value - 15.0 * np.log(2.0 * np.pi) == pytest.approx(dense)
+
+
+def test_basis_has_the_kernel_of_unit_complex_variance():
+    """Real and imaginary part have half the variance each."""
+    f = np.linspace(100.0, 4000.0, 40)
+    basis = smooth_basis(f)
+    kernel = np.exp(-0.5 * (np.subtract.outer(f, f) / CORRELATION_HZ) ** 2)
+    assert np.allclose(2.0 * basis.T @ basis, kernel, atol=2e-2)
+
+
+def spoilt(observations, row, error):
+    """Observations whose sensor `row` has a relative error, a function of the frequency in Hz."""
+    spoilt = []
+    for o in observations:
+        values = o.values.copy()
+        values[row] *= 1.0 + error(o.frequency_hz)
+        spoilt.append(replace(o, values=values))
+    return spoilt
+
+
+def unlisted(f):
+    """Smooth, up to 8 % at 4 kHz, and of no effect's law: a phase that grows as the cube."""
+    return -0.08j * (f / 4000.0) ** 3
+
+
+@pytest.fixture(scope="module")
+def line_with_volume():
+    """A line with a volume whose second sensor has an unlisted error: twin, data, true theta."""
+    bench, recorded, truth = make(np.random.default_rng(3), VOLUME, TRUTH, 3, POINTS[:2])
+    data = spoilt(select_fitted_frequencies(recorded, bench), 1, unlisted)
+    return Twin(bench, data), data, truth.theta
+
+
+def robustness_of_last_effect(base, data, fit):
+    """Of the last effect of a fit, against the line without it."""
+    rest = fit.hypothesis[:-1]
+    start = np.array(
+        [fit.twin.theta[fit.twin.index[p.name]] for p in base.with_(effects=rest).parameters]
+    )
+    without = refine(base, rest, data, [start], exact=False)
+    effect, place, values = fit.twin.effect_values(fit.twin.theta)[-1]
+    own = own_element(effect, place, values, base.rig)
+    elements = elements_of(base.rig, data, [own])
+    tables = [SmoothCorrections(f, data).by_element(elements) for f in (fit, without)]
+    tables.append(SmoothCorrections(without, data, start).by_element(elements))
+    return tables, compare_beside_corrections(tables[0], tables[1:], own)
+
+
+def test_a_true_effect_survives_an_unlisted_error_elsewhere(line_with_volume):
+    """The volume keeps its evidence whatever element may err, and what remains belongs to the
+    sensor that really errs."""
+    base, data, theta = line_with_volume
+    fit = refine(base, VOLUME, data, [theta], exact=False)
+    tables, robustness = robustness_of_last_effect(base, data, fit)
+    assert robustness.least > 20.0 and robustness.own > 0.0
+    best = max(tables[0], key=tables[0].get)
+    assert best == ("sensor", 1)
+    assert tables[0][best] > tables[0][NONE, None] + 20.0
+    remainder = find_remainder(fit, data)
+    assert remainder.is_significant and remainder.element == ("sensor", 1)
+    assert 0.005 < remainder.model_error < 0.1 and remainder.law is None
+
+
+def test_an_effect_that_fits_an_unlisted_error_is_not_established(line_with_volume):
+    """The phase error grows faster than that of a delay. A delay has the evidence to be named;
+    beside a free correction at its own place its law is needless."""
+    base, data, theta = line_with_volume
+    first = refine(base, VOLUME, data, [theta], exact=False)
+    wrong = (EFFECTS["sensor_delay"], Place("sensor p2", 1))
+    (fit,) = Workers(base, data).fit([FitJob((*VOLUME, wrong), NearFit(first))])
+    assert fit.evidence > first.evidence + 8.0
+    _, robustness = robustness_of_last_effect(base, data, fit)
+    assert robustness.own < 0.0 or robustness.least < 8.0
+
+
+def test_the_remainder_of_an_unlisted_leak_is_at_its_place():
+    """A leak that the fit does not have: the remainder is a shunt near it."""
+    bench, recorded, truth = make(
+        np.random.default_rng(4), LEAK, TRUTH, 3, POINTS[:2], source=0.0, noise=500.0
+    )
+    data = select_fitted_frequencies(recorded, bench)
+    base = Twin(bench, data)
+    start = np.array([truth.theta[truth.index[p.name]] for p in base.parameters])
+    fit = refine(base, (), data, [start], exact=False)
+    remainder = find_remainder(fit, data)
+    kind, _ = remainder.element
+    low, high = remainder.interval
+    position = TRUTH["leak@position.position"]
+    assert kind == "shunt" and low - 0.3 <= position <= high + 0.3
+    assert remainder.law is not None

@@ -1,0 +1,64 @@
+"""The state of a recording: a factor on all wave speeds while it was made."""
+
+import numpy as np
+import pytest
+
+from rippletwin.spectra.frequency_selection import select_fitted_frequencies
+from rippletwin.twin import twin_file
+from rippletwin.twin.forward_jacobian import DifferentiableForward
+from rippletwin.twin.twin import Twin
+from synthetic_effects import HOSE, TRUTH
+from synthetic_observations import POINTS, make
+
+
+@pytest.fixture(scope="module")
+def observed():
+    """A line with a hose at two operating points: twin with states, observations."""
+    bench, recorded, truth = make(np.random.default_rng(1), HOSE, TRUTH, 3, POINTS[:2])
+    data = select_fitted_frequencies(recorded, bench)
+    twin = Twin(bench, data, effects=HOSE, changing_state=True)
+    theta = np.zeros(len(twin.theta))
+    for name, k in truth.index.items():
+        theta[twin.index[name]] = truth.theta[k]
+    return twin, data, theta
+
+
+def test_a_state_scales_the_wave_speeds_of_its_recording_alone(observed):
+    """The same as a line with other wave speeds for that recording, and nothing for the other."""
+    twin, data, theta = observed
+    moved = theta.copy()
+    moved[twin.index["state[point 2]"]] = 2.0
+    factor = twin.parameters[twin.index["state[point 2]"]].value(2.0)
+    first, second = twin.predict(data, moved)
+    assert np.array_equal(first, twin.predict(data, theta)[0])
+    faster = theta.copy()
+    for k in range(1, len(twin.rig.line) + 1):
+        index = twin.index[f"wave_speed[{k}]"]
+        p = twin.parameters[index]
+        faster[index] = p.prior.coordinate(factor * p.value(theta[index]))
+    assert np.allclose(second, twin.predict(data, faster)[1], rtol=1e-9)
+
+
+def test_its_derivative_is_the_difference_quotient(observed):
+    """Against central differences of the prediction."""
+    twin, data, theta = observed
+    forward = DifferentiableForward(twin, data)
+    slopes = forward.derivatives(theta)
+    for label in ("state[point 1]", "state[point 2]"):
+        k, step = twin.index[label], 1e-3
+        ends = []
+        for side in (-1.0, 1.0):
+            moved = theta.copy()
+            moved[k] += side * step
+            ends.append(np.concatenate(forward(moved), axis=1))
+        quotient = (ends[1] - ends[0]) / (2.0 * step)
+        assert np.linalg.norm(slopes[k] - quotient) < 0.02 * np.linalg.norm(quotient)
+
+
+def test_one_recording_has_no_state_and_a_file_keeps_it(observed):
+    """With one recording the wave speeds themselves are free. twin.json keeps the choice."""
+    twin, data, _ = observed
+    single = Twin(twin.rig, data[:1], changing_state=True)
+    assert not any(name.startswith("state") for name in single.index)
+    again = twin_file.from_dict(twin_file.to_dict(twin))
+    assert again.changing_state and again.index == twin.index
