@@ -8,6 +8,9 @@ exceptions. `harmonics` comes after `case`, for it is about the flow ripples tha
 """
 
 import ast
+import os
+import subprocess
+import sys
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
 
@@ -156,13 +159,37 @@ def test_packages_hold_a_docstring_only():
         for name, path in modules().items()
         if path.name == "__init__.py"
         and name
-        not in ("rippletwin", "rippletwin.cli")  # nothing of the workflow imports the second
+        # The first imports rooms on demand only (see below); no workflow imports the second.
+        not in ("rippletwin", "rippletwin.cli")
         and not (
             len(body := ast.parse(path.read_text()).body) == 1
             and ast.get_docstring(ast.Module(body, []))
         )
     ]
     assert not wrong, wrong
+
+
+def test_the_package_itself_imports_a_room_only_when_asked():
+    """`rippletwin` offers functions of the rooms and yet loads none; each of them is there, also
+    after the room `report` has been imported, and a name that is not offered is an error."""
+    code = """
+import sys, rippletwin
+assert not [name for name in sys.modules if name.startswith("rippletwin.")], sys.modules
+assert "numpy" not in sys.modules
+rippletwin.load_case
+assert "rippletwin.case.load" in sys.modules and "rippletwin.twin.twin" not in sys.modules
+import rippletwin.report.page
+names = [name for name in rippletwin.__all__ if not name.startswith("__")]
+assert len(names) == 6 and all(callable(getattr(rippletwin, name)) for name in names)
+assert set(names) <= set(dir(rippletwin))
+try:
+    rippletwin.nothing
+except AttributeError:
+    sys.exit(7)
+"""
+    environment = {**os.environ, "PYTHONPATH": str(SOURCES)}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True)
+    assert done.returncode == 7, done.stderr.decode()
 
 
 @pytest.mark.parametrize(

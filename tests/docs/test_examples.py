@@ -17,6 +17,7 @@ from paths import ROOT
 
 OWN_RECORDINGS = ROOT / "docs" / "how-to" / "own_recordings.md"
 NEW_EFFECT = ROOT / "docs" / "how-to" / "add_an_effect.md"
+NOTEBOOK = ROOT / "docs" / "how-to" / "notebook.md"
 NEW_NETWORK = ROOT / "docs" / "how-to" / "add_a_network.md"
 
 
@@ -120,3 +121,42 @@ def test_the_network_of_the_how_to_can_be_built():
     finally:
         architectures.ARCHITECTURES.clear()
         architectures.ARCHITECTURES.update(entries)
+
+
+def notebook_blocks() -> list[str]:
+    """Python of notebook.md: simulate, diagnose, report."""
+    return [block.text for block in blocks_of(NOTEBOOK) if block.language == "python"]
+
+
+def test_the_notebook_simulates_and_reports(tmp_path, monkeypatch, capsys):
+    """First and last example of notebook.md run on a small case: a leak changes the readings of
+    both sensors by more than a kPa, and the page is written."""
+    (tmp_path / "my_case").mkdir()
+    write_case(tmp_path / "my_case", sheet())
+    monkeypatch.chdir(tmp_path)
+    simulated, _, reported = notebook_blocks()
+    names = {}
+    exec(simulated, names)
+    assert names["change"].shape == (2, len(names["slipper"].time_s))
+    assert np.all(np.std(names["change"], axis=1) > 1e3)
+    exec(reported, {})
+    assert "my_case/report.html" in capsys.readouterr().out
+    assert (tmp_path / "my_case" / "report.html").stat().st_size > 1e4
+
+
+@pytest.mark.long
+def test_the_notebook_diagnoses(tmp_path, monkeypatch, capsys):
+    """The second example of notebook.md runs on a case of the virtual rig with a worn slipper, and
+    says so after one of the verdicts that there are."""
+    from rippletwin.explanation.verdict.decision import VERDICTS
+    from virtualrig.cli import main as virtualrig
+
+    monkeypatch.chdir(tmp_path)
+    virtualrig(["record", "--out", "my_case", "--points", "smoke", "--seconds", "2"])
+    names = {"__name__": "notebook"}
+    exec(notebook_blocks()[1], names)
+    capsys.readouterr()
+    names["main"]()
+    verdict, *diagnoses = capsys.readouterr().out.splitlines()
+    assert verdict in VERDICTS
+    assert "slipper_1000_95 slipper" in "\n".join(diagnoses)

@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+import rippletwin
 import source_files
 from paths import ROOT
 from source_files import PLUGIN_FOLDERS, package_files, source_files_of
@@ -143,14 +144,22 @@ def test_every_effect_and_every_reader_of_recordings_counts():
 
 
 def test_whoever_imports_by_a_computed_name_is_declared():
-    """A new registry has to be added to PLUGIN_FOLDERS, or its plugins would rerun nothing."""
+    """A new registry has to be added to PLUGIN_FOLDERS, or its plugins would rerun nothing. The
+    package's own functions for notebooks need not be: no script and no module asks for them."""
     computed = re.compile(r"\bpkgutil\.|\bimport_module\(|\b__import__\(")
     found = {
         file.relative_to(ROOT).as_posix()
         for file in (ROOT / "src").rglob("*.py")
         if computed.search(file.read_text())
     }
-    assert found == set(PLUGIN_FOLDERS)
+    assert found == {*PLUGIN_FOLDERS, "src/rippletwin/__init__.py"}
+    functions = "|".join(rippletwin.__all__[1:])
+    asked = re.compile(
+        rf"\brippletwin\.({functions})\b(?!\.)|from rippletwin import .*\b({functions})\b"
+    )
+    code = [*(ROOT / "src").rglob("*.py"), *(ROOT / "workflow").rglob("*.py")]
+    assert asked.search("from rippletwin import store, explain")
+    assert not [file for file in code if asked.search(file.read_text())]
     assert all((ROOT / folder).is_dir() for folder in PLUGIN_FOLDERS.values())
 
 

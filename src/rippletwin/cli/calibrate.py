@@ -10,7 +10,6 @@ import click
 from rippletwin.cli import options
 from rippletwin.cli.exit_codes import found_code
 from rippletwin.cli.progress import warn
-from rippletwin.errors import InputError
 
 
 @click.command("calibrate", short_help="fit the twin to a case's healthy recordings")
@@ -36,26 +35,13 @@ def command(
 ) -> int:
     """Fit the twin to the healthy recordings of the folder CASE."""
     from rippletwin.calibration import report
-    from rippletwin.calibration.calibrate import Settings, calibrate
+    from rippletwin.calibration.calibrate_case import calibrate_case
     from rippletwin.case.load import load_case
-    from rippletwin.spectra.observation import observe
-    from rippletwin.twin.twin import Twin
 
     read = load_case(case, states={"healthy"})
-    if not read.recordings:
-        raise InputError(
-            f"{case}/rig.yaml",
-            "recordings",
-            "none has state: healthy",
-            "calibration needs at least one healthy recording",
-        )
     warn(read.warnings)
-    observations = [observe(r, read.rig, piston_harmonics_only=True) for r in read.recordings]
-    _check_band(observations, max_frequency)
-    twin = Twin(read.rig, observations, friction=friction)
-    settings = Settings(max_frequency_hz=max_frequency)
     progress = None if as_json else print
-    calibration = calibrate(twin, observations, settings, progress=progress)
+    calibration = calibrate_case(read, friction, max_frequency, progress)
     report.save(calibration, out)
     if as_json:
         left_out = ("twin", "covariance")
@@ -69,16 +55,3 @@ def command(
             print(f"warning: {warning}")
     warned = bool(calibration.warnings or read.warnings)
     return found_code(["warning"] if warned else [], fail_on)
-
-
-def _check_band(observations, max_frequency: float | None) -> None:
-    """Raise InputError where nothing of a recording is below `max_frequency`."""
-    lowest = max(o.frequency_hz[0] for o in observations)
-    if max_frequency is not None and max_frequency < lowest:
-        raise InputError(
-            "command line",
-            "--max-frequency",
-            f"{max_frequency:g} Hz leaves nothing of a recording, whose lowest frequency is "
-            f"{lowest:.4g} Hz",
-            "give a multiple of the pump's piston frequency, or leave it out",
-        )

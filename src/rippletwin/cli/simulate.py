@@ -86,11 +86,11 @@ def command(
             "a healthy pump has no leak" if healthy else f"the leak area of {fault} is missing",
             "leave it out" if healthy else "give one, such as --severity 0.2mm2",
         )
-    from rippletwin.diagnosis.faults.library import FAULTS, read_fault
+    from rippletwin.diagnosis.faults.library import find_fault
     from rippletwin.diagnosis.simulated_fault import simulate_fault
     from rippletwin.twin.twin_file import load_twin
 
-    found = None if healthy else FAULTS.get(fault) or read_fault(fault)
+    found = find_fault(fault)
     twin = load_twin(twin_file, effects)
     runs = [
         simulate_fault(twin, found, area, speed, pressure * PASCAL_PER_BAR)

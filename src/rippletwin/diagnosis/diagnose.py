@@ -11,6 +11,7 @@ from rippletwin.diagnosis.anchor import distance
 from rippletwin.diagnosis.diagnoser import MOST_REPEATS, Diagnoser
 from rippletwin.diagnosis.diagnosis import Diagnosis
 from rippletwin.diagnosis.faults.base import Fault
+from rippletwin.diagnosis.faults.library import select_faults
 from rippletwin.diagnosis.line_calibration import calibrate_line
 from rippletwin.diagnosis.pump_calibration import calibrate_pump, one_each_point
 from rippletwin.errors import InputError
@@ -23,20 +24,24 @@ HIGHEST_HZ = 4000.0
 def diagnose(
     case: Case,
     twin: Twin,
-    recordings: Sequence[Recording],
-    faults: Sequence[Fault],
+    recordings: Sequence[Recording] | None = None,
+    faults: Sequence[Fault] | None = None,
     progress: Callable[[str, int, int], None] | None = None,
     recalibrate: bool = True,
 ) -> list[Diagnosis]:
     """Diagnose periodic recordings of a case by its twin, each anchored to the healthy recording of
     the nearest operating point, itself excepted.
 
+    recordings    all of unknown state where None
+    faults        those tried by default where None
     recalibrate   whether the twin's line is fitted to ratios between sensors (`calibrate_line`) and
                   its pump to the flow that the recordings ask for (`calibrate_pump`)
 
     `progress` is told what is done, how much of it, and of how much. Raises InputError where the
     twin is that of another rig, and where there is no healthy recording to anchor one to.
     """
+    recordings = select_recordings(case) if recordings is None else recordings
+    faults = select_faults() if faults is None else faults
     _check_twin(case, twin)
     healthy = {r.label: _anchors(case, r)[: 1 + MOST_REPEATS] for r in recordings}
     read, found = {}, []

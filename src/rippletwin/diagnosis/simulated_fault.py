@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rippletwin.diagnosis.faults.base import Fault
+from rippletwin.diagnosis.faults.library import find_fault
 from rippletwin.diagnosis.pump_flow import (
     healthy_flow,
     leak_velocity,
@@ -41,18 +42,20 @@ class SimulatedFault:
 
 def simulate_fault(
     twin: Twin,
-    fault: Fault | None,
+    fault: Fault | str | None,
     area: float,
     speed_rpm: float,
     load_pressure: float,
 ) -> SimulatedFault:
-    """`SimulatedFault` of a fault, None for healthy, with leak area in m2, at r/min.
+    """`SimulatedFault` of a fault with leak area in m2, at r/min.
 
+    fault : itself, or its name or file as in `find_fault`; None for healthy.
     load_pressure : Pa gauge before the load while the pump is healthy.
 
     Raises InputError where the twin has no pump, where an orifice has no pressure over it, for a
     load given as a measured impedance, and where pump or line find no periodic state.
     """
+    fault = find_fault(fault) if isinstance(fault, str) else fault
     warnings = []
     twin = _with_pump(twin, speed_rpm / 60.0, load_pressure, warnings)
     pump, fluid = twin.rig.pump, twin.rig.fluid

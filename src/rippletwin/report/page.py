@@ -12,7 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from rippletwin.report.content import Page, WorkflowPart, make_page
-from rippletwin.report.results import Results
+from rippletwin.report.results import Results, read_results
 
 TEMPLATES = "templates"
 
@@ -34,6 +34,16 @@ def render(page: Page) -> str:
     return template.render(
         page=page, script=Markup(script), style=Markup(style), script_hash=f"sha256-{digest}"
     )
+
+
+def report_case(
+    case_folder: str | Path,
+    path: str | Path,
+    explained: str | Path | None = None,
+    diagnosed: str | Path | None = None,
+) -> Path:
+    """Write the report of the case and the results in its folders, as `read_results` finds them."""
+    return write_report(read_results(case_folder, explained, diagnosed), path)
 
 
 def write_report(results: Results, path: str | Path, workflow: WorkflowPart | None = None) -> Path:

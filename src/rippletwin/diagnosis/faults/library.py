@@ -48,6 +48,12 @@ def select_faults(asked: Sequence[str | Path] = ()) -> tuple[Fault, ...]:
     return tuple(chosen)
 
 
+def find_fault(asked: str | Path) -> Fault | None:
+    """The fault of this name or of this user's file, None for healthy; raises InputError where
+    there is none."""
+    return None if str(asked) == "healthy" else FAULTS.get(str(asked)) or read_fault(asked)
+
+
 def read_fault(path: str | Path) -> Fault:
     """The `FAULT` of a user's Python file; raises InputError where there is none."""
     return read_object(path, "FAULT", Fault, "--faults", ", ".join(FAULTS))
