@@ -24,7 +24,7 @@ from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.twin import Twin
 from synthetic_effects import LEAK, TRUTH, VOLUME
-from synthetic_observations import POINTS, make
+from synthetic_observations import POINTS, make, rig
 
 
 def test_likelihood_is_that_of_the_dense_covariance():
@@ -126,3 +126,13 @@ def test_the_remainder_of_an_unlisted_leak_is_at_its_place():
     position = TRUTH["leak@position.position"]
     assert kind == "shunt" and low - 0.3 <= position <= high + 0.3
     assert remainder.law is not None
+
+
+def test_a_line_of_one_segment_is_that_segment():
+    """The own element of friction is all segments, and of one segment the element that is tried."""
+    friction, place = EFFECTS["unsteady_friction"], Place("line")
+    bench = rig()
+    assert own_element(friction, place, {}, bench) == ("segment series", (0, 1, 2))
+    single = replace(bench, line=bench.line[:1])
+    own = own_element(friction, place, {}, single)
+    assert own == ("segment series", 0) and own in elements_of(single, [])

@@ -5,7 +5,11 @@ from types import SimpleNamespace
 import pytest
 
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders
-from rippletwin.explanation.verdict.summary_text import liquid_like_air, summary_text
+from rippletwin.explanation.verdict.summary_text import (
+    _ripple_error,
+    liquid_like_air,
+    summary_text,
+)
 
 SPREAD = ShaftOrders(0.02, 1e-9, 0.95, "piston_spread", 0.03, interval=(0.025, 0.036))
 
@@ -109,3 +113,11 @@ def test_air_at_one_pressure_may_be_another_liquid(name, pressures, is_warned):
     warning = liquid_like_air([name, "leak"], pressures)
     assert (len(warning) == 1) is is_warned
     assert all("any liquid that stiffens" in sentence for sentence in warning)
+
+
+def test_a_wrong_ripple_is_told_apart_from_a_wrong_line():
+    """A misfit of 40 % beside a model error of 1 % is the ripple's; one of 2 % is not."""
+    fit = {"after": {"in_sample": 0.4}, "model_error": {"after": 0.01}}
+    (sentence,) = _ripple_error(fit)
+    assert "misses 40% of the reading" in sentence and "error of the ripple" in sentence
+    assert _ripple_error({"after": {"in_sample": 0.02}, "model_error": {"after": 0.01}}) == []

@@ -177,7 +177,7 @@ def elements_of(rig, observations: Sequence, own: Sequence[tuple] = ()) -> list[
 
 def own_element(effect, place, values: Mapping[str, float], rig) -> tuple:
     """The element at which an effect itself acts, with its fitted `values`."""
-    everywhere = tuple(range(len(rig.line)))
+    everywhere = tuple(range(len(rig.line))) if len(rig.line) > 1 else 0
     if effect.element == "sensor":
         return "sensor", place.index
     if effect.element == "segment":

@@ -14,6 +14,9 @@ from rippletwin.explanation.verdict.places import element_and_extent, join_words
 
 SAME_PRESSURE = 0.05  # relative; mean pressures closer than this count as one
 SOURCE_FREE_SHARE = 0.2  # of the evidence that must remain if the source is unknown
+RIPPLE_ERROR_RATIO = 3.0
+"""Misfit over model error from which nearly all of the misfit is an error of the pump's ripple: the
+rest, a tenth in power, is the model error."""
 OPENINGS = {
     "consistent": "The recordings agree with the twin within the tolerances of the data sheet.",
     "calibration_only": "No physics is missing, but nominal values of the line are outside their "
@@ -54,6 +57,8 @@ def summary_text(e: Explanation, result: dict, entries: Sequence[dict]) -> str:
             sentences.append("Its place or form is not determined: see equivalents.")
         sentences += _source_free(e)
     sentences += _remainder(result["remainder"])
+    if entries:
+        sentences += _ripple_error(result["fit"])
     sentences += _pump(result["pump"])
     sentences += _shaft_orders(e.shaft_orders)
     sentences += _drift(e)
@@ -148,6 +153,17 @@ def _remainder(remainder: dict | None) -> list[str]:
         passive = "passive" if network["passive"] else "not passive"
         sentences.append(f"A {network['form']} ({passive}) stands in for it in the twin.")
     return sentences
+
+
+def _ripple_error(fit: dict) -> list[str]:
+    """That most of the misfit is an error of the pump's ripple, where it is."""
+    misfit, model_error = fit["after"]["in_sample"], fit["model_error"]["after"]
+    if misfit < RIPPLE_ERROR_RATIO * model_error:
+        return []
+    return [
+        f"With the pump's nominal ripple the twin misses {misfit:.0%} of the reading. Nearly all "
+        "of that is an error of the ripple, and not of the line."
+    ]
 
 
 def _capital(text: str) -> str:
