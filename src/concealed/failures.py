@@ -7,13 +7,13 @@ def failure(row: dict) -> str | None:
     """In what a case falls short, in words; None where it does not.
 
     An effect that is not plain may be missed. A plain effect outside the library must raise the
-    alarm, and no effect outside the library may be given a name.
+    alarm. Nothing may be established that is not there.
     """
     kind = row["kind"]
     if kind in ("none", "off"):
-        return "false alarm" if row["alarm"] else None
+        return "false alarm" if row["wrong"] or row["verdict"] == "crashed" else None
     if kind == "outside":
-        if row["named"]:
+        if row["wrong"]:
             return "misnamed"
         return "not noticed" if row["plain"] and not row["alarm"] else None
     if row["wrong"]:

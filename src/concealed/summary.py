@@ -153,7 +153,11 @@ def method_table(rows: list[dict]) -> list[MethodScore]:
         )
 
     return [
-        scored("`rippletwin explain`", lambda row: row),
+        # Nuisance physics that is there may be named: what is not there counts.
+        scored(
+            "`rippletwin explain`",
+            lambda row: row | {"alarm": bool(row["wrong"]), "named": row["wrong"]},
+        ),
         scored("calibration alone", lambda row: row["baselines"]["recalibrate"]),
         scored("least BIC of single effects", lambda row: row["baselines"]["bic"]),
         scored("matching pursuit on the residual", lambda row: row["baselines"]["sparse"]),

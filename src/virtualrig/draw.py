@@ -100,13 +100,7 @@ def draw_case(count: int, commit: str, number: int | str, index: int) -> DrawnCa
         "kind": kind,
         "effects": [truth_of_effect(effect, sheet, true) for effect in effects],
         "classes": classes,
-        "segments": [
-            {
-                "delay": s["length"] / s["wave_speed"],
-                "impedance": context.density * s["wave_speed"] / (np.pi / 4 * s["diameter"] ** 2),
-            }
-            for s in true["line"]["segments"]
-        ],
+        "segments": truth_of_segments(true["line"]["segments"], context.density),
         "length": float(context.length),
         "noise": true["noise"],
         "source_error": float(error),
@@ -140,6 +134,17 @@ def draw_effects(
         effect, names = INDISTINGUISHABLE[alike[running % len(alike)]](context, 0.5 + 0.5 * level)
         return [effect], [names]
     return [], []
+
+
+def truth_of_segments(segments: list[dict], density: float) -> list[dict]:
+    """Delay (s) and characteristic impedance (Pa s/m3) of each true segment."""
+    return [
+        {
+            "delay": s["length"] / s["wave_speed"],
+            "impedance": density * s["wave_speed"] / (np.pi / 4 * s["diameter"] ** 2),
+        }
+        for s in segments
+    ]
 
 
 def truth_of_effect(effect: DrawnEffect, sheet: dict, true: dict) -> dict:

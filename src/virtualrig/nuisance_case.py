@@ -11,7 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from virtualrig.conceal import nominal_flow_ripple
-from virtualrig.draw import case_kinds, draw_effects, random_generator, truth_of_effect
+from virtualrig.draw import (
+    case_kinds,
+    draw_effects,
+    random_generator,
+    truth_of_effect,
+    truth_of_segments,
+)
 from virtualrig.draw_nuisance import RECORDING_KELVIN, draw_nuisance
 from virtualrig.draw_population import (
     DrawnRig,
@@ -90,13 +96,7 @@ def draw_nuisance_case(count: int, commit: str, number: int | str, index: int) -
         "effects": [truth_of_effect(effect, sheet, true) for effect in effects],
         "nuisance": nuisance_effects(sheet, true, nuisance, geometry),
         "classes": classes,
-        "segments": [
-            {
-                "delay": s["length"] / s["wave_speed"],
-                "impedance": context.density * s["wave_speed"] / (np.pi / 4 * s["diameter"] ** 2),
-            }
-            for s in true["line"]["segments"]
-        ],
+        "segments": truth_of_segments(true["line"]["segments"], context.density),
         "length": float(context.length),
         "noise": nuisance["noise"],
         "points": len(points),

@@ -5,7 +5,7 @@ import pytest
 from concealed.failures import failure
 from concealed.score import assign_claims, score_case
 from concealed.tool import NO_BASELINES, crash_verdict
-from scored_cases import claim, pair_truth, score_example, truth, verdict
+from scored_cases import claim, effect, pair_truth, score_example, truth, verdict
 
 
 def test_right_name_place_and_interval():
@@ -90,11 +90,20 @@ def test_assignment_finds_many_effects_before_own_names():
 
 
 def test_no_effect_and_effects_outside_the_library():
-    """Without an effect silence is right; outside the library abstention is, and no name."""
+    """Without an effect nothing may be established that is not there; outside the library neither.
+    Nuisance physics that is there may be."""
     none = truth(kind="none", effects=[], change=0.0)
     assert failure(score_example(none, verdict("consistent"))) is None
     assert failure(score_example(none, verdict("calibration_only"))) is None
-    assert failure(score_example(none, verdict("unexplained"))) == "false alarm"
+    assert failure(score_example(none, verdict("unexplained"))) is None
+    named = verdict("named", claim("leak"))
+    assert failure(score_example(none, named)) == "false alarm"
+    there = none | {"nuisance": [effect("leak")]}
+    assert failure(score_example(there, named)) is None
+    elsewhere = verdict("named", claim("leak", position=(1.0, 1.2)))
+    assert failure(score_example(there, elsewhere)) == "false alarm"
+    only_supported = verdict("named", claim("leak") | {"support": "supported"})
+    assert failure(score_example(none, only_supported)) is None
     outside = truth(kind="outside")
     outside["effects"][0]["name"] = "accumulator"
     assert failure(score_example(outside, verdict("unexplained"))) is None

@@ -35,7 +35,7 @@ def rows():
     right = verdict("named", claim("leak", conductance=(1.5, 2.5)))
     scored = [
         score_example(none, verdict("consistent")),
-        score_example(none | {"kind": "off"}, verdict("unexplained")),
+        score_example(none | {"kind": "off"}, verdict("named", claim("leak"))),
         score_example(truth(), verdict("consistent"), 2.0),
         score_example(truth(sensors=3), right, 30.0),
         score_example(pair_truth(), right, 40.0),
