@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
+from rippletwin.calibration.likelihood import Likelihood
+from rippletwin.calibration.misfit import misfit
+from rippletwin.calibration.shaft_angles import fit_shaft_angles
 from rippletwin.case.model import Case, Recording
 from rippletwin.diagnosis.anchor import distance
 from rippletwin.diagnosis.diagnoser import MOST_REPEATS, Diagnoser
@@ -14,7 +18,9 @@ from rippletwin.diagnosis.faults.base import Fault
 from rippletwin.diagnosis.faults.library import select_faults
 from rippletwin.diagnosis.line_calibration import calibrate_line
 from rippletwin.diagnosis.pump_calibration import calibrate_pump, one_each_point
+from rippletwin.diagnosis.pump_flow import with_fitted_pump
 from rippletwin.errors import InputError
+from rippletwin.spectra.frequency_selection import select_fitted_frequencies
 from rippletwin.spectra.observation import observe, revolutions_of
 from rippletwin.twin.twin import Twin
 
@@ -35,7 +41,8 @@ def diagnose(
     recordings    all of unknown state where None
     faults        those tried by default where None
     recalibrate   whether the twin's line is fitted to ratios between sensors (`calibrate_line`) and
-                  its pump to the flow that the recordings ask for (`calibrate_pump`)
+                  its pump to the flow that the recordings ask for (`calibrate_pump`), if that
+                  lowers its misfit of the healthy ripples
 
     `progress` is told what is done, how much of it, and of how much. Raises InputError where the
     twin is that of another rig, and where there is no healthy recording to anchor one to.
@@ -51,8 +58,10 @@ def diagnose(
             for each in beside:
                 read[each.label] = _read(each, case.rig)
             healthy_ones = [read[each.label][0] for each in beside]
-            twin = calibrate_line(twin, healthy_ones)
-            twin = calibrate_pump(twin, one_each_point(healthy_ones))
+            other = calibrate_line(twin, healthy_ones)
+            other = calibrate_pump(other, one_each_point(healthy_ones))
+            # A twin that is right already would only lose what its line owes to the ripple.
+            twin = min((twin, other), key=lambda each: healthy_misfit(each, healthy_ones))
         diagnoser = Diagnoser(twin, faults)
         for k, recording in enumerate(recordings):
             if progress:
@@ -66,6 +75,24 @@ def diagnose(
     if progress:
         progress("diagnosing", len(recordings), len(recordings))
     return found
+
+
+def healthy_misfit(twin: Twin, observations: Sequence) -> float:
+    """Relative misfit of a twin's healthy ripples at the pistons' orders, shaft angles free."""
+    fitted = with_fitted_pump(twin)
+    data = select_fitted_frequencies(observations, fitted.rig, HIGHEST_HZ)
+    turned = Twin(
+        fitted.rig,
+        data,
+        friction=fitted.friction,
+        effects=fitted.effects,
+        guessed_load=fitted.guessed_load,
+    )
+    theta = np.zeros(len(turned.theta))
+    for name, k in fitted.index.items():
+        theta[turned.index[name]] = fitted.theta[k]
+    model = Likelihood(turned, data, evenness=1.0)
+    return misfit(model, fit_shaft_angles(model, theta)).relative
 
 
 def select_recordings(case: Case, labels: Sequence[str] = ()) -> list[Recording]:
