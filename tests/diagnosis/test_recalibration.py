@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import leaking_pump
+from rippletwin.diagnosis.diagnose import healthy_misfit
 from rippletwin.diagnosis.line_calibration import calibrate_line
 from rippletwin.diagnosis.pump_calibration import calibrate_pump, one_each_point
 from rippletwin.diagnosis.pump_flow import healthy_flow
@@ -58,3 +59,17 @@ def test_the_pump_s_flow_comes_nearer_to_the_true_one(healthy):
 def test_an_operating_point_set_twice_is_fitted_once(healthy):
     """Two recordings of one speed and load pressure."""
     assert len(one_each_point(healthy)) == 1
+
+
+def test_the_misfit_of_healthy_ripples_prefers_the_right_line(healthy):
+    """A twin with the true wave speed reproduces the healthy ripples better than one whose wave
+    speed is 6 % off, so it is the one that a diagnosis keeps."""
+    twin = Twin(leaking_pump.rig(), healthy)
+    misfits = []
+    for factor in (0.98, 1.04):
+        theta = twin.theta.copy()
+        k = twin.index["wave_speed[1]"]
+        speed = factor * leaking_pump.WAVE_SPEED
+        theta[k] = twin.parameters[k].prior.coordinate(speed)
+        misfits.append(healthy_misfit(twin.with_(theta=theta), healthy))
+    assert misfits[0] < 0.5 * misfits[1]
