@@ -25,8 +25,8 @@ data are 20 to 1 against it."""
 FALSE_ALARM_RATE = 0.02  # of cases without an effect, for the threshold of a bootstrap
 
 GOOD_MODEL_ERROR = 1.25 * MIN_MODEL_ERROR
-"""Relative model error up to which no effect can improve a fit noticeably. It saves work: beside such
-a fit no network is tried. No name depends on it."""
+"""Relative model error up to which no effect can improve a fit noticeably. It saves work: beside
+such a fit no network is tried. No name depends on it."""
 
 # Parameters and data of several recordings
 
