@@ -16,7 +16,7 @@ from virtualrig.draw_population import STATES
 @pytest.mark.skipif(landlock_version() < 1, reason="this kernel has no Landlock")
 def test_one_rig_from_drawing_to_the_page(tmp_path):
     """The target runs, nothing crashes, and every state is scored as the diagnosis says."""
-    trial = "{rigs: 1, number: 1001, twin: calibrated}"
+    trial = "{rigs: 1, number: 1001, methods: [anchored@calibrated]}"
     (tmp_path / "one.yaml").write_text(f"results: {tmp_path}/out\ndiagnosis_trial: {trial}\n")
     command = [sys.executable, "-m", "snakemake", "--cores", "2", "--configfile"]
     command += [str(tmp_path / "one.yaml"), "--directory", str(ROOT), "diagnosis_trial"]
@@ -26,7 +26,8 @@ def test_one_rig_from_drawing_to_the_page(tmp_path):
     folder = tmp_path / "out" / "diagnosis_trial"
     rows = json.loads((folder / "rows.json").read_text())
     assert sorted(row["state"] for row in rows) == sorted(STATES)
-    told = json.loads((folder / "diagnosed" / "000" / "diagnosis.json").read_text())["recordings"]
+    told = json.loads((folder / "diagnosed" / "000" / "diagnosis.json").read_text())
+    told = told["anchored@calibrated"]["recordings"]
     assert {row["label"]: row["told"] for row in rows} == {r["label"]: r["state"] for r in told}
     assert "crashed" not in {row["told"] for row in rows}
     assert "## Smallest leak" in (folder / "report.md").read_text()
