@@ -110,6 +110,20 @@ def test_shaft_angles_that_the_twin_has_fitted_count_for_nothing():
         assert np.linalg.norm(left) < 1e-3 * np.linalg.norm(model.values)
 
 
+def test_without_the_healthy_recording_less_can_be_told(diagnoses):
+    """A healthy recording is healthy in either way. The leak that is found beside the healthy
+    recording weighs less, by many decades, against a twin whose own misfit it must exceed."""
+    rng = np.random.default_rng(0)
+    anchor = leaking_pump.record("anchor", turn=FIRST_TURN, rng=rng)
+    alone = Diagnoser(Twin(leaking_pump.rig(), [anchor]), select_faults(), anchored=False)
+    healthy = leaking_pump.record("again", None, TURN, rng)
+    assert alone(healthy, [anchor]).state == "healthy"
+    leaking = alone(leaking_pump.record("slipper", *STATES["slipper"][:1], TURN, rng), [anchor])
+    assert leaking.anchor.label == "the twin alone"
+    doubts = [d.probabilities["healthy"] for d in (leaking, diagnoses["slipper"])]
+    assert doubts[0] > 1e3 * doubts[1]
+
+
 def test_the_file_has_the_contract_s_keys(diagnoses):
     """diagnosis.json, key by key."""
     (entry,) = diagnosis_dict([diagnoses["slipper"]])["recordings"]
