@@ -22,6 +22,7 @@ from rippletwin.case.model import (
 )
 from rippletwin.case.plausibility import unusual_values
 from rippletwin.case.pressure_units import PASCALS
+from rippletwin.case.readers.layout import Layout
 from rippletwin.case.readers.registry import read_signals
 from rippletwin.case.rig_yaml import faults, find_sheet, parse_sheet
 from rippletwin.case.sheet_checks import missing_files
@@ -117,7 +118,7 @@ def _recording(folder: Path, entry: dict, rig: Rig) -> Recording:
         names = [sensor.name for sensor in rig.sensors] if kind == "spectrum" else None
         frequency_hz, spectra = tables.read_repeats(files, names)
         return Recording(**fields, frequency_hz=frequency_hz, spectra=spectra)
-    signals = read_signals(path, [sensor.name for sensor in rig.sensors])
+    signals = read_signals(path, Layout.of((sensor.name for sensor in rig.sensors), entry))
     rate = sampling_rate(path, signals, entry.get("sampling_rate_hz"))
     factor = entry.get("scale", 1.0) * PASCALS[entry.get("unit", "Pa")]
     pressure = signals.pressure if factor == 1.0 else signals.pressure * factor
