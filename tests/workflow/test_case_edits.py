@@ -1,5 +1,5 @@
-"""What runs again after an edit of rig.yaml, and what a case plans that has no faulty recording: dry
-runs over Snakemake's real records of a finished run."""
+"""What an edit of rig.yaml reruns, and what a case without a faulty recording plans: dry runs over
+Snakemake's real records of a finished run."""
 
 import re
 import shutil
