@@ -38,6 +38,13 @@ TEXTS = {
         [f"data row {LAST}, the last one: it may be cut short"],
     ),
     "a row cut short": (text(row_7="0.0001,9.5e6"), "p2", ["no number", "data row 7 (line 8)"]),
+    "the first row cut short": (text(row_1="0,9.5e6"), "p2", ["data row 1 (line 2)"]),
+    "text in the first row": (text(row_1="0,x,9.5e6"), "p1", ["'x' in data row 1"]),
+    "far down another encoding": (
+        text().encode() + "0.4,1,2°\n".encode("latin-1"),
+        "file",
+        ["0xb0 far down is not UTF-8"],
+    ),
     "a row too long": (text(row_99="0,1,2,3"), "file", ["line 100 has 4 fields, not 3"]),
     "time of 1e999": (text(row_5="1e999,9.5e6,9.5e6"), "time_s", ["inf in data row 5"]),
     "pressure of 1e999": (text(row_5="0,9.5e6,-1e999"), "p2", ["-inf in data row 5"]),

@@ -11,43 +11,10 @@ import scipy.io
 from nptdms import ChannelObject, TdmsWriter
 from scipy.io import wavfile
 
-from case_folders import RATE, refused, ripple, sheet, write_case
+from case_folders import RATE, refused, sheet, write_case
 from paths import MEASURED
+from recorder_files import ALL, NUMBERED, OTHERS, PRESSURE, TIME, duct_like, hdf5, read, same
 from rippletwin.case.load import load_case
-
-PRESSURE = ripple(0.3)  # (2, N): p1 and p2
-OTHERS = np.array([np.zeros(PRESSURE.shape[1]), 7 * PRESSURE[0]])  # channels that nobody wants
-ALL = np.array([OTHERS[0], PRESSURE[1], OTHERS[1], PRESSURE[0]])
-NUMBERED = {"channels": {"p1": 4, "p2": 2}}
-TIME = np.arange(PRESSURE.shape[1]) / RATE
-
-
-def read(folder, name, write, **entry):
-    """The recording `name`, made by `write(path)`, as a case reads it."""
-    content = sheet()
-    content["recordings"][0].update(file=name, **entry)
-    write_case(folder, content, pressure=None)
-    write(folder / name)
-    return load_case(folder).recordings[0]
-
-
-def same(recording, relative=1e-9):
-    np.testing.assert_allclose(recording.pressure, PRESSURE, rtol=relative)
-    assert recording.sampling_rate_hz == pytest.approx(RATE, rel=1e-5)  # 6 digits in some files
-
-
-def hdf5(fill):
-    def write(path):
-        with h5py.File(path, "w") as file:
-            fill(file)
-
-    return write
-
-
-def duct_like(file):
-    """As the recorder of the measured duct writes: samples by channels, another attribute."""
-    file["time_data"] = ALL.T
-    file["time_data"].attrs["sample_freq"] = RATE
 
 
 def in_groups(file):
@@ -260,125 +227,6 @@ def test_a_library_that_is_not_installed_is_named(tmp_path, monkeypatch, name, p
         monkeypatch.delitem(sys.modules, f"rippletwin.case.readers.{module}", raising=False)
     monkeypatch.setitem(sys.modules, package, None)
     refused(tmp_path, name, "file", package, "rippletwin[readers]")
-
-
-# text
-
-
-def rows(separator=",", decimal=".", end=""):
-    table = zip(TIME, *PRESSURE)
-    texts = (separator.join((f"{t:.9f}", f"{a:.1f}", f"{b:.1f}")) + end for t, a, b in table)
-    return "\n".join(text.replace(".", decimal) for text in texts)
-
-
-TEXTS = {
-    "semicolons": "time_s;p1;p2\n" + rows(";"),
-    "decimal commas": "time_s;p1;p2\n" + rows(";", ","),
-    "tabs": "time_s\tp1\tp2\n" + rows("\t"),
-    "tabs and decimal commas": "time_s\tp1\tp2\n" + rows("\t", ","),
-    "spaces": "time_s p1 p2\n" + rows("  "),
-    "spaces and decimal commas": " time_s   p1  p2\n" + rows(" ", ","),
-    "vertical bars": "time_s|p1|p2\n" + rows("|"),
-    "a separator at the end": "time_s;p1;p2;\n" + rows(";", ",", ";"),
-    "an unnamed separator at the end": "time_s;p1;p2\n" + rows(";", ",", ";"),
-    "a preamble": 'Recorder 7, pipe 3/4"\nStart: 9:30\n\nChannels: 3\ntime_s,p1,p2\n' + rows(),
-    "a row of units": "time_s;p1;p2\ns;Pa;Pa\n" + rows(";", ","),
-    "quotes": '"time_s","p1","p2"\n' + rows(),
-    "spaces after commas": "time_s, p1, p2\n" + rows(", "),
-    "Windows line ends": ("time_s;p1;p2\n" + rows(";", ",")).replace("\n", "\r\n"),
-    "a byte order mark": "\ufefftime_s;p1;p2\n" + rows(";"),
-}
-
-
-@pytest.mark.parametrize("name", TEXTS)
-def test_text_as_recorders_and_spreadsheets_write_it(tmp_path, name):
-    """Separator, decimal sign and preamble are found out without a word in rig.yaml."""
-    same(read(tmp_path, "r.csv", lambda path: path.write_bytes(TEXTS[name].encode())), 1e-6)
-
-
-def test_text_with_names_and_unit_of_its_own(tmp_path):
-    """`Time [s]`, `P1 [bar]` and a column number, in bar with decimal commas."""
-    table = zip(TIME, *(PRESSURE / 1e5))
-    text = "Time [s];P1 [bar];Outlet\n" + "\n".join(
-        f"{t:.9f};{a:.7f};{b:.7f}".replace(".", ",") for t, a, b in table
-    )
-    entry = {"time": "Time [s]", "unit": "bar", "channels": {"p1": "P1 [bar]", "p2": 3}}
-    same(read(tmp_path, "r.txt", lambda path: path.write_text(text), **entry), 1e-6)
-
-
-def test_text_without_a_header(tmp_path):
-    """Columns by number, the rate from rig.yaml."""
-    entry = {"sampling_rate_hz": RATE, "channels": {"p1": 2, "p2": 3}}
-    same(read(tmp_path, "r.csv", lambda path: path.write_text(rows(";", ",")), **entry), 1e-6)
-
-
-def test_a_bad_cell_under_decimal_commas_is_named(tmp_path):
-    """The cell as the file has it, with the file's own line behind two lines of preamble."""
-    lines = rows(";", ",").splitlines()
-    lines[4] = lines[4].rsplit(";", 1)[0] + ";over,load"
-    content = sheet()
-    content["recordings"][0].update(file="r.csv")
-    write_case(tmp_path, content, pressure=None)
-    (tmp_path / "r.csv").write_text("\n".join(["a", "b", "time_s;p1;p2", *lines]))
-    refused(tmp_path, "r.csv", "p2", "'over,load' in data row 5 is not a finite number (line 8)")
-
-
-def test_flow_ripple_with_semicolons_and_decimal_commas(tmp_path):
-    """Tables of a case are read as recordings are."""
-    angle = np.arange(360.0)
-    flow = 5e-4 + 1e-5 * np.cos(np.radians(9 * angle))
-    content = sheet()
-    content["recordings"][0]["flow_ripple"] = "q.csv"
-    write_case(tmp_path, content)
-    text = "\n".join(f"{a:g};{q:.9f}".replace(".", ",") for a, q in zip(angle, flow))
-    (tmp_path / "q.csv").write_text("angle_deg;flow_m3_s\n" + text)
-    found = load_case(tmp_path).recordings[0].flow_ripple.flow
-    np.testing.assert_allclose(found, flow, atol=1e-9)
-
-
-# what is said of a layout that is wrong
-
-WRONG = {
-    "a number too large": ({"channels": {"p1": 9, "p2": 1}}, "p1", ["4 channel(s), counted from"]),
-    "a name without names": ({"channels": {"p1": "a", "p2": 1}}, "p1", ["have no names"]),
-    "one sensor without a number": ({"channels": {"p1": 1}}, "p2", ["have no names", "number"]),
-    "too many channels": ({}, "time_data", ["4 channel(s)", "channels: {p1: 1, ...}"]),
-    "no such dataset": ({"dataset": "time_dat"}, "dataset", ["Did you mean time_data?"]),
-    "no such attribute": (
-        {"sampling_rate_name": "freq", **NUMBERED},
-        "sampling_rate_name",
-        ["freq is not in the file"],
-    ),
-}
-
-
-@pytest.mark.parametrize("name", WRONG)
-def test_layout_that_the_file_has_not(tmp_path, name):
-    """The key of rig.yaml or the sensor is named, with what the file has."""
-    entry, field, words = WRONG[name]
-    content = sheet()
-    content["recordings"][0].update({"file": "r.h5", "dataset": "time_data"} | entry)
-    write_case(tmp_path, content, pressure=None)
-    hdf5(duct_like)(tmp_path / "r.h5")
-    refused(tmp_path, "r.h5", field, *words)
-
-
-SHEETS = {
-    "counted from zero": ({"p1": 0, "p2": 1}, "channels.p1", ["from 1"]),
-    "a list": ({"p1": [1], "p2": 2}, "channels.p1", ["a whole number or text"]),
-    "no such sensor": ({"p3": 1, "p2": 2}, "channels.p3", ["no such sensor", "name of a sensor"]),
-    "one channel for two": ({"p1": 1, "p2": 1}, "channels.p2", ["the channel of p1 too"]),
-}
-
-
-@pytest.mark.parametrize("name", SHEETS)
-def test_channels_that_make_no_sense(tmp_path, name):
-    """Told from the sheet alone."""
-    channels, field, words = SHEETS[name]
-    content = sheet()
-    content["recordings"][0]["channels"] = channels
-    write_case(tmp_path, content)
-    refused(tmp_path, "rig.yaml", f"recordings[0].{field}", *words)
 
 
 DUCT = MEASURED / "duct_six_microphones" / "empty.h5"

@@ -120,6 +120,8 @@ def _wrong_type(path: Path, field: str, value, wanted: str | list[str], give: st
     problem = f"{shown(value)} is not {' or '.join(TYPES[kind] for kind in kinds)}"
     if value is None:
         problem = "nothing is given"
+    elif wanted in ("object", "array"):
+        give = f"Give {TYPES[wanted]}"
     elif wanted == "string":
         give = (
             f'Put it in quotes: "{value}"'

@@ -50,6 +50,13 @@ def read(path: Path, layout: Layout) -> Signals:
                 check_size(path, "file", rows * len(wanted))
     except InputError:
         raise
+    except UnicodeDecodeError as error:
+        raise InputError(
+            path,
+            "file",
+            f"the byte 0x{error.object[error.start]:02x} far down is not UTF-8",
+            "Save it with encoding UTF-8",
+        ) from error
     except (OSError, ValueError) as error:  # those of pandas are ValueErrors
         raise InputError(
             path,

@@ -14,6 +14,9 @@ from rippletwin.errors import InputError, raise_any
 SENSORS_BY_SAMPLES, SAMPLES_BY_SENSORS = "sensors_by_samples", "samples_by_sensors"
 UNITS = ("Pa", "kPa", "MPa", "bar", "psi")
 
+KEYS = {"rate": "sampling_rate_name"}
+"""Keys of rig.yaml that are called otherwise than the fields of a layout."""
+
 
 @dataclass(frozen=True)
 class Layout:

@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 
 from rippletwin.case.readers.file_checks import check_readable
-from rippletwin.case.readers.layout import Layout
+from rippletwin.case.readers.layout import KEYS, Layout
 from rippletwin.case.readers.signals import Signals
 from rippletwin.errors import InputError
 
@@ -25,6 +25,14 @@ MODULES = {
 }
 FOLDERS = (".zarr",)
 """Suffixes of recordings that are folders."""
+UNUSED = {
+    "csv_text": ("dataset", "orientation", "rate"),
+    "parquet": ("dataset", "orientation", "rate"),
+    "uff58": ("dataset", "orientation", "rate", "time"),
+    "wav": ("dataset", "orientation", "rate", "time"),
+    "tdms": ("orientation",),
+}
+"""What of a layout means nothing in a format."""
 EXTRAS = {"parquet": "pyarrow", "uff58": "pyuff"}
 """Readers whose library only the extra `readers` installs."""
 
@@ -43,6 +51,10 @@ def read_signals(path: Path, layout: Layout) -> Signals:
             f"no reader for {path.suffix or 'a file without a suffix'}",
             f"Give one of {', '.join(MODULES)}",
         )
+    for key in UNUSED.get(name, ()):
+        if getattr(layout, key) is not None:
+            problem = f"means nothing for a {suffix} file"
+            raise InputError(path, KEYS.get(key, key), problem, "Take it out of rig.yaml")
     if suffix not in FOLDERS:
         check_readable(path)
     try:

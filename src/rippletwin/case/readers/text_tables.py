@@ -44,6 +44,7 @@ class TextFormat:
     names      fields of its header; None where there is none
     rows_from  number of lines before the first row of numbers; None where there are no rows
     columns    fields of a row
+    width      the same with the empty field of a separator at the end of the line
     """
 
     separator: str
@@ -51,6 +52,7 @@ class TextFormat:
     names: list[str] | None
     rows_from: int | None
     columns: int
+    width: int
 
     @cached_property
     def options(self) -> dict:
@@ -59,6 +61,8 @@ class TextFormat:
             "sep": r"\s+" if self.separator == " " else self.separator,
             "decimal": self.decimal,
             "header": None,
+            "names": range(self.width),
+            "index_col": False,
             "skipinitialspace": True,
         }
 
@@ -96,7 +100,8 @@ def _tried(
     tried = [] if first is None else [row for row in rows[first:] if any(row)][:ROWS_TRIED]
     count = len(tried[0]) if names is None else len(names)
     good = sum(_is_numeric(_whole(row, count), decimal) and bool(tried) for row in tried)
-    form = TextFormat(separator, decimal, names, first, count)
+    width = max([count, *(len(row) for row in tried if _whole(row, count))])
+    form = TextFormat(separator, decimal, names, first, count, width)
     return (named is not None, good / max(len(tried), 1), count), form
 
 
