@@ -69,9 +69,9 @@ def ask_networks(
     """
     return {
         recording.label: {
-            name: judge_windows(kept, _windows(recording, rig, kept.samples_per_revolution))
+            name: judge_windows(kept, windows_of(recording, rig, kept.samples_per_revolution))
             for name, kept in networks.items()
-            if not _apart(recording, kept)
+            if is_at_their_point(recording, kept)
         }
         for recording in recordings
     }
@@ -90,12 +90,12 @@ def judge_windows(kept: KeptNetworks, windows: np.ndarray) -> dict:
     return {"state": state, "share": share, "unlike": unlike}
 
 
-def _windows(recording: Recording, rig: Rig, samples: int) -> np.ndarray:
+def windows_of(recording: Recording, rig: Rig, samples: int) -> np.ndarray:
     """Windows (R, S, M) of one revolution each, without their means."""
     return remove_mean(revolutions_of(recording, rig, samples).windows)
 
 
-def _apart(recording: Recording, kept: KeptNetworks) -> float:
-    """Distance of the operating points of a recording and of networks."""
+def is_at_their_point(recording: Recording, kept: KeptNetworks) -> bool:
+    """Whether a recording has the operating point at which networks have learnt."""
     speed_hz = recording.speed_rpm / 60.0
-    return distance(speed_hz, kept.speed_hz, recording.load_pressure, kept.load_pressure)
+    return not distance(speed_hz, kept.speed_hz, recording.load_pressure, kept.load_pressure)
