@@ -45,7 +45,12 @@ TEXTS = {
         "file",
         ["0xb0 far down is not UTF-8"],
     ),
-    "a row too long": (text(row_99="0,1,2,3"), "file", ["line 100 has 4 fields, not 3"]),
+    "a row too long": (text(row_7="0,1,2,3"), "line 8", ["4 fields under a header of 3"]),
+    "a row too long far down": (
+        text(row_999="0,1,2,3"),
+        "file",
+        ["line 1000 has 4 fields, not 3"],
+    ),
     "time of 1e999": (text(row_5="1e999,9.5e6,9.5e6"), "time_s", ["inf in data row 5"]),
     "pressure of 1e999": (text(row_5="0,9.5e6,-1e999"), "p2", ["-inf in data row 5"]),
     "one row": (text(rows=GOOD[1:2]), "time_s", ["1 row(s) only"]),

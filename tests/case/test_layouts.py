@@ -1,6 +1,7 @@
 """Files as recorders write them are read by what rig.yaml says of them: the pressures that come in
 are those that were written."""
 
+import shutil
 import sys
 
 import h5py
@@ -12,7 +13,7 @@ from nptdms import ChannelObject, TdmsWriter
 from scipy.io import wavfile
 
 from case_folders import RATE, refused, sheet, write_case
-from paths import MEASURED
+from paths import MEASURED, ROOT
 from recorder_files import ALL, NUMBERED, OTHERS, PRESSURE, TIME, duct_like, hdf5, read, same
 from rippletwin.case.load import load_case
 
@@ -235,29 +236,7 @@ DUCT = MEASURED / "duct_six_microphones" / "empty.h5"
 @pytest.mark.skipif(not DUCT.exists(), reason="no measurements beside the repository")
 def test_the_measured_duct_is_read_by_rig_yaml_alone(tmp_path):
     """Six microphones of the recorder's own file, unconverted: the file's own samples."""
-    places = (0, 0.415, 0.5, 1.6, 1.685, 2.1)
-    content = {
-        "fluid": {
-            "density": 1.2,
-            "kinematic_viscosity": 1.5e-5,
-            "heat_capacity_ratio": 1.4,
-            "prandtl": 0.71,
-        },
-        "line": {"segments": [{"length": 2.5, "diameter": 0.1, "wave_speed": 343.0}]},
-        "sensors": [{"name": f"m{k}", "position": x} for k, x in enumerate(places, 1)],
-        "load": {"kind": "anechoic"},
-        "recordings": [
-            {
-                "file": "empty.h5",
-                "kind": "random",
-                "state": "healthy",
-                "dataset": "time_data",
-                "sampling_rate_name": "sample_freq",
-                "channels": {f"m{k}": k for k in range(1, 7)},
-            }
-        ],
-    }
-    write_case(tmp_path, content, pressure=None)
+    shutil.copy(ROOT / "resources" / "duct" / "rig.yaml", tmp_path)
     (tmp_path / "empty.h5").symlink_to(DUCT)
     (recording,) = load_case(tmp_path).recordings
     with h5py.File(DUCT) as file:

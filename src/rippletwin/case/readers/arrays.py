@@ -23,14 +23,14 @@ from rippletwin.errors import InputError, raise_any
 class ArrayFile:
     """An open file of named arrays.
 
-    present    names of what it holds, for messages and suggestions
+    present    names of what it holds, for messages; asked for only where something is missing
     array      name -> its numbers, None where it has none of that name
     attribute  (array's name, attribute's name) -> value, None where there is none
     separator  between the parts of a nested name
     """
 
     path: Path
-    present: Sequence[str]
+    present: Callable[[], Sequence[str]]
     array: Callable[[str], np.ndarray | None]
     attribute: Callable[[str, str], object]
     separator: str = "/"
@@ -45,12 +45,12 @@ def read_arrays(file: ArrayFile, layout: Layout) -> Signals:
         names = None if names is None else [_text(one) for one in np.ravel(names)]
         pressure = rows_of(file.path, name, array, layout, names)
     elif layout.dataset is not None:
-        raise missing_name(file.path, "dataset", name, file.present)
+        raise missing_name(file.path, "dataset", name, file.present())
     else:
         pressure, name = _vectors(file, layout), ""
     time = _beside(file, name, layout.time_name)
     if time is None and layout.time is not None:
-        raise missing_name(file.path, "time", layout.time, file.present)
+        raise missing_name(file.path, "time", layout.time, file.present())
     return Signals(
         pressure=pressure,
         sampling_rate_hz=_rate(file, layout, name),
@@ -62,16 +62,18 @@ def _vectors(file: ArrayFile, layout: Layout) -> np.ndarray:
     """The sensors' own vectors as rows (S, N)."""
     found = {s: file.array(str(layout.channel(s))) for s in layout.sensors}
     missing = [sensor for sensor, vector in found.items() if vector is None]
-    near = any(similar_name(str(layout.channel(s)), file.present) for s in missing)
-    if missing and len(missing) == len(found) and not near:
-        raise InputError(
-            file.path,
-            "pressure",
-            f"no such array; the file has {', '.join(file.present) or 'nothing'}",
-            "Say in rig.yaml which one holds the pressure: dataset: "
-            f"{file.present[0] if file.present else 'NAME'}",
-        )
-    raise_any(missing_sensor(file.path, layout, sensor, file.present) for sensor in missing)
+    if missing:
+        present = list(file.present())
+        near = any(similar_name(str(layout.channel(s)), present) for s in missing)
+        if len(missing) == len(found) and not near:
+            raise InputError(
+                file.path,
+                "pressure",
+                f"no such array; the file has {', '.join(present) or 'nothing'}",
+                "Say in rig.yaml which one holds the pressure: dataset: "
+                f"{present[0] if present else 'NAME'}",
+            )
+        raise_any(missing_sensor(file.path, layout, sensor, present) for sensor in missing)
     lengths = {sensor: vector.size for sensor, vector in found.items()}
     if len(set(lengths.values())) > 1:
         problem = f"lengths {lengths} differ"
@@ -86,7 +88,7 @@ def _rate(file: ArrayFile, layout: Layout, beside: str) -> float | None:
     if value is None:
         value = _beside(file, beside, layout.rate_name)
     if value is None and layout.rate is not None:
-        raise missing_name(file.path, "sampling_rate_name", layout.rate, file.present)
+        raise missing_name(file.path, "sampling_rate_name", layout.rate, file.present())
     return one_number(file.path, layout.rate_name, value)
 
 

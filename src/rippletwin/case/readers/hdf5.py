@@ -25,7 +25,7 @@ def read(path: Path, layout: Layout) -> Signals:
             return read_arrays(
                 ArrayFile(
                     path,
-                    datasets_in(file),
+                    lambda: datasets_in(file),
                     lambda name: read_dataset(path, file, name),
                     lambda beside, name: read_attribute(path, file, beside, name),
                 ),

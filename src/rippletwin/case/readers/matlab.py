@@ -57,14 +57,13 @@ def _read_v5(path: Path, layout: Layout) -> Signals:
             value = getattr(value, field, None)
         return None if value is None else numbers(path, name, value)
 
-    present = [
-        f"{name}.{field}"
-        for name, (_, kind) in variables.items()
-        if kind in STRUCTS
-        for field in _fields_of(path, name)
-    ]
-    plain = [name for name, (_, kind) in variables.items() if kind not in STRUCTS]
-    return read_arrays(ArrayFile(path, plain + present, array, _no_attribute, "."), layout)
+    def present() -> list[str]:
+        kinds = {name: kind for name, (_, kind) in variables.items()}
+        plain = [name for name, kind in kinds.items() if kind not in STRUCTS]
+        structs = [name for name, kind in kinds.items() if kind in STRUCTS]
+        return plain + [f"{name}.{field}" for name in structs for field in _fields_of(path, name)]
+
+    return read_arrays(ArrayFile(path, present, array, _no_attribute, "."), layout)
 
 
 def _fields_of(path: Path, struct: str) -> list[str]:
@@ -75,11 +74,10 @@ def _fields_of(path: Path, struct: str) -> list[str]:
 def _read_v73(path: Path, layout: Layout) -> Signals:
     """A file of v7.3, which is HDF5."""
     with h5py.File(path, "r") as file:
-        present = [name.replace("/", ".") for name in datasets_in(file)]
         return read_arrays(
             ArrayFile(
                 path,
-                present,
+                lambda: [name.replace("/", ".") for name in datasets_in(file)],
                 lambda name: read_dataset(path, file, name.replace(".", "/")),
                 _no_attribute,
                 ".",

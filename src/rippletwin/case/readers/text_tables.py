@@ -22,7 +22,7 @@ import pandas as pd
 from rippletwin.errors import InputError
 
 HEAD_BYTES = 65536
-HEAD_LINES = 60  # lines in which the header and the first rows are looked for
+HEAD_LINES = 200  # lines in which the header and the first rows are looked for
 ROWS_TRIED = 20
 MOST_UNIT_ROWS = 2  # between header and numbers: units, channel numbers in words
 NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "vertical bars", " ": "spaces"}

@@ -38,7 +38,7 @@ def read(path: Path, layout: Layout) -> Signals:
             holders = [arrays[beside], store] if beside in arrays else [store]
             return next((h.attrs[name] for h in holders if name in h.attrs), None)
 
-        return read_arrays(ArrayFile(path, list(arrays), array, attribute), layout)
+        return read_arrays(ArrayFile(path, lambda: list(arrays), array, attribute), layout)
     except InputError:
         raise
     except Exception as error:  # zarr raises many kinds for a damaged store
