@@ -60,6 +60,7 @@ def verdict_dict(explanation: Explanation) -> dict:
         "fit": _fit_scores(e),
         "without": [asdict(sensitivity) for sensitivity in e.prior_sensitivity],
         "pump": pump_intervals(decision.accepted),
+        "warnings": list(e.warnings),
         "sentence": "",
     }
     result["sentence"] = summary_text(e, result, entries)
