@@ -58,6 +58,14 @@ def test_imports_inside_functions_count(house, tmp_path):
     assert house.imports(package) == {"one": {"two"}, "two": set()}
 
 
+def test_rule_graph_shows_the_rules_of_a_run(monkeypatch):
+    """docs/figures/rule_graph.svg names the rules that the smoke run plans; else run
+    `python docs/figures/rule_graph.py` again."""
+    monkeypatch.syspath_prepend(FIGURES)
+    graph = script("rule_graph")
+    assert graph.rules_drawn(graph.PICTURE.read_text()) == set(graph.needs())
+
+
 def test_steps_of_explain_are_its_modules():
     """docs/explanation/explain.md has one numbered step a module of src/rippletwin/explanation,
     numbered without a gap."""

@@ -6,7 +6,13 @@ rule calibrate:
         source=scripts_sources("calibrate.py"),
     output:
         twin=f"{RESULTS}/calibration/twin.json",
-        report=f"{RESULTS}/calibration/report.md",
+        report=report(
+            f"{RESULTS}/calibration/report.md",
+            category="Calibration",
+            subcategory="Tables",
+            labels={"result": "parameters and misfits"},
+            caption="../report/calibration_table.rst",
+        ),
         ripples=directory(f"{RESULTS}/calibration/ripples.zarr"),
     log:
         f"{RESULTS}/logs/calibrate.log",

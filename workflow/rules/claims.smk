@@ -8,14 +8,24 @@ rule claims:
     output:
         table=report(
             f"{RESULTS}/claims.csv",
-            category="claims",
+            category="Claims of the paper",
+            subcategory="Tables",
+            labels={"result": "claims"},
             caption="../report/claims.rst",
         ),
-        comparisons=f"{RESULTS}/claims_compared.csv",
+        comparisons=report(
+            f"{RESULTS}/claims_compared.csv",
+            category="Claims of the paper",
+            subcategory="Tables",
+            labels={"result": "comparisons"},
+            caption="../report/claims_compared.rst",
+        ),
         page=f"{RESULTS}/claims.md",
         png=report(
             f"{RESULTS}/figures/claims.png",
-            category="claims",
+            category="Claims of the paper",
+            subcategory="Figures",
+            labels={"result": "claims"},
             caption="../report/claims.rst",
         ),
         svg=f"{RESULTS}/figures/claims.svg",
@@ -40,12 +50,16 @@ rule compare_sst:
     output:
         table=report(
             f"{RESULTS}/similarity.csv",
-            category="simulated signals",
+            category="Simulated signals",
+            subcategory="Tables",
+            labels={"result": "similarity of the images"},
             caption="../report/similarity.rst",
         ),
         png=report(
             f"{RESULTS}/figures/sst_compared.png",
-            category="simulated signals",
+            category="Simulated signals",
+            subcategory="Synchrosqueezed images",
+            labels={"result": "recorded and simulated"},
             caption="../report/similarity.rst",
         ),
         svg=f"{RESULTS}/figures/sst_compared.svg",

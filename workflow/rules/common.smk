@@ -8,7 +8,6 @@ import pandas as pd
 from snakemake.exceptions import WorkflowError
 from snakemake.utils import validate
 
-ROOT = Path(workflow.basedir)
 sys.path[:0] = [str(ROOT / "workflow"), str(ROOT / "src")]
 
 from config_errors import (
@@ -113,6 +112,11 @@ def of_domain(domain):
     """The configured networks on time windows, or on images."""
     names = config["architectures"]
     return [name for name in names if ARCHITECTURES[name].domain == domain]
+
+
+def in_words(name):
+    """A figure's file name as a label of the report."""
+    return name.removeprefix("explain_").replace("_", " ")
 
 
 def scripts_sources(script):

@@ -8,11 +8,19 @@ rule diagnose:
         faults=[name for name in config["faults"]["files"] if name.endswith(".py")],
         source=scripts_sources("diagnose.py"),
     output:
-        diagnosis=f"{RESULTS}/diagnosis/diagnosis.json",
+        diagnosis=report(
+            f"{RESULTS}/diagnosis/diagnosis.json",
+            category="Diagnosis by the twin",
+            subcategory="Data",
+            labels={"result": "diagnosis of every recording"},
+            caption="../report/diagnosis.rst",
+        ),
         figures=report(
             directory(f"{RESULTS}/diagnosis/figures"),
             patterns=["{name}.png"],
-            category="diagnosis by the twin",
+            category="Diagnosis by the twin",
+            subcategory="Figures",
+            labels=lambda wildcards: {"result": in_words(wildcards.name)},
             caption="../report/diagnose.rst",
         ),
     log:

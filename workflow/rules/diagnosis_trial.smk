@@ -99,13 +99,17 @@ rule report_diagnosis_trial:
     output:
         page=report(
             f"{TRIAL}/report.md",
-            category="diagnosis trial",
+            category="Diagnosis trial",
+            subcategory="Tables",
+            labels={"result": "scores"},
             caption="../report/diagnosis_trial.rst",
         ),
         figures=report(
             directory(f"{TRIAL}/figures"),
             patterns=["{name}.png"],
-            category="diagnosis trial",
+            category="Diagnosis trial",
+            subcategory="Figures",
+            labels=lambda wildcards: {"result": in_words(wildcards.name)},
             caption="../report/diagnosis_trial.rst",
         ),
     log:

@@ -6,12 +6,20 @@ rule explain:
         effects=config["explain"]["effects"],
         source=scripts_sources("explain.py"),
     output:
-        verdict=f"{RESULTS}/explain/verdict.json",
+        verdict=report(
+            f"{RESULTS}/explain/verdict.json",
+            category="Missing physics",
+            subcategory="Data",
+            labels={"result": "verdict"},
+            caption="../report/verdict.rst",
+        ),
         twin=f"{RESULTS}/explain/twin.json",
         figures=report(
             directory(f"{RESULTS}/explain/figures"),
             patterns=["{name}.png"],
-            category="missing physics",
+            category="Missing physics",
+            subcategory="Figures",
+            labels=lambda wildcards: {"result": in_words(wildcards.name)},
             caption="../report/explain.rst",
         ),
     log:

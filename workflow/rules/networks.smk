@@ -36,7 +36,9 @@ rule unlike_table:
     output:
         page=report(
             f"{RESULTS}/unlike.md",
-            category="accuracy",
+            category="Accuracy",
+            subcategory="Tables",
+            labels={"result": "recordings unlike the simulations"},
             caption="../report/unlike.rst",
         ),
     log:

@@ -17,7 +17,9 @@ rule accuracy_table:
     output:
         table=report(
             f"{RESULTS}/accuracy.csv",
-            category="accuracy",
+            category="Accuracy",
+            subcategory="Tables",
+            labels={"result": "accuracy beside the paper's"},
             caption="../report/accuracy.rst",
         ),
         page=f"{RESULTS}/accuracy.md",
@@ -48,7 +50,9 @@ rule recording_table:
     output:
         table=report(
             f"{RESULTS}/recordings.csv",
-            category="accuracy",
+            category="Accuracy",
+            subcategory="Tables",
+            labels={"result": "recording by recording"},
             caption="../report/recordings.rst",
         ),
         page=f"{RESULTS}/recordings.md",
@@ -73,7 +77,9 @@ rule report_cost:
     output:
         report(
             f"{RESULTS}/cost_of_missing_physics.md",
-            category="accuracy",
+            category="Accuracy",
+            subcategory="Tables",
+            labels={"result": "cost of missing physics"},
             caption="../report/cost.rst",
         ),
     log:
@@ -102,7 +108,9 @@ rule report_page:
     output:
         report(
             f"{RESULTS}/report.html",
-            category="summary",
+            category="Summary",
+            subcategory="Page",
+            labels={"result": "everything on one page"},
             caption="../report/page.rst",
         ),
     log:

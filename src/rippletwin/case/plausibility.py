@@ -141,8 +141,9 @@ def _compared(path: Path, sheet: dict) -> Iterator[tuple[list[InputError], list[
     ranges = GAS if "heat_capacity_ratio" in mapping(sheet, "fluid") else LIQUID
     for field, value in leaves(sheet):
         allowed = ranges.get(re.sub(r"\[\d+\]", "", field))
-        good = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if allowed is None or not good or not math.isfinite(value):
+        if not isinstance(value, (int, float)) or isinstance(value, bool):
+            continue
+        if allowed is None or not math.isfinite(value):
             continue
         # what is not above zero where it must be is the schema's matter
         if (value == 0 and allowed.zero) or (value <= 0 and allowed.possible[0] > 0):

@@ -79,7 +79,7 @@ def _sensor_errors(path: Path, sheet: dict) -> Iterator[InputError]:
 def _recording_errors(path: Path, sheet: dict) -> Iterator[InputError]:
     names = [sensor.get("name") for sensor in entries(sheet, "sensors")]
     load_kind = mapping(sheet, "load").get("kind")
-    reported = set()
+    reported: set[tuple[str, bool]] = set()
     for index, entry in enumerate(entries(sheet, "recordings")):
         field = f"recordings[{index}]"
         kind = entry.get("kind", "periodic")
@@ -94,8 +94,8 @@ def _recording_errors(path: Path, sheet: dict) -> Iterator[InputError]:
         if low is not None and high is not None and low >= high:
             problem = f"{low:g} Hz is not below max_frequency_hz, {high:g} Hz"
             yield InputError(path, f"{field}.min_frequency_hz", problem, "Correct one of them")
-        if kind == "random" and len(names) == 1 and "random" not in reported:
-            reported.add("random")
+        if kind == "random" and len(names) == 1 and ("random", True) not in reported:
+            reported.add(("random", True))
             yield InputError(
                 path, "sensors", "one sensor only", "A random recording needs two or more"
             )

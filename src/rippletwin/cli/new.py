@@ -153,7 +153,7 @@ def _ask(given: dict) -> None:
         kind = CheckedValue("cSt", lambda text: options.number(str(text), "viscosity", "cSt"))
         question = f"Viscosity at {given['temperature']:g} °C, cSt"
         given["viscosity"] = _prompt(question, kind)
-    for key, question, kind in (
+    for key, question, read in (
         ("segments", "Segment: length,bore,wall in mm, pump first", _segment),
         ("sensors", "Sensor: name,mm from the pump outlet", _sensor),
         ("recordings", "Recording: file,state,r/min,bar", _recording),
@@ -161,7 +161,7 @@ def _ask(given: dict) -> None:
         if given[key]:
             continue
         found: list = []
-        while (one := _prompt(f"{question} (empty: no more)", CheckedValue("", kind), "")) != "":
+        while (one := _prompt(f"{question} (empty: no more)", CheckedValue("", read), "")) != "":
             found.append(one)
         given[key] = tuple(found)
 
@@ -208,7 +208,7 @@ def _sheet(given: dict) -> NewSheet:
         viscosity=viscosity * CST,
         temperature=f"at {given['temperature']:g} °C",
         pistons=given["pistons"],
-        segments=[_new_segment(*segment, density, modulus) for segment in given["segments"]],
+        segments=[_new_segment(segment, density, modulus) for segment in given["segments"]],
         sensors=dict(given["sensors"]),
         load=given["load"],
         coefficient=coefficient,
@@ -219,10 +219,11 @@ def _sheet(given: dict) -> NewSheet:
     )
 
 
-def _new_segment(length, bore, wall, material, speed, density, modulus) -> NewSegment:
+def _new_segment(segment: tuple, density: float, modulus: float) -> NewSegment:
     """A segment with the wave speed that was measured, or follows from oil, bore and wall."""
     from rippletwin.case.new_sheet import NewSegment
 
+    length, bore, wall, material, speed = segment
     if speed is not None:
         return NewSegment(length, bore, speed, "measured", measured=True)
     stiffness = YOUNGS_MODULUS[material or "steel"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -89,7 +89,7 @@ def export_twin(twin: Twin, covariance: np.ndarray | None, path: str | Path) -> 
     return path
 
 
-def _write_csv(path: Path, columns: dict[str, Sequence]) -> None:
+def _write_csv(path: Path, columns: Mapping[str, np.ndarray]) -> None:
     """Columns of equal length under their names; numbers keep all their digits."""
     rows: Iterable = zip(*(np.asarray(column).tolist() for column in columns.values()))
     with open(path, "w", newline="", encoding="utf-8") as file:

@@ -39,7 +39,8 @@ def _mean(mean: float, sd: float) -> Cell:
 
 def timing_table(folder: str | Path) -> Table:
     """Jobs, seconds and largest memory of each rule, of the benchmark files below `folder`."""
-    folder, rules = Path(folder), {}
+    folder = Path(folder)
+    rules: dict[str, list[tuple[float, float]]] = {}
     for path in sorted(folder.rglob("*.tsv")):
         with path.open(newline="") as file:
             for row in csv.DictReader(file, delimiter="\t"):

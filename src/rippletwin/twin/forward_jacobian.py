@@ -208,10 +208,10 @@ class DifferentiableForward(ForwardModel):
 
         n, load, shape = len(rig.line), twin.index.get("load"), (count, len(self.s))
         v = Arrays(
-            wave_speeds=[value(k) for k in range(n)],
-            diameters=[value(n + k) for k in range(n)],
-            lengths=[value(2 * n + k) for k in range(n)],
-            positions=base.sensor_positions,
+            wave_speeds=np.array([value(k) for k in range(n)]),
+            diameters=np.array([value(n + k) for k in range(n)]),
+            lengths=np.array([value(2 * n + k) for k in range(n)]),
+            positions=np.asarray(base.sensor_positions),
             viscosity=value(twin.index["viscosity"]),
             load=1.0 if load is None else value(load),
             reflection=twin.reflection(coordinates),

@@ -73,7 +73,7 @@ class ForwardModel:
             self.load_impedance = _interpolate(
                 self.frequency_hz, rig.load.frequency_hz, rig.load.impedance
             )
-        self._series_cache = {}
+        self._series_cache: dict[int, tuple] = {}
         self._orifice = None
         self._ripples = [point.ripple for point in points]
         self._periodic = [r for r, ripple in enumerate(self._ripples) if ripple is not None]
@@ -158,7 +158,7 @@ class ForwardModel:
                 effect.apply(network, state, values, place)
         return network
 
-    def _state_factor(self, theta: np.ndarray) -> np.ndarray:
+    def _state_factor(self, theta: np.ndarray) -> np.ndarray | float:
         """What the state of each recording makes of shunt admittances, (..., F); `theta` may be
         (P, B)."""
         if not self.twin.changing_state:

@@ -107,7 +107,7 @@ def line_in_time(
         load_resistance=resistance,
         heat_capacity_ratio=rig.fluid.heat_capacity_ratio,
         prandtl=rig.fluid.prandtl,
-        mean_flow=nominal,
+        mean_flow=np.array(nominal),
         load_passes_flow=rig.load.passes_flow,
     )
     for effect, place, values in twin.effect_values(twin.theta):

@@ -132,7 +132,7 @@ class Twin:
         self.theta = np.zeros(len(self.parameters)) if theta is None else np.asarray(theta, float)
         if self.theta.shape != (len(self.parameters),):
             raise ValueError(f"theta must have {len(self.parameters)} entries")
-        self._ripples = {}
+        self._ripples: dict = {}
 
     # parameters and their values
 
