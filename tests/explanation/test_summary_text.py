@@ -137,3 +137,14 @@ def test_an_unknown_load_and_uncalibrated_sensors_are_told():
     (said,) = _sensors({"m2": {"gain": {"value": 1.12}, "phase": {"value": 0.1}}})
     assert "m2 1.120 (phase +5.7 deg)" in said
     assert _load(None) == [] and _sensors({}) == []
+
+
+def test_numbers_up_to_a_million_have_no_power_of_ten():
+    """A resonance is at 3000 Hz, not at 3e+03 Hz; 1.3 GPa keeps its power."""
+    pump = {
+        "frequency": {"value": 3004.0, "ci95": [2998.0, 3010.0], "sheet": 2500.0, "unit": "Hz"},
+        "bulk_modulus": {"value": 1.3e9, "ci95": [1.2e9, 1.4e9], "sheet": 1.7e9, "unit": "Pa"},
+    }
+    sentence = summarise("consistent", pump=pump)
+    assert "frequency 3000 Hz (data sheet 2500)" in sentence
+    assert "bulk modulus 1.3e+09 Pa (data sheet 1.7e+09)" in sentence

@@ -17,6 +17,7 @@ from rippletwin.explanation.verdict.places import element_and_extent, join_words
 SAME_PRESSURE = 0.05  # relative; mean pressures closer than this count as one
 SOURCE_FREE_SHARE = 0.2  # of the evidence that must remain if the source is unknown
 RIPPLE_ERROR_RATIO = 3.0
+LARGEST_PLAIN = 1e6  # larger numbers are written with a power of ten
 """Misfit over model error from which nearly all of the misfit is an error of the pump's ripple: the
 rest, a tenth in power, is the model error."""
 OPENINGS = {
@@ -200,14 +201,21 @@ def _parameter(name: str, parameter: dict) -> str:
     low, high = parameter["ci95"]
     unit = "" if parameter["unit"] == "1" else f" {parameter['unit']}"
     name = _words(name).capitalize()
-    return f"{name}: {parameter['value']:.3g}{unit} (95 % interval {low:.3g} to {high:.3g})."
+    value, low, high = map(_number, (parameter["value"], low, high))
+    return f"{name}: {value}{unit} (95 % interval {low} to {high})."
+
+
+def _number(value: float) -> str:
+    """Three digits, without a power of ten up to a million: 3000, not 3e+03."""
+    text = f"{value:.3g}"
+    return f"{float(text):.0f}" if "e+" in text and abs(value) < LARGEST_PLAIN else text
 
 
 def _pump(parameters: dict) -> list[str]:
     """The pump's parameters whose intervals exclude the data sheet's value."""
     off = [
-        f"{_words(name)} {p['value']:.3g}{'' if p['unit'] == '1' else ' ' + p['unit']} (data sheet "
-        f"{p['sheet']:.3g})"
+        f"{_words(name)} {_number(p['value'])}{'' if p['unit'] == '1' else ' ' + p['unit']} (data "
+        f"sheet {_number(p['sheet'])})"
         for name, p in parameters.items()
         if not p["ci95"][0] <= p["sheet"] <= p["ci95"][1]
     ]
@@ -218,8 +226,8 @@ def _data_sheet_rivals(e: Explanation) -> list[str]:
     """Fits without an effect that only the data sheet rejects."""
     return [
         f"Without {_words(s.effect)} the line would fit to {s.misfit:.1%} with {s.parameter} at "
-        f"{s.value:.3g} {s.unit}. That is {s.pull:.0f} standard deviations from the data sheet, "
-        "and only the data sheet rejects it."
+        f"{_number(s.value)} {s.unit}. That is {s.pull:.0f} standard deviations from the data "
+        "sheet, and only the data sheet rejects it."
         for s in e.prior_sensitivity
         if s.rivals and s.pull > PULL_ALARM
     ]

@@ -68,6 +68,7 @@ def verdict_dict(explanation: Explanation) -> dict:
         "pump": pump_intervals(decision.accepted),
         "load": None if curve is None else curve.as_dict(),
         "sensors": sensor_intervals(decision.accepted),
+        "warnings": list(e.warnings),
         "sentence": "",
     }
     result["sentence"] = summary_text(e, result, entries)
