@@ -42,7 +42,7 @@ def read_arrays(file: ArrayFile, layout: Layout) -> Signals:
     array = file.array(name)
     if array is not None:
         names = file.attribute(name, "sensors")
-        names = None if names is None else [_text(one) for one in np.ravel(names)]
+        names = None if names is None else [_text(one) for one in np.ravel(np.asarray(names))]
         pressure = rows_of(file.path, name, array, layout, names)
     elif layout.dataset is not None:
         raise missing_name(file.path, "dataset", name, file.present())

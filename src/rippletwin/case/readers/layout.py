@@ -165,10 +165,10 @@ def missing_sensor(
     path: Path, layout: Layout, sensor: str, present: Iterable[object]
 ) -> InputError:
     """The error for a file that lacks the channel of a sensor, by name."""
-    present = [str(other) for other in present]
+    known = [str(other) for other in present]
     name = str(layout.channel(sensor))
-    found = ", ".join(present) or "nothing"
-    near = similar_name(name, present)
+    found = ", ".join(known) or "nothing"
+    near = similar_name(name, known)
     hint = "Add it to the file"
     if near:
         quoted = near if near.replace("_", "").isalnum() else repr(near)

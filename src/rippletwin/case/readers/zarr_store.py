@@ -22,7 +22,8 @@ def read(path: Path, layout: Layout) -> Signals:
     """Read a recording in a zarr store, a folder; raises InputError."""
     try:
         store = zarr.open_group(path, mode="r")
-        arrays = {name: item for name, item in store.members(max_depth=4) if _is_array(item)}
+        members = store.members(max_depth=4)
+        arrays = {name: item for name, item in members if isinstance(item, zarr.Array)}
 
         def array(name: str) -> np.ndarray | None:
             item = arrays.get(name)
@@ -35,7 +36,9 @@ def read(path: Path, layout: Layout) -> Signals:
             return numbers(path, name, item[...])
 
         def attribute(beside: str, name: str):
-            holders = [arrays[beside], store] if beside in arrays else [store]
+            holders: list[zarr.Array | zarr.Group] = [store]
+            if beside in arrays:
+                holders.insert(0, arrays[beside])
             return next((h.attrs[name] for h in holders if name in h.attrs), None)
 
         return read_arrays(ArrayFile(path, lambda: list(arrays), array, attribute), layout)
@@ -48,7 +51,3 @@ def read(path: Path, layout: Layout) -> Signals:
             f"cannot be read, or is no zarr store ({error})",
             "Copy it again from where it was recorded",
         ) from error
-
-
-def _is_array(item: object) -> bool:
-    return isinstance(item, zarr.Array)
