@@ -60,6 +60,10 @@ NOT_RUN = {
         "the measurements are not part of the project",
         "python benchmarks/measured_tube.py --help",
     ),
+    "python benchmarks/measured_duct.py MEASURED duct": (
+        "the measurements are not part of the project",
+        "python benchmarks/measured_duct.py --help",
+    ),
     "python benchmarks/flow_sensor_truth.py flow_truth": (
         HOURS,
         "python benchmarks/flow_sensor_truth.py --help",

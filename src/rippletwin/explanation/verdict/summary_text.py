@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from rippletwin.explanation.checks.alarms import largest_pull
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders
 from rippletwin.explanation.localise.source_free_fits import compare_evidence
@@ -61,6 +63,8 @@ def summary_text(e: Explanation, result: dict, entries: Sequence[dict]) -> str:
     if entries:
         sentences += _ripple_error(result["fit"])
     sentences += _pump(result["pump"])
+    sentences += _load(result["load"])
+    sentences += _sensors(result["sensors"])
     sentences += _shaft_orders(e.shaft_orders)
     sentences += _drift(e)
     sentences += _pulls(e, is_off_data_sheet=verdict == "calibration_only" and not e.alarms.raised)
@@ -95,6 +99,27 @@ def _named(e: Explanation, result: dict, entries: Sequence[dict]) -> list[str]:
         classes = "; ".join(join_words(names) for names in result["equivalents"])
         sentences.append(f"These recordings cannot discriminate between {classes}.")
     return sentences
+
+
+def _load(load: dict | None) -> list[str]:
+    """How much an unknown load reflects, over the observed band."""
+    if load is None:
+        return []
+    parts, frequency_hz = load["reflection"], load["frequency_hz"]
+    size = np.hypot(parts["re"], parts["im"])
+    said = [
+        f"{size[k]:.2f} at {frequency_hz[k]:.0f} Hz" for k in (0, len(size) // 2, len(size) - 1)
+    ]
+    return [f"The unknown load reflects {join_words(said)} of a wave's amplitude."]
+
+
+def _sensors(sensors: Mapping[str, dict]) -> list[str]:
+    """Gains and phases of uncalibrated sensors."""
+    said = [
+        f"{name} {one['gain']['value']:.3f} (phase {np.rad2deg(one['phase']['value']):+.1f} deg)"
+        for name, one in sensors.items()
+    ]
+    return [f"Gains of the sensors: {join_words(said)}."] if said else []
 
 
 def _level(levels: Mapping[tuple[str, str], str], entry: dict) -> str:
