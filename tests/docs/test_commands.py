@@ -45,6 +45,7 @@ NOT_RUN = {
         NETWORK,
         "python -m pip install --help && test -s environment.txt",
     ),
+    "pip install 'rippletwin[readers]'": (NETWORK, "python -m pip install --help"),
     "pip install snakemake-executor-plugin-slurm": (NETWORK, "python -m pip install --help"),
     "apptainer build rippletwin.sif workflow/rippletwin.def": (
         CLUSTER,
@@ -58,6 +59,10 @@ NOT_RUN = {
     "python benchmarks/measured_tube.py RUN_1 RUN_2 tube": (
         "the measurements are not part of the project",
         "python benchmarks/measured_tube.py --help",
+    ),
+    "python benchmarks/measured_duct.py MEASURED duct": (
+        "the measurements are not part of the project",
+        "python benchmarks/measured_duct.py --help",
     ),
     "python benchmarks/flow_sensor_truth.py flow_truth": (
         HOURS,

@@ -34,7 +34,7 @@ rule claims:
     benchmark:
         f"{RESULTS}/benchmarks/claims.tsv"
     params:
-        rig=rig_sections("pump"),
+        rig=rig_content("pump"),
         samples_per_revolution=config["windows"]["samples_per_revolution"],
         datasets=[name for name in CHOSEN if name not in RANDOMISED],
     script:
@@ -72,7 +72,7 @@ rule compare_sst:
             "uncalibrated" if DATASETS[name].line == "pipe" else DATASETS[name].twin
             for name in PRESSURES
         ],
-        rig=rig_sections("pump"),
+        rig=rig_content("pump"),
         sst=config["sst"],
     script:
         "../scripts/compare_sst.py"

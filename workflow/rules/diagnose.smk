@@ -2,7 +2,7 @@
 rule diagnose:
     input:
         rig=rig_sheet(),
-        recordings=recordings(),
+        recordings=recordings("all"),
         twin=rules.explain.output.twin,
         effects=config["explain"]["effects"],
         faults=[name for name in config["faults"]["files"] if name.endswith(".py")],
@@ -30,7 +30,7 @@ rule diagnose:
     resources:
         mem_mb=2000,
     params:
-        rig=rig_sections("pump", "sensors", "recordings"),
+        rig=rig_content(*RIG_SECTIONS, recordings="all"),
         faults=config["faults"]["files"],
     script:
         "../scripts/diagnose.py"

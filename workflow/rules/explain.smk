@@ -2,7 +2,7 @@
 rule explain:
     input:
         rig=rig_sheet(),
-        recordings=recordings(),
+        recordings=recordings("fit"),
         effects=config["explain"]["effects"],
         source=scripts_sources("explain.py"),
     output:
@@ -32,6 +32,6 @@ rule explain:
     resources:
         mem_mb=3000,
     params:
-        rig=rig_sections("fluid", "pump", "line", "sensors", "load", "uncertainty"),
+        rig=rig_content(*RIG_SECTIONS, recordings="fit"),
     script:
         "../scripts/explain.py"

@@ -48,7 +48,7 @@ rule plot_seeds:
     benchmark:
         f"{RESULTS}/benchmarks/plot_seeds/{{dataset}}.tsv"
     params:
-        rig=rig_sections("pump"),
+        rig=rig_content("pump"),
         # the picture has a size of its own
         sst={key: value for key, value in config["sst"].items() if key != "size"},
     script:
@@ -188,7 +188,7 @@ rule plot_attention:
         f"{RESULTS}/benchmarks/plot_attention/{{dataset}}_{{domain}}.tsv"
     params:
         architectures=lambda wildcards: of_domain(wildcards.domain),
-        rig=rig_sections("pump"),
+        rig=rig_content("pump"),
         sst=config["sst"],
     script:
         "../scripts/plot_attention.py"

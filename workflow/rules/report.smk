@@ -11,7 +11,6 @@ rule accuracy_table:
             dataset=CHOSEN,
             architecture=config["architectures"],
         ),
-        recorded=rules.cut_windows.output.windows,
         paper=PAPER,
         source=scripts_sources("accuracy_table.py"),
     output:
@@ -96,13 +95,14 @@ rule report_cost:
 rule report_page:
     input:
         rig=rig_sheet(),
-        recordings=recordings(),
+        recordings=recordings("all"),
         verdict=rules.explain.output.verdict,
         twin=rules.explain.output.twin,
         explained=rules.explain.output.figures,
         diagnosis=rules.diagnose.output if DIAGNOSED_HERE else [],
-        table=rules.accuracy_table.output.table,
+        table=rules.accuracy_table.output.table if SCORED_HERE else [],
         paper=PAPER,
+        answers=rules.ask_networks.output.answers if ASKED_HERE else [],
         attention=shown_attention(),
         source=scripts_sources("report_page.py"),
     output:
@@ -118,7 +118,7 @@ rule report_page:
     benchmark:
         f"{RESULTS}/benchmarks/report_page.tsv"
     params:
-        rig=rig_sections("fluid", "pump", "line", "sensors", "load", "recordings"),
+        rig=rig_content(*RIG_SECTIONS, recordings="all"),
         recordings="the virtual rig's" if RECORDED_HERE else f"those of {CASE}",
         benchmarks=f"{RESULTS}/benchmarks",
         configuration=config,

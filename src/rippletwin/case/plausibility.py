@@ -71,6 +71,7 @@ BOTH = {
     "uncertainty.viscosity": Range("", (1e-8, 0.99), (1e-5, 0.5), PER_CENT, zero=True),
     "uncertainty.load": Range("", (1e-8, 0.99), (1e-5, 0.5), PER_CENT, zero=True),
     "uncertainty.sensor_position": Range("m", (1e-8, 0.99), (1e-5, 0.2), MILLIMETRES, zero=True),
+    "uncertainty.sensor_gain": Range("", (1e-8, 0.99), (1e-5, 0.5), PER_CENT, zero=True),
     "pump.piston_diameter": Range("m", (1e-3, 0.3), (4e-3, 0.08), MILLIMETRES),
     "pump.pitch_radius": Range("m", (2e-3, 1.0), (8e-3, 0.2), MILLIMETRES),
     "pump.dead_volume": Range("m3", (1e-10, 1e-2), (5e-8, 1e-4), (("cm3", 1e-6), ("mm3", 1e-9))),

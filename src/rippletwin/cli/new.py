@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rippletwin.case.new_sheet import NewSegment, NewSheet
 
 MM, BAR, CST, LITRES_A_MINUTE = 1e-3, 1e5, 1e-6, 1 / 60000
-LOADS = ("orifice", "open", "closed", "anechoic")
+LOADS = ("orifice", "open", "closed", "anechoic", "unknown")
 STATES = ("healthy", "unknown", "slipper", "cylinder", "cylinder_slight", "cylinder_severe")
 EXAMPLE = ("recordings/healthy_0.h5", "healthy", 1000.0, 95.0)
 

@@ -1,4 +1,4 @@
-"""Tables of what a whole run of the workflow adds: accuracies beside the paper's, and timings."""
+"""Tables of what a whole run of the workflow adds: accuracies, networks' answers, timings."""
 
 from __future__ import annotations
 
@@ -29,6 +29,26 @@ def accuracy_table(
         "Accuracy on recordings: mean and standard deviation over seeds",
         columns, (False, False, True, True), cells,
     )  # fmt: skip
+
+
+def answer_table(answers: Mapping[str, Mapping[str, Mapping]]) -> Table:
+    """What networks say of recordings of unknown state: label -> network -> answer."""
+    cells = [
+        [
+            text(label),
+            text(network),
+            text(said["state"]),
+            *(Cell(f"{100 * said[key]:.0f}", said[key]) for key in ("share", "unlike")),
+        ]
+        for label, networks in answers.items()
+        for network, said in networks.items()
+    ]
+    return Table(
+        "Recordings of unknown state, as networks see them",
+        ("Recording", "Network", "State", "Windows that say so / %", "Unlike all simulated / %"),
+        (False, False, False, True, True),
+        cells,
+    )
 
 
 def _mean(mean: float, sd: float) -> Cell:

@@ -214,6 +214,8 @@ class DifferentiableForward(ForwardModel):
             positions=np.asarray(base.sensor_positions),
             viscosity=value(twin.index["viscosity"]),
             load=1.0 if load is None else value(load),
+            reflection=twin.reflection(coordinates),
+            gains=twin.gains(coordinates),
         )
         source, admittance = self._sources(theta, base, shape)
         network = FrequencyDomainLine(
@@ -222,8 +224,9 @@ class DifferentiableForward(ForwardModel):
             series=np.empty((n, *shape), complex),
             shunt=np.empty((n, *shape), complex),
             source_admittance=admittance,
-            load=self._load(v.load),
+            load=self._load(v),
             sensor_positions=v.positions,
+            sensor_factor=v.gains,
         )
         density = rig.fluid.density
         for k, (a, d) in enumerate(zip(v.wave_speeds, v.diameters)):

@@ -21,6 +21,7 @@ from rippletwin.line.frequency_domain.orifice_load import OrificeLoad
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
 from rippletwin.twin.effects.base import LineState
 from rippletwin.twin.flow_source import FlowSource
+from rippletwin.twin.unknown_load import unknown_impedance
 
 if TYPE_CHECKING:
     from rippletwin.twin.twin import Arrays, Twin
@@ -147,8 +148,9 @@ class ForwardModel:
             shunt=shunt,
             source_flow=source * self.source.turn(theta),
             source_admittance=source_admittance,
-            load=self._load(v.load),
+            load=self._load(v),
             sensor_positions=v.positions,
+            sensor_factor=v.gains,
         )
         if twin.effects:
             state = self.line_state(v)
@@ -209,12 +211,14 @@ class ForwardModel:
             self._series_cache[segment] = (diameter, viscosity), value
         return value
 
-    def _load(self, factor: float) -> tuple:
+    def _load(self, v: Arrays) -> tuple:
         kind = self.twin.rig.load.kind
         if kind == "orifice":
-            return "admittance", self._orifice_admittance(factor)
+            return "admittance", self._orifice_admittance(v.load)
         if kind == "impedance":
-            return "impedance", factor * self.load_impedance
+            return "impedance", v.load * self.load_impedance
+        if kind == "unknown":
+            return "impedance", unknown_impedance(self.s, v, self.twin.rig.fluid.density)
         return kind, None
 
     def _balance(self, network: FrequencyDomainLine, theta: np.ndarray) -> None:
