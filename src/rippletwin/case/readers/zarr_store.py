@@ -8,13 +8,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import zarr
 
 from rippletwin.case.readers.arrays import ArrayFile, read_arrays
-from rippletwin.case.readers.file_checks import check_size
 from rippletwin.case.readers.layout import Layout
-from rippletwin.case.readers.signals import Signals, check_type, numbers
+from rippletwin.case.readers.signals import Signals, check_type
 from rippletwin.errors import InputError
 
 
@@ -25,15 +23,13 @@ def read(path: Path, layout: Layout) -> Signals:
         members = store.members(max_depth=4)
         arrays = {name: item for name, item in members if isinstance(item, zarr.Array)}
 
-        def array(name: str) -> np.ndarray | None:
+        def array(name: str) -> zarr.Array | None:
             item = arrays.get(name)
-            if item is None:
-                return None
-            if not item.size:
+            if item is not None and not item.size:
                 raise InputError(path, name, "empty", "Store numbers in it")
-            check_type(path, name, item.dtype)
-            check_size(path, name, item.size)
-            return numbers(path, name, item[...])
+            if item is not None:
+                check_type(path, name, item.dtype)
+            return item
 
         def attribute(beside: str, name: str):
             holders: list[zarr.Array | zarr.Group] = [store]
