@@ -6,7 +6,7 @@ export OMP_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 export NUMBA_NUM_THREADS = 1
 
-.PHONY: run smoke test test-long lint clean
+.PHONY: run smoke test test-long lint docs-site clean
 
 run: .venv/ready
 	$(BIN)/snakemake --cores $(CORES)
@@ -24,8 +24,12 @@ test-long: .venv/ready
 lint: .venv/ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/snakefmt --check Snakefile workflow/rules
+	$(BIN)/snakefmt --check Snakefile workflow/Snakefile workflow/rules
 	$(BIN)/snakemake --lint
+	$(BIN)/mypy
+
+docs-site: .venv/ready
+	$(BIN)/python docs/site_of_docs.py
 
 .venv/ready: environment.txt pyproject.toml
 	$(PYTHON) -m venv .venv
@@ -33,4 +37,4 @@ lint: .venv/ready
 	touch $@
 
 clean:
-	rm -rf .venv .snakemake results
+	rm -rf .venv .snakemake .site results

@@ -15,8 +15,7 @@ from paths import ROOT
 
 DISTRIBUTION = {"yaml": "pyyaml", "pywt": "pywavelets"}
 """Import name -> name of the distribution, where they differ beyond case."""
-NOT_IMPORTED = {"zarr"}
-"""Distributions that another one loads by name: xarray its engine for stores."""
+SOURCES = list((ROOT / "src").rglob("*.py"))
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 
@@ -25,24 +24,39 @@ def name_of(requirement: str) -> str:
     return re.match(r"[\w.-]+", requirement)[0].lower()
 
 
-def imported() -> set[str]:
-    """Distributions whose modules src/ imports."""
-    own = {path.name for path in (ROOT / "src").iterdir()}
+def imported_by(path) -> set[str]:
+    """Distributions whose modules a source file imports."""
+    own = {folder.name for folder in (ROOT / "src").iterdir()}
     found = set()
-    for path in (ROOT / "src").rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.Import):
-                found |= {name.name.split(".")[0] for name in node.names}
-            elif isinstance(node, ast.ImportFrom):
-                found.add(node.module.split(".")[0])
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found |= {name.name.split(".")[0] for name in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found.add(node.module.split(".")[0])
     found -= own | set(sys.stdlib_module_names)
     return {DISTRIBUTION.get(name, name).lower() for name in found}
 
 
+def imported() -> set[str]:
+    """Distributions whose modules src/ imports."""
+    return set().union(*map(imported_by, SOURCES))
+
+
+def of_extras() -> set:
+    """The readers whose library is an extra; the registry tells when it is not installed."""
+    from rippletwin.case.readers.registry import EXTRAS
+
+    return {ROOT / "src/rippletwin/case/readers" / f"{name}.py" for name in EXTRAS}
+
+
 def test_dependencies_are_what_the_source_imports():
     """A module imported without a requirement would fail after a bare install; a requirement that
-    nothing imports would be installed for nothing."""
-    assert {name_of(each) for each in PROJECT["dependencies"]} == imported() | NOT_IMPORTED
+    nothing imports would be installed for nothing. The libraries of some readers are extras."""
+    base = {name_of(each) for each in PROJECT["dependencies"]}
+    readers = {name_of(each) for each in PROJECT["optional-dependencies"]["readers"]}
+    assert base | readers == imported() and not base & readers
+    others = set().union(*(imported_by(path) for path in SOURCES if path not in of_extras()))
+    assert readers.isdisjoint(others)
 
 
 def test_every_requirement_is_pinned():
@@ -51,7 +65,7 @@ def test_every_requirement_is_pinned():
     lines = (ROOT / "environment.txt").read_text().splitlines()
     pins = dict(line.lower().split("==") for line in lines if "==" in line)
     extras = PROJECT["optional-dependencies"]
-    wanted = [*PROJECT["dependencies"], *extras["workflow"], *extras["dev"]]
+    wanted = [*PROJECT["dependencies"], *extras["workflow"], *extras["readers"], *extras["dev"]]
     for each in map(requirements.Requirement, wanted):
         if each.name != PROJECT["name"]:
             assert each.specifier.contains(pins[each.name.lower()]), each

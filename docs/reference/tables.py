@@ -19,6 +19,7 @@ import importlib
 import io
 import os
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import yaml
@@ -39,6 +40,8 @@ def effect(name: str) -> str:
     """Place, equation, source and priors of an effect."""
     found = EFFECTS[name]
     rig = _rig_of(found.medium)
+    if not found.places(rig):
+        rig = replace(rig, load=Load("anechoic"))
     rows = [
         ("name", f"`{found.name}`"),
         ("acts on", found.element),
@@ -153,6 +156,8 @@ def _prior_in_words(prior) -> str:
     low, high = (float(prior.value(u)) for u in (-TWO_SIGMA, TWO_SIGMA))
     if prior.kind == "uniform":
         return f"uniform, {prior.centre:.3g} to {prior.centre + prior.scale:.3g}"
+    if prior.kind == "bounded":
+        return f"tanh of a normal, 0 ± {prior.scale:.3g}"
     if prior.kind == "normal":
         return f"normal, {prior.centre:.3g} ± {prior.scale:.3g}"
     return f"lognormal, median {prior.centre:.2g}, 95 % from {low:.2g} to {high:.2g}"

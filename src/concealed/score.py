@@ -172,7 +172,7 @@ def is_where_right(true: list[dict], verdict: dict, length: float) -> bool:
 
 
 def _holds_position(effect: dict, interval: Sequence[float], length: float) -> bool:
-    """Whether the widened interval holds the position, in true metres or as on the drawing.
+    """Whether the widened interval holds the actual or the nominal position.
 
     The calibrated line's metres are between the two.
     """

@@ -33,10 +33,7 @@ class DetectionCurve(NamedTuple):
 
 
 def alarm_threshold(healthy: Sequence[float], share: float = FALSE_ALARMS) -> float:
-    """The least suspicion above which lies at most this share of the healthy recordings'.
-
-    Infinite where more than that share of healthy recordings has infinite suspicion.
-    """
+    """The least suspicion above which lies at most this share of the healthy recordings'."""
     ordered = np.sort(np.asarray(healthy, float))[::-1]
     return float(ordered[int(share * len(ordered))])
 

@@ -13,52 +13,63 @@ from diagnosis_trial.summary import (
     ANSWERS,
     SINGLE,
     STATES,
+    columns_of,
     confusion_matrix,
     covers,
     reliability_table,
 )
 from rippletwin.figures import style
 
-LOOK = {"slipper": (style.CALIBRATED, "o", "-"), "cylinder": (style.ALARM, "s", "--")}
+LOOK = {"slipper": (style.CALIBRATED, "o"), "cylinder": (style.ALARM, "s")}
 LEAST_CHANGE = 1e-3  # smaller changes are drawn here
 BINS = 6  # of equally many recordings each, in which shares are drawn beside a curve
 
 
 def draw_figures(rows: list[dict], folder: str | Path, suffix: str = ".png") -> list[Path]:
     """Write every figure of the scored recordings into `folder`; returns their paths."""
+    columns = columns_of(rows)
+    figures = {"detection": draw_detection(columns)}
+    for name, chosen in columns.items():
+        figures[file_name("confusion", name)] = draw_confusion(chosen)
+        figures[file_name("severities", name)] = draw_severities(chosen)
     paths = []
-    for name, make in FIGURES.items():
+    for name, figure in figures.items():
         paths.append(Path(folder) / f"{name}{suffix}")
-        style.save(make(rows), paths[-1])
+        style.save(figure, paths[-1])
     return paths
 
 
-def draw_detection(rows: list[dict]) -> Figure:
-    """Probability of detection at 5 % false alarms, against the change and against the leak."""
-    fig, axes = style.figure(1, 2, height=2.6, sharey=True)
-    healthy = [row["suspicion"] for row in rows if row["state"] == "healthy"]
-    threshold = detection.alarm_threshold(healthy) if healthy else np.inf
-    for state, (colour, marker, dash) in LOOK.items():
-        chosen = [row for row in rows if row["state"] == state]
-        hit = np.array([row["suspicion"] > threshold for row in chosen])
-        change = np.array([max(row["change"], LEAST_CHANGE) for row in chosen])
-        area = np.array([row["areas"][state] * 1e6 for row in chosen])
-        for ax, severity in zip(axes[0], (change, area), strict=True):
-            _draw_curve(ax, severity, hit, state, colour, marker, dash)
-    axes[0, 0].set_xlabel("relative change of the ripple")
-    axes[0, 1].set_xlabel("leak, area of the same orifice (mm$^2$)")
+def file_name(figure: str, column: str) -> str:
+    """Name of a column's figure, without its suffix."""
+    return f"{figure}_{column.replace('@', '_')}"
+
+
+def draw_detection(columns: dict[str, list[dict]]) -> Figure:
+    """Probability of detection of one leak at 5 % false alarms against the change that it makes,
+    one panel a fault, one curve a column."""
+    fig, axes = style.figure(1, len(SINGLE), height=2.8, sharey=True)
+    for ax, state in zip(axes[0], SINGLE, strict=True):
+        for k, (column, rows) in enumerate(columns.items()):
+            healthy = [row["suspicion"] for row in rows if row["state"] == "healthy"]
+            threshold = detection.alarm_threshold(healthy) if healthy else np.inf
+            chosen = [row for row in rows if row["state"] == state]
+            hit = np.array([row["suspicion"] > threshold for row in chosen])
+            change = np.array([max(row["change"], LEAST_CHANGE) for row in chosen])
+            _draw_curve(ax, change, hit, column, k)
+        ax.set_xlabel(f"relative change of the ripple by a {state}'s leak")
     axes[0, 0].set_ylabel("probability of detection")
     axes[0, 0].set_ylim(-0.12, 1.12)
-    if axes[0, 1].lines:
-        axes[0, 1].legend(loc="lower right")
+    if axes[0, -1].lines:
+        axes[0, -1].legend(loc="lower right", fontsize=7)
     return fig
 
 
-def _draw_curve(ax, severity, hit, label: str, colour: str, marker: str, dash: str) -> None:
-    """A detection curve, shares in bins with exact intervals, and the recordings as ticks."""
+def _draw_curve(ax, severity, hit, label: str, rank: int) -> None:
+    """The detection curve of a column, and shares in bins with exact intervals."""
     ax.set_xscale("log")
     if not len(severity):
         return
+    colour, marker, dash = f"C{rank}", "osD^vP*X"[rank % 8], ("-", "--", ":")[rank % 3]
     curve = detection.fit_curve(severity, hit)
     if curve is not None:
         grid = np.geomspace(severity.min(), severity.max(), 200)
@@ -67,12 +78,10 @@ def _draw_curve(ax, severity, hit, label: str, colour: str, marker: str, dash: s
     for k, part in enumerate(np.array_split(order, min(BINS, len(order)))):
         rate = rate_of(hit[part])
         low, high = rate.interval
-        x = np.exp(np.mean(np.log(severity[part])))
+        x = np.exp(np.mean(np.log(severity[part])) + 0.03 * rank)  # intervals beside each other
         spread = [[rate.share - low], [high - rate.share]]
         ax.errorbar(x, rate.share, spread, fmt=marker, color=colour, ms=4, capsize=2, lw=0.8,
                     label=label if k == 0 else None)  # fmt: skip
-    side = 0.03 * (list(LOOK).index(label) + 1)
-    ax.plot(severity, np.where(hit, 1.03 + side, -0.03 - side), "|", color=colour, ms=4)
 
 
 def draw_confusion(rows: list[dict]) -> Figure:
@@ -99,7 +108,7 @@ def draw_severities(rows: list[dict]) -> Figure:
     ax = axes[0, 0]
     found = [s for row in rows if row["right"] for s in row["severities"]]
     for fault in SINGLE:
-        colour, marker, _ = LOOK[fault]
+        colour, marker = LOOK[fault]
         for holds, face in ((True, colour), (False, "white")):
             some = [s for s in found if s["fault"] == fault and covers(s) == holds]
             if some:
@@ -134,10 +143,3 @@ def draw_severities(rows: list[dict]) -> Figure:
 
 def _words(name: str) -> str:
     return name.replace("_", " ").replace("+", "\n+ ")
-
-
-FIGURES = {
-    "detection": draw_detection,
-    "confusion": draw_confusion,
-    "severities": draw_severities,
-}

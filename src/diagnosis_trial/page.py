@@ -6,6 +6,7 @@ import numpy as np
 
 from concealed.summary import Rate, percent
 from diagnosis_trial import detection, summary
+from diagnosis_trial.figures import file_name
 from diagnosis_trial.score import LEAK_STATES
 
 FAILURES_SHOWN = 60
@@ -14,90 +15,94 @@ FAILURES_SHOWN = 60
 def report_page(rows: list[dict], origin: dict) -> str:
     """The page in Markdown, of the rows of `diagnosis_trial.score.score_rig`.
 
-    `origin` states `commit` (hash of the tool's tree), `number` (of the trial), `not_committed`
-    (whether the tool has changes that are not committed) and `twin` ("explained" or "calibrated").
+    `origin` states `commit` (hash of the tool's tree), `number` (of the trial) and `not_committed`
+    (whether the tool has changes that are not committed).
     """
+    columns = summary.columns_of(rows)
     return "\n".join(
         [
             "# How often `rippletwin diagnose` is right on a population of rigs",
             "",
-            *_origin(rows, origin),
+            *_origin(rows, columns, origin),
             "## Scores",
             "",
-            *_table(("score", "target", "result"),
-                    [(s.what, s.target, str(s.rate)) for s in summary.score_table(rows)]),
+            *_scores(columns),
             "## Smallest leak found at 5 % false alarms",
             "",
-            *_smallest(rows),
+            *_smallest(columns),
             "![detection](figures/detection.png)",
             "",
-            "## States by the change that they make in the ripple",
-            "",
-            *_table(("state", "change", "state right", "not called healthy"),
-                    [(b.state, _span(b.low, b.high), str(b.right), str(b.noticed))
-                     for b in summary.change_table(rows)]),
-            "![confusion](figures/confusion.png)",
-            "",
-            "## Leak areas and stated probabilities",
-            "",
-            *_table(("fault", "stated over true, median", "5 to 95 %", "95 % intervals that hold"),
-                    [(e.fault, f"{e.median:.2f}", f"{e.low:.2f} to {e.high:.2f}", str(e.coverage))
-                     for e in summary.severity_table(rows)]),
-            *_table(("stated probability", "mean", "state right"),
-                    [(f"{b.low:g} to {b.high:g}", f"{b.mean:.4f}", str(b.right))
-                     for b in summary.reliability_table(rows)]),
-            "![severities](figures/severities.png)",
-            "",
-            "## Rigs",
-            "",
-            *_rigs(rows),
-            "## Recordings that were diagnosed wrongly",
-            "",
-            *_failures(rows),
+            *(line for name, chosen in columns.items() for line in _column(name, chosen)),
         ]
-    )  # fmt: skip
+    )
 
 
-def _origin(rows: list[dict], origin: dict) -> list[str]:
+def _origin(rows: list[dict], columns: dict[str, list[dict]], origin: dict) -> list[str]:
     changed = " The tool has changes that are not committed." if origin["not_committed"] else ""
-    rigs = {row["rig"]: row for row in rows}
-    misfit = np.array([row["twin_misfit"] for row in rigs.values() if row["twin_misfit"]])
-    fit, seconds = (np.median([row[key] for row in rigs.values()]) for key in _TIMES)
-    each = len(rows) / max(len(rigs), 1)
-    lines = [
-        f"{len(rows)} recordings of {len(rigs)} rigs, drawn from tree `{origin['commit'][:12]}` "
-        f"and trial number {origin['number']} by `snakemake diagnosis_trial`.{changed} The "
-        "protocol is in docs/diagnosis_trial.md.",
-        "",
-        f"The twin is `{origin['twin']}` from the rig's healthy recordings (median {fit:.0f} s); a "
-        f"recording is then diagnosed in {seconds / each:.1f} s (median, one process).",
-    ]
-    if len(misfit):
-        quantiles = np.quantile(misfit, [0, 0.5, 1])
-        lines[-1] += " It leaves {} % of the healthy ripple (median; {} to {} %).".format(
-            *(percent(quantiles[k]) for k in (1, 0, 2))
-        )
+    each = {name: {(row["rig"], row["label"]) for row in made} for name, made in columns.items()}
+    shared = len(next(iter(each.values()), ()))
+    every = len({(row["rig"], row["label"]) for row in rows})
     return [
-        *lines,
+        f"{every} recordings of {len({row['rig'] for row in rows})} rigs, drawn from tree "
+        f"`{origin['commit'][:12]}` and trial number {origin['number']} by "
+        f"`snakemake diagnosis_trial`.{changed} The protocol is in docs/diagnosis_trial.md.",
         "",
+        f"A column is METHOD@TWIN. Every score is over the {shared} recordings that all columns "
+        "have answered: networks answer at the operating point that they have learnt.",
+        "",
+        *_table(("column", "misfit of the twin", "twin, s", "diagnosis of a rig, s"),
+                [(name, *_costs(made)) for name, made in columns.items()]),
+        "* Medians over rigs, the misfit with its least and greatest.",
         "* Shares are followed by their exact 95 % confidence interval (Clopper and Pearson). It "
         "takes recordings as independent.",
         "* *Change*: norm of the change that the state makes in the sensors' ripple, over that of "
         "the healthy ripple, from two runs of the rig.",
         "",
+    ]  # fmt: skip
+
+
+def _costs(rows: list[dict]) -> tuple[str, str, str]:
+    """Misfit of the twin and seconds of either step, of one column."""
+    rigs = list({row["rig"]: row for row in rows}.values())
+    misfit, fit, seconds = (
+        [row[key] for row in rigs if row[key] is not None]
+        for key in ("twin_misfit", "fit_s", "diagnose_s")
+    )
+    least, middle, most = (percent(x) for x in np.quantile(misfit or [np.nan], [0, 0.5, 1]))
+    text = f"{middle} % ({least} to {most} %)" if misfit else ""
+    return text, *(f"{np.median(x):.0f}" if x else "" for x in (fit, seconds))
+
+
+def _scores(columns: dict[str, list[dict]]) -> list[str]:
+    tables = [summary.score_table(rows) for rows in columns.values()]
+    lines = [
+        (same[0].what, same[0].target, *(str(score.rate) for score in same))
+        for same in zip(*tables, strict=True)
+    ]
+    return _table(("score", "target", *columns), lines)
+
+
+def _smallest(columns: dict[str, list[dict]]) -> list[str]:
+    """The table of smallest leaks, by change and by area, with intervals over rigs."""
+    rng = np.random.default_rng(0)
+    lines = [
+        (name, *line) for name, rows in columns.items() for line in _smallest_of_column(rows, rng)
+    ]
+    heads = [f"found in {100 * p:.0f} %" for p in detection.FOUND]
+    return [
+        "The alarm is raised above the log odds against healthy that 5 % of the healthy recordings "
+        "exceed. Intervals are from resampled rigs.",
+        "",
+        *_table(("column", "alarm above", "false alarms", "fault", "severity", *heads), lines),
     ]
 
 
-_TIMES = ("fit_s", "diagnose_s")
-
-
-def _smallest(rows: list[dict]) -> list[str]:
-    """The table of smallest leaks, by change and by area, with intervals over rigs."""
+def _smallest_of_column(rows: list[dict], rng: np.random.Generator) -> list[tuple[str, ...]]:
     healthy = [row["suspicion"] for row in rows if row["state"] == "healthy"]
     if not healthy:
-        return ["There is no healthy recording.", ""]
+        return []
     threshold = detection.alarm_threshold(healthy)
-    rng = np.random.default_rng(0)
+    false_alarms = Rate(sum(s > threshold for s in healthy), len(healthy))
     lines = []
     for state in summary.SINGLE:
         chosen = [row for row in rows if row["state"] == state]
@@ -107,23 +112,46 @@ def _smallest(rows: list[dict]) -> list[str]:
             ([row["change"] for row in chosen], "% of the ripple", 100.0),
             ([row["areas"][state] for row in chosen], "mm2", 1e6),
         ):
-            cells = []
-            for probability in detection.FOUND:
-                found = detection.smallest_found(severity, hit, rigs, probability, rng)
-                cells.append(
-                    "too few"
-                    if found is None
-                    else "{:.2g} ({:.2g} to {:.2g})".format(*(factor * x for x in found))
-                )
-            lines.append((state, unit, *cells))
-    rate = Rate(sum(s > threshold for s in healthy), len(healthy))
-    heads = [f"found in {100 * p:.0f} %" for p in detection.FOUND]
+            found = [
+                detection.smallest_found(severity, hit, rigs, probability, rng)
+                for probability in detection.FOUND
+            ]
+            cells = [
+                "too few"
+                if f is None
+                else "{:.2g} ({:.2g} to {:.2g})".format(*(factor * x for x in f))
+                for f in found
+            ]
+            alarm = f"{threshold:.3g}", f"{false_alarms.hits} of {false_alarms.count}"
+            lines.append((*alarm, state, unit, *cells))
+    return lines
+
+
+def _column(name: str, rows: list[dict]) -> list[str]:
+    """What one column has said, in detail."""
+    picture = file_name("confusion", name)
+    severities = file_name("severities", name)
     return [
-        f"The alarm is raised above log odds of {threshold:.3g} against healthy: false alarms "
-        f"{rate}. Intervals are from resampled rigs.",
+        f"## {name}",
         "",
-        *_table(("fault", "severity", *heads), lines),
-    ]
+        *_table(("state", "change", "state right", "not called healthy"),
+                [(b.state, _span(b.low, b.high), str(b.right), str(b.noticed))
+                 for b in summary.change_table(rows)]),
+        f"![confusion](figures/{picture}.png)",
+        "",
+        *_table(("fault", "stated over true, median", "5 to 95 %", "95 % intervals that hold"),
+                [(e.fault, f"{e.median:.2f}", f"{e.low:.2f} to {e.high:.2f}", str(e.coverage))
+                 for e in summary.severity_table(rows)]),
+        *_table(("stated probability", "mean", "state right"),
+                [(f"{b.low:g} to {b.high:g}", f"{b.mean:.4f}", str(b.right))
+                 for b in summary.reliability_table(rows)]),
+        f"![severities](figures/{severities}.png)",
+        "",
+        *_rigs(rows),
+        "Recordings that were diagnosed wrongly:",
+        "",
+        *_failures(rows),
+    ]  # fmt: skip
 
 
 def _rigs(rows: list[dict]) -> list[str]:

@@ -12,11 +12,12 @@ CHANGED_LINE = "changed_line"
 
 
 def score_rig(rig: int, truth: dict, diagnosis: dict, run: dict) -> list[dict]:
-    """One row for each recording of unknown state, in the order of their labels.
+    """One row for each column and each recording of unknown state that it has answered, in the
+    order of the labels.
 
     `truth` is the content of the seal, `diagnosis` that of diagnosis.json, `run` that of run.json.
     Keys of a row:
-        rig, label
+        column, rig, label
         state, change, weakest, areas   the truth (`virtualrig.population.record_rig`)
         same_point            whether a healthy recording has the same operating point as most
         told                  the state that the tool names, "unlike" or "crashed"
@@ -28,7 +29,16 @@ def score_rig(rig: int, truth: dict, diagnosis: dict, run: dict) -> list[dict]:
         piston_right          None where the tool tells no piston or no single one is true
         twin_misfit, fit_s, diagnose_s   of the rig, from `run`
     """
-    told = {each["label"]: each for each in diagnosis["recordings"]}
+    return [
+        {"column": column} | row
+        for column, found in diagnosis.items()
+        for row in _score_column(rig, truth, found["recordings"], run[column])
+    ]
+
+
+def _score_column(rig: int, truth: dict, entries: list[dict], run: dict) -> list[dict]:
+    """The rows of one column but for its name, of its entries of diagnosis.json."""
+    told = {each["label"]: each for each in entries}
     first = next(iter(truth["recordings"].values()))["point"]
     rows = []
     for label, true in sorted(truth["recordings"].items()):
@@ -67,16 +77,22 @@ def is_right(state: str, told: str) -> bool:
 def suspicion(said: dict) -> float:
     """How far the tool doubts that a recording is healthy, on a scale that ranks recordings.
 
-    Log odds against healthy, infinite where the recording is unlike all states; -infinity where the
-    tool crashed: it has found nothing.
+    Log odds of the stated probabilities against healthy; where the recording is unlike all states
+    at least those of its p-value; -infinity where the tool crashed: it has found nothing.
     """
     if said["state"] == "crashed":
         return -math.inf
-    if said["state"] == "unlike":
-        return math.inf
     healthy = said["probabilities"]["healthy"]
     others = math.fsum(p for name, p in said["probabilities"].items() if name != "healthy")
-    return math.log(max(others, 1e-300)) - math.log(max(healthy, 1e-300))
+    odds = _log(others) - _log(healthy)
+    if said["state"] == "unlike":
+        p_value = said["unlike"]["p_value"]
+        odds = max(odds, _log(1.0 - p_value) - _log(p_value))
+    return odds
+
+
+def _log(share: float) -> float:
+    return math.log(max(share, 1e-300))
 
 
 def compare_severities(areas: dict[str, float], said: dict) -> list[dict]:

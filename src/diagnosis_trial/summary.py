@@ -1,5 +1,6 @@
 """Shares over all recordings of a trial, each with its exact confidence interval."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable
 from itertools import pairwise
 from typing import NamedTuple
@@ -19,6 +20,14 @@ KNOWN = ("healthy", *LEAK_STATES)
 STATES = (*KNOWN, *OUTSIDE_STATES, CHANGED_LINE)
 ANSWERS = (*KNOWN, "unlike", "crashed")
 PLAIN = 0.05  # change of the ripple from which a state counts as plain
+
+
+def columns_of(rows: list[dict]) -> dict[str, list[dict]]:
+    """Column -> its rows, of the recordings that all columns have answered."""
+    columns = list(dict.fromkeys(row["column"] for row in rows))
+    answers = Counter((row["rig"], row["label"]) for row in rows)
+    shared = [row for row in rows if answers[row["rig"], row["label"]] == len(columns)]
+    return {name: [row for row in shared if row["column"] == name] for name in columns}
 
 
 def score_table(rows: list[dict]) -> list[Score]:

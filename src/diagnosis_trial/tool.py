@@ -1,51 +1,78 @@
-"""The tool on one rig: a twin of its healthy recordings, then the diagnosis of the others.
+"""The tool on one rig: twins of its healthy recordings, then a diagnosis of the others by each
+column.
 
-Its arguments are a case, an output folder and TWIN, `explained` or `calibrated`: what is fitted to
-the healthy recordings before the others are diagnosed. Writes twin.json and diagnosis.json, and
-run.json with the seconds that either took and the twin's misfit. It runs in one process: its
-confinement has no shared memory.
+Its arguments are a case, an output folder and the columns, METHOD@TWIN. METHOD is
+
+    anchored     `rippletwin diagnose`
+    unanchored   the same, but compared with the twin's own healthy ripple
+    P, PR, PRA   a network that the twin teaches (`diagnosis_trial.networks`)
+
+and TWIN one of `diagnosis_trial.twins`. Writes diagnosis.json, column -> the content of a file of
+`rippletwin diagnose`, and run.json, column -> the seconds that twin and diagnoses took and the
+twin's misfit. It runs in one process: its confinement has no shared memory.
 """
 
 import json
 import sys
 import time
 import traceback
+from collections.abc import Callable
 from pathlib import Path
 
 import yaml
 
-from rippletwin.calibration import report
-from rippletwin.calibration.calibrate import Settings, calibrate
+from diagnosis_trial.networks import ask_network, teach_network
+from diagnosis_trial.twins import TWINS, FittedTwin
 from rippletwin.case.load import load_case
+from rippletwin.case.model import Case
 from rippletwin.diagnosis.diagnose import diagnose, select_recordings
-from rippletwin.diagnosis.diagnosis_file import write_diagnosis
-from rippletwin.diagnosis.faults.library import select_faults
-from rippletwin.explanation.explain import explain
-from rippletwin.explanation.verdict.verdict_file import write_verdict
-from rippletwin.spectra.observation import observe
-from rippletwin.twin.twin import Twin
+from rippletwin.diagnosis.diagnosis_file import diagnosis_dict
 
 
-def main(case_folder: str, out: str, twin_kind: str) -> None:
+def main(case_folder: str, out: str, *columns: str) -> None:
     """Diagnose one rig; an error of the tool gives each of its recordings the state `crashed`."""
-    out = Path(out)
-    started, fitted, misfit = time.perf_counter(), None, None
-    try:
-        twin, misfit = TWINS[twin_kind](load_case(case_folder, states={"healthy"}), out)
-        fitted = time.perf_counter()
-        case = load_case(case_folder, states={"healthy", "unknown"})
-        write_diagnosis(diagnose(case, twin, select_recordings(case), select_faults()), out)
-    except Exception:  # any error: one rig must not end the trial
-        traceback.print_exc()
-        crashed = [{"label": label, "state": "crashed"} for label in unknown_labels(case_folder)]
-        (out / "diagnosis.json").write_text(json.dumps({"recordings": crashed}) + "\n")
-    ended = time.perf_counter()
-    run = {
-        "fit_s": (fitted or ended) - started,
-        "diagnose_s": ended - (fitted or ended),
-        "misfit": misfit,
-    }
-    (out / "run.json").write_text(json.dumps(run) + "\n")
+    out, twins, diagnoses, runs = Path(out), {}, {}, {}
+    for column in columns:
+        method, kind = column.split("@")
+        run = {"fit_s": None, "diagnose_s": None, "misfit": None}
+        try:
+            if kind not in twins:
+                twins[kind] = timed(fit_twin, case_folder, kind, out)
+            fitted, run["fit_s"] = twins[kind]
+            run["misfit"] = fitted.misfit
+            case = load_case(case_folder, states={"healthy", "unknown"})
+            found = timed(diagnose_by, method, kind, fitted, case)
+            diagnoses[column], run["diagnose_s"] = found
+        except Exception:  # any error: one rig must not end the trial
+            traceback.print_exc()
+            crashed = [{"label": x, "state": "crashed"} for x in unknown_labels(case_folder)]
+            diagnoses[column] = {"recordings": crashed}
+        runs[column] = run
+    (out / "diagnosis.json").write_text(json.dumps(diagnoses, indent=1) + "\n")
+    (out / "run.json").write_text(json.dumps(runs) + "\n")
+
+
+def fit_twin(case_folder: str, kind: str, out: Path) -> FittedTwin:
+    """The twin of this kind; its files are in a folder of its own."""
+    return TWINS[kind](load_case(case_folder, states={"healthy"}), out / kind)
+
+
+def diagnose_by(method: str, kind: str, fitted: FittedTwin, case: Case) -> dict:
+    """The recordings of unknown state by a method; the nominal twin is not fitted again."""
+    recordings = select_recordings(case)
+    if method in ("anchored", "unanchored"):
+        again, anchored = kind != "nominal", method == "anchored"
+        return diagnosis_dict(
+            diagnose(case, fitted.twin, recordings, recalibrate=again, anchored=anchored)
+        )
+    network = teach_network(method, fitted.twin, fitted.covariance, case)
+    return ask_network(network, recordings, case.rig)
+
+
+def timed(work: Callable, *arguments) -> tuple:
+    """What `work` returns, and the seconds that it took."""
+    started = time.perf_counter()
+    return work(*arguments), time.perf_counter() - started
 
 
 def unknown_labels(case_folder: str) -> list[str]:
@@ -54,23 +81,5 @@ def unknown_labels(case_folder: str) -> list[str]:
     return [Path(r["file"]).stem for r in sheet["recordings"] if r["state"] == "unknown"]
 
 
-def fit_calibrated(case, out: Path) -> tuple[Twin, float]:
-    """The twin with the physics of the data sheet and unsteady friction, and its misfit."""
-    observations = [observe(r, case.rig, piston_harmonics_only=True) for r in case.recordings]
-    twin = Twin(case.rig, observations, friction="unsteady")
-    calibration = calibrate(twin, observations, Settings())
-    report.save(calibration, out)
-    return calibration.twin, float(calibration.after.relative)
-
-
-def fit_explained(case, out: Path) -> tuple[Twin, float]:
-    """The twin with the effects that `rippletwin explain` finds, and its misfit."""
-    explanation = explain(case, processes=1)
-    verdict = write_verdict(explanation, out)
-    return explanation.twin, float(verdict["fit"]["after"]["in_sample"])
-
-
-TWINS = {"calibrated": fit_calibrated, "explained": fit_explained}
-
 if __name__ == "__main__":
-    main(*sys.argv[1:4])
+    main(*sys.argv[1:])

@@ -121,9 +121,9 @@ def test_load_impedance_without_its_file(tmp_path):
 
 
 def test_unknown_format(tmp_path):
-    spoilt(tmp_path, lambda c: c["recordings"][0].update(file="r.wav"), pressure=None)
-    (tmp_path / "r.wav").touch()
-    refused(tmp_path, "r.wav", "file", ".wav", ".h5")
+    spoilt(tmp_path, lambda c: c["recordings"][0].update(file="r.doc"), pressure=None)
+    (tmp_path / "r.doc").touch()
+    refused(tmp_path, "r.doc", "file", ".doc", ".h5")
 
 
 @pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.99])
@@ -161,7 +161,7 @@ def test_hdf5_without_sampling_rate(tmp_path):
 
 def test_missing_sensor_row(tmp_path):
     write_case(tmp_path, sheet(), ripple()[:1])
-    refused(tmp_path, "healthy_0.h5", "p2", "no data for this sensor")
+    refused(tmp_path, "healthy_0.h5", "pressure", "1 channel(s)", "lists 2 sensor(s)")
 
 
 def csv_case(folder, header="time_s,p1,p2", columns=None, **entry):

@@ -3,14 +3,18 @@
 Independent truth: the pump coupled to its pipe step by step in time, with known leaks.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import leaking_pump
 from rippletwin.diagnosis.diagnoser import Diagnoser
 from rippletwin.diagnosis.diagnosis_file import diagnosis_dict
+from rippletwin.diagnosis.evidence import ErrorPrior
 from rippletwin.diagnosis.faults.library import select_faults
 from rippletwin.diagnosis.observation_model import Hypothesis
+from rippletwin.diagnosis.unlike import judge_residual
 from rippletwin.figures import fault_posterior
 from rippletwin.pump.faults import Cylinder, Slipper
 from rippletwin.twin.twin import Twin
@@ -90,6 +94,19 @@ def test_a_changed_line_is_told_from_the_pump(diagnoses):
     assert found.severities == {}
 
 
+def test_a_line_that_drifts_too_far_is_another_line(diagnoses):
+    """Residual and pump being as before, a state of the line five standard deviations off is
+    unlike, and the line is what differs; one of a standard deviation is not."""
+    found = diagnoses["healthy"]
+    drift = np.zeros(len(found.model.line.drifts))
+    for size, unlike in ((1.0, False), (5.0, True)):
+        drift[0] = size
+        best = replace(found.best, mode=replace(found.best.mode, drift=drift))
+        judged = judge_residual(found.model, best, ErrorPrior(scatter=0.05, change=4.0))
+        assert judged.unlike == unlike
+    assert judged.element == "line"
+
+
 def test_known_states_are_not_unlike(diagnoses):
     """A drift of the line's state is no reason to call a recording unlike."""
     assert all(diagnoses[s].unlikeness.p_value > 0.05 for s in STATES if s != "unlike")
@@ -108,6 +125,44 @@ def test_shaft_angles_that_the_twin_has_fitted_count_for_nothing():
         model.linearise_line(nothing)
         left = model.values - model.parts(nothing).healthy
         assert np.linalg.norm(left) < 1e-3 * np.linalg.norm(model.values)
+
+
+def test_without_the_healthy_recording_the_twin_s_misfit_is_an_error(diagnoses):
+    """Healthy and leaking recordings are told by the twin's own ripple too, and the leak lies in
+    its interval. What the twin gets wrong of the healthy ripple is then among the errors."""
+    rng = np.random.default_rng(0)
+    anchor = leaking_pump.record("anchor", turn=FIRST_TURN, rng=rng)
+    alone = Diagnoser(Twin(leaking_pump.rig(), [anchor]), select_faults(), anchored=False)
+    healthy = leaking_pump.record("again", None, TURN, rng)
+    assert alone(healthy, [anchor]).state == "healthy"
+    fault = Slipper(1e-7, 2)
+    found = alone(leaking_pump.record("slipper", fault, TURN, rng), [anchor])
+    assert found.state == "slipper"
+    assert found.severities["slipper"].low < fault.leak_area < found.severities["slipper"].high
+    own = found.model.orders % leaking_pump.PISTONS == 0
+    errors = [np.mean(d.anchor.variance[:, own]) for d in (found, diagnoses["slipper"])]
+    assert errors[0] > 100.0 * errors[1]
+
+
+def test_a_user_s_fault_is_diagnosed(tmp_path):
+    """Two worn slippers side by side, of a user's file: the state, its probability and the leak
+    area of both together are told under the user's name."""
+    path = tmp_path / "own.py"
+    path.write_text(
+        "from rippletwin.diagnosis.faults.base import Fault\n"
+        "from rippletwin.pump.faults import Slipper\n"
+        "FAULT = Fault('two_slippers', 'two worn slippers', lambda area, piston, pistons: [\n"
+        "    Slipper(area / 2, piston), Slipper(area / 2, piston + 1)], 'inspection')\n"
+    )
+    rng = np.random.default_rng(0)
+    anchor = leaking_pump.record("anchor", turn=FIRST_TURN, rng=rng)
+    leaks = [Slipper(2e-7, 2), Slipper(2e-7, 3)]
+    recording = leaking_pump.record("worn", leaks, TURN, rng)
+    diagnoser = Diagnoser(Twin(leaking_pump.rig(), [anchor]), select_faults([path]))
+    (entry,) = diagnosis_dict([diagnoser(recording, [anchor])])["recordings"]
+    assert entry["state"] == "two_slippers" and entry["probabilities"]["two_slippers"] > 0.95
+    low, high = entry["severity"]["two_slippers"]["ci95"]
+    assert low < 4e-7 < high
 
 
 def test_the_file_has_the_contract_s_keys(diagnoses):

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from diagnosed_rigs import RUN, said, truth
-from diagnosis_trial.score import is_right, score_rig
+from diagnosed_rigs import RUN, said, scored, truth
+from diagnosis_trial.score import is_right
 
 
 @pytest.mark.parametrize(
@@ -41,7 +41,7 @@ def test_rows_compare_truth_and_diagnosis():
         said("unknown_02", "unlike", 0.5),
         said("unknown_03", "slipper", 1e-9, {"slipper": (4e-8, 6e-8)}, piston=3),
     ]
-    first, second, third, fourth = score_rig(7, true, {"recordings": told}, RUN)
+    first, second, third, fourth = scored(7, true, told)
     assert (first["rig"], first["label"], first["right"], first["piston_right"]) == (
         7, "unknown_00", True, True,
     )  # fmt: skip
@@ -49,7 +49,11 @@ def test_rows_compare_truth_and_diagnosis():
     assert severity["low"] < severity["true"] < severity["high"]
     assert first["suspicion"] == pytest.approx(math.log(1e6), rel=1e-6)
     assert second["right"] and second["suspicion"] == pytest.approx(math.log(1 / 9))
-    assert third["right"] and third["suspicion"] == math.inf and third["probability"] is None
+    assert (
+        third["right"]
+        and third["suspicion"] == pytest.approx(math.log(999))
+        and third["probability"] is None
+    )
     assert not fourth["right"] and fourth["piston_right"] is None
     assert fourth["severities"][0]["true"] < fourth["severities"][0]["low"]
 
@@ -57,6 +61,6 @@ def test_rows_compare_truth_and_diagnosis():
 def test_a_crash_is_no_finding():
     """It is wrong for every state, and ranks below every healthy recording."""
     true = truth(unknown_00=("slipper", 0.08, {"slipper": 3e-8}))
-    crashed = {"recordings": [{"label": "unknown_00", "state": "crashed"}]}
-    (row,) = score_rig(0, true, crashed, RUN | {"misfit": None})
+    crashed = [{"label": "unknown_00", "state": "crashed"}]
+    (row,) = scored(0, true, crashed, RUN | {"misfit": None, "diagnose_s": None})
     assert not row["right"] and row["suspicion"] == -math.inf

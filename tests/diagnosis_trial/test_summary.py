@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from diagnosed_rigs import RUN, said, truth
+from diagnosed_rigs import said, scored, truth
 from diagnosis_trial.figures import draw_figures
 from diagnosis_trial.page import report_page
-from diagnosis_trial.score import score_rig
 from diagnosis_trial.summary import (
     ANSWERS,
     STATES,
     change_table,
+    columns_of,
     confusion_matrix,
     reliability_table,
     score_table,
@@ -44,7 +44,7 @@ def rows(rigs: int = 10) -> list[dict]:
             said("unknown_04", "unlike", 0.5),
             said("unknown_05", "slipper+cylinder", 1e-5),
         ]  # fmt: skip
-        made += score_rig(rig, true, {"recordings": told}, RUN)
+        made += scored(rig, true, told)
     return made
 
 
@@ -96,12 +96,30 @@ def test_stated_probabilities_are_those_of_known_states():
     assert wrong.mean == pytest.approx(0.83, abs=0.05)
 
 
+def two_columns() -> list[dict]:
+    """Besides the rows of all recordings those of a network that knows the first two of a rig."""
+    made = rows()
+    seen = [row for row in made if row["label"] in ("unknown_00", "unknown_02")]
+    return made + [row | {"column": "PRA@nominal", "told": "healthy"} for row in seen]
+
+
+def test_columns_are_compared_on_the_recordings_that_all_have_answered():
+    """A network that answers at one operating point must not be compared with easier ones."""
+    found = columns_of(two_columns())
+    assert list(found) == ["anchored@calibrated", "PRA@nominal"]
+    labels = [{(row["rig"], row["label"]) for row in made} for made in found.values()]
+    assert labels[0] == labels[1] and len(labels[0]) == 20
+
+
 def test_page_and_pictures_are_written(tmp_path):
     """Every section has a table; also where next to nothing was recorded."""
-    origin = {"commit": "0" * 40, "number": 1000, "not_committed": False, "twin": "explained"}
-    for made in (rows(), rows(1)[:1]):
+    origin = {"commit": "0" * 40, "number": 1000, "not_committed": False}
+    for made in (rows(), rows(1)[:1], two_columns()):
+        columns = len(columns_of(made))
         page = report_page(made, origin)
-        assert page.count("\n## ") == 6
+        assert page.count("\n## ") == 2 + columns
         assert "nan" not in page and "| slipper |" in page
         paths = draw_figures(made, tmp_path)
-        assert all(path.stat().st_size > 5000 for path in paths) and len(paths) == 3
+        assert all(path.stat().st_size > 5000 for path in paths)
+        assert len(paths) == 1 + 2 * columns
+        assert all(f"figures/{path.name}" in page for path in paths)

@@ -16,7 +16,8 @@ from virtualrig.draw_population import STATES
 @pytest.mark.skipif(landlock_version() < 1, reason="this kernel has no Landlock")
 def test_one_rig_from_drawing_to_the_page(tmp_path):
     """The target runs, nothing crashes, and every state is scored as the diagnosis says."""
-    trial = "{rigs: 1, number: 1001, twin: calibrated}"
+    columns = ["anchored@calibrated", "unanchored@calibrated", "PRA@calibrated", "P@nominal"]
+    trial = f"{{rigs: 1, number: 1001, methods: [{', '.join(columns)}]}}"
     (tmp_path / "one.yaml").write_text(f"results: {tmp_path}/out\ndiagnosis_trial: {trial}\n")
     command = [sys.executable, "-m", "snakemake", "--cores", "2", "--configfile"]
     command += [str(tmp_path / "one.yaml"), "--directory", str(ROOT), "diagnosis_trial"]
@@ -25,8 +26,13 @@ def test_one_rig_from_drawing_to_the_page(tmp_path):
     assert result.returncode == 0, result.stderr
     folder = tmp_path / "out" / "diagnosis_trial"
     rows = json.loads((folder / "rows.json").read_text())
-    assert sorted(row["state"] for row in rows) == sorted(STATES)
-    told = json.loads((folder / "diagnosed" / "000" / "diagnosis.json").read_text())["recordings"]
-    assert {row["label"]: row["told"] for row in rows} == {r["label"]: r["state"] for r in told}
+    told = json.loads((folder / "diagnosed" / "000" / "diagnosis.json").read_text())
+    assert list(told) == columns
+    for column in columns:
+        made = {row["label"]: row for row in rows if row["column"] == column}
+        said = {entry["label"]: entry["state"] for entry in told[column]["recordings"]}
+        assert {label: row["told"] for label, row in made.items()} == said
+    asked = [row["state"] for row in rows if row["column"] == columns[0]]
+    assert sorted(asked) == sorted(STATES)
     assert "crashed" not in {row["told"] for row in rows}
     assert "## Smallest leak" in (folder / "report.md").read_text()

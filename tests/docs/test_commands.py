@@ -37,6 +37,8 @@ HOURS = "it takes a quarter of an hour and more"
 NOT_RUN = {
     "make run": (SCHEDULED, "make --dry-run run"),
     "make smoke": (SCHEDULED, "make --dry-run smoke"),
+    "make lint": ("it makes an environment", "make --dry-run lint"),
+    "make docs-site": ("it makes an environment", "make --dry-run docs-site"),
     "make test": ("it runs this test", "make --dry-run test"),
     "make test-long": ("it runs this test", "make --dry-run test-long"),
     "python3 -m venv .venv": (NETWORK, "python3 -m venv --help"),
@@ -45,6 +47,7 @@ NOT_RUN = {
         NETWORK,
         "python -m pip install --help && test -s environment.txt",
     ),
+    "pip install 'rippletwin[readers]'": (NETWORK, "python -m pip install --help"),
     "pip install snakemake-executor-plugin-slurm": (NETWORK, "python -m pip install --help"),
     "apptainer build rippletwin.sif workflow/rippletwin.def": (
         CLUSTER,
@@ -58,6 +61,10 @@ NOT_RUN = {
     "python benchmarks/measured_tube.py RUN_1 RUN_2 tube": (
         "the measurements are not part of the project",
         "python benchmarks/measured_tube.py --help",
+    ),
+    "python benchmarks/measured_duct.py MEASURED duct": (
+        "the measurements are not part of the project",
+        "python benchmarks/measured_duct.py --help",
     ),
     "python benchmarks/flow_sensor_truth.py flow_truth": (
         HOURS,

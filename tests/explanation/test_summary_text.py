@@ -6,7 +6,9 @@ import pytest
 
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders
 from rippletwin.explanation.verdict.summary_text import (
+    _load,
     _ripple_error,
+    _sensors,
     liquid_like_air,
     summary_text,
 )
@@ -31,6 +33,7 @@ def summarise(
     )
     fit = {"before": {"held_out": 0.02}, "after": {"held_out": 0.02}}
     result = {"verdict": verdict, "fit": fit, "next_recording": None, "pump": pump or {}}
+    result |= {"load": None, "sensors": {}}
     result["remainder"] = remainder
     return summary_text(e, result, [])
 
@@ -121,3 +124,27 @@ def test_a_wrong_ripple_is_told_apart_from_a_wrong_line():
     (sentence,) = _ripple_error(fit)
     assert "misses 40% of the reading" in sentence and "error of the ripple" in sentence
     assert _ripple_error({"after": {"in_sample": 0.02}, "model_error": {"after": 0.01}}) == []
+
+
+def test_an_unknown_load_and_uncalibrated_sensors_are_told():
+    """At the ends and the middle of the band; a phase of 0.1 rad is 5.7 degrees."""
+    load = {
+        "frequency_hz": [100.0, 800.0, 1500.0],
+        "reflection": {"re": [0.3, 0, 0], "im": [0.4, 0.1, 0]},
+    }
+    (said,) = _load(load)
+    assert "0.50 at 100 Hz, 0.10 at 800 Hz and 0.00 at 1500 Hz" in said
+    (said,) = _sensors({"m2": {"gain": {"value": 1.12}, "phase": {"value": 0.1}}})
+    assert "m2 1.120 (phase +5.7 deg)" in said
+    assert _load(None) == [] and _sensors({}) == []
+
+
+def test_numbers_up_to_a_million_have_no_power_of_ten():
+    """A resonance is at 3000 Hz, not at 3e+03 Hz; 1.3 GPa keeps its power."""
+    pump = {
+        "frequency": {"value": 3004.0, "ci95": [2998.0, 3010.0], "sheet": 2500.0, "unit": "Hz"},
+        "bulk_modulus": {"value": 1.3e9, "ci95": [1.2e9, 1.4e9], "sheet": 1.7e9, "unit": "Pa"},
+    }
+    sentence = summarise("consistent", pump=pump)
+    assert "frequency 3000 Hz (data sheet 2500)" in sentence
+    assert "bulk modulus 1.3e+09 Pa (data sheet 1.7e+09)" in sentence

@@ -58,6 +58,12 @@ def test_a_speed_fluctuation_is_named_with_its_own_interval(explanation, verdict
     assert "probability" not in effect
 
 
+def test_warnings_of_the_case_are_told(explanation):
+    """What `check` warns of, as a generic pump, is in the verdict too."""
+    warned = replace(explanation, warnings=("pump: only pistons is given",))
+    assert verdict_dict(warned)["warnings"] == ["pump: only pistons is given"]
+
+
 def test_an_unknown_interval_is_left_out(explanation):
     """Without an interval the key is missing: an invented one would be worse."""
     unknown = replace(explanation, shaft_orders=replace(MODULATION, interval=None))

@@ -1,5 +1,7 @@
 """Truths and diagnoses of a rig, made up for tests of the diagnosis trial."""
 
+from diagnosis_trial.score import score_rig
+
 
 def truth(**states) -> dict:
     """A truth with one recording for each label; keywords are label = (state, change, areas)."""
@@ -27,7 +29,14 @@ def said(
         for name, (low, high) in (intervals or {}).items()
     }
     return {"label": label, "state": state, "probabilities": probabilities, "severity": severity,
-            "piston": piston}  # fmt: skip
+            "piston": piston,
+            "unlike": {"p_value": 1e-3 if state == "unlike" else 0.5}}  # fmt: skip
 
 
+COLUMN = "anchored@calibrated"
 RUN = {"misfit": 0.2, "fit_s": 30.0, "diagnose_s": 12.0}
+
+
+def scored(rig: int, truth: dict, told: list[dict], run: dict = RUN, column: str = COLUMN):
+    """Rows of a rig whose tool has one column."""
+    return score_rig(rig, truth, {column: {"recordings": told}}, {column: run})

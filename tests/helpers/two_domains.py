@@ -13,7 +13,7 @@ STRENGTH = 0.7  # of an effect's parameters, in standard deviations of their pri
 
 def rig(load="orifice"):
     """A short oil line of two segments; with an open end one of air, where radiation counts."""
-    oil = load == "orifice"
+    oil = load != "open"
     line = (
         Segment(0.9, 0.02, 1020.0) if oil else Segment(0.41, 0.008, 343.0),
         Segment(0.637, 0.016, 1200.0) if oil else Segment(0.23, 0.009, 343.0),

@@ -19,7 +19,7 @@ import pathlib
 for _path in map(pathlib.Path, snakemake.output):
     if _path.suffix in (".zarr", "") :
         _path.mkdir(parents=True, exist_ok=True)
-        _path = _path / "made"
+        _path = _path / "made.png"
     _path.write_text(snakemake.rule)
 raise SystemExit(0)
 """

@@ -29,6 +29,7 @@ FIXED = {
     "sensor_delay": "sensor",
     "thermal_boundary_layer": "line",
     "end_radiation": "load",
+    "end_reflection": "load",
     "side_hole": "position",
 }
 FREQUENCY = np.linspace(20.0, 5000.0, 150)

@@ -1,5 +1,7 @@
 """The page of a whole run: accuracies beside the paper's, attention, timings, configuration."""
 
+import json
+
 import pandas as pd
 from PIL import Image
 
@@ -25,6 +27,8 @@ def test_the_page_has_what_only_a_workflow_knows(tmp_path):
         (benchmarks / f"{name}.tsv").write_text(f"s\tmax_rss\n{seconds}\t300.0\n")
     (benchmarks / "short.tsv").write_text("s\tmax_rss\n0.01\t-\n")
     Image.new("RGB", (4, 4)).save(tmp_path / "attention.png")
+    said = {"run 7": {"cnn1d_3_1": {"state": "cylinder", "share": 0.875, "unlike": 0.0625}}}
+    (tmp_path / "networks.json").write_text(json.dumps(said))
     run_script(
         "report_page",
         tmp_path,
@@ -39,11 +43,14 @@ def test_the_page_has_what_only_a_workflow_knows(tmp_path):
         verdict=str(case / "explained" / "verdict.json"),
         diagnosis=[str(case / "diagnosed" / "diagnosis.json")],
         table=str(tmp_path / "accuracy.csv"),
+        answers=str(tmp_path / "networks.json"),
         paper=str(tmp_path / "paper.csv"),
         attention=[str(tmp_path / "attention.png")],
     )
     page = (tmp_path / "report.html").read_text()
     for words in (
+        "run 7</td>",
+        "88</td>",
         "65.0 ± 7.1",
         "37.6 ± 25.6",
         "31.0</td>",

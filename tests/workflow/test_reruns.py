@@ -1,13 +1,9 @@
 """What runs again after an edit: dry runs over Snakemake's real records of a finished run."""
 
 import re
-import shutil
-import subprocess
 from pathlib import Path
 
-import pytest
-
-from workflow_copy import make, planned, snakemake
+from workflow_copy import planned, snakemake
 
 TESTED_AGAIN = {
     "evaluate",
@@ -35,24 +31,6 @@ IMAGES_AGAIN = TESTED_AGAIN | {
     "train",
 }
 PICTURES_OF_SIGNALS = {"plot_seeds", "plot_compound_seeds", "compare_sst"}
-
-
-@pytest.fixture(scope="session")
-def finished(tmp_path_factory) -> Path:
-    folder = tmp_path_factory.mktemp("finished") / "workflow"
-    make(folder)
-    result = snakemake(folder)
-    assert result.returncode == 0, result.stderr
-    return folder
-
-
-@pytest.fixture
-def workflow(finished, tmp_path) -> Path:
-    """A copy of the finished run to edit."""
-    folder = tmp_path / "workflow"
-    subprocess.run(["cp", "-a", finished, folder], check=True)
-    yield folder
-    shutil.rmtree(folder)
 
 
 def edit(path: Path, old: str, new: str) -> None:

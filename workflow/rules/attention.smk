@@ -30,12 +30,16 @@ rule attention_table:
     output:
         table=report(
             f"{RESULTS}/attention.csv",
-            category="attention",
+            category="Attention",
+            subcategory="Tables",
+            labels={"result": "attention of each network"},
             caption="../report/attention.rst",
         ),
         ranks=report(
             f"{RESULTS}/attention_ranks.csv",
-            category="attention",
+            category="Attention",
+            subcategory="Tables",
+            labels={"result": "ranks of the networks"},
             caption="../report/attention_ranks.rst",
         ),
         page=f"{RESULTS}/attention.md",

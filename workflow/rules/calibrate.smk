@@ -1,12 +1,18 @@
 # Healthy recordings -> the calibrated twin, its report and the ripples to draw.
 rule calibrate:
     input:
-        rig=RIG,
-        recordings=recordings(),
+        rig=rig_sheet(),
+        recordings=recordings("fit"),
         source=scripts_sources("calibrate.py"),
     output:
         twin=f"{RESULTS}/calibration/twin.json",
-        report=f"{RESULTS}/calibration/report.md",
+        report=report(
+            f"{RESULTS}/calibration/report.md",
+            category="Calibration",
+            subcategory="Tables",
+            labels={"result": "parameters and misfits"},
+            caption="../report/calibration_table.rst",
+        ),
         ripples=directory(f"{RESULTS}/calibration/ripples.zarr"),
     log:
         f"{RESULTS}/logs/calibrate.log",
@@ -15,6 +21,7 @@ rule calibrate:
     resources:
         mem_mb=2000,
     params:
+        rig=rig_content(*RIG_SECTIONS, recordings="fit"),
         method=config["calibration"]["method"],
         friction=config["calibration"]["friction"],
         max_frequency_hz=config["calibration"]["max_frequency_hz"],

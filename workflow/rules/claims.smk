@@ -8,14 +8,24 @@ rule claims:
     output:
         table=report(
             f"{RESULTS}/claims.csv",
-            category="claims",
+            category="Claims of the paper",
+            subcategory="Tables",
+            labels={"result": "claims"},
             caption="../report/claims.rst",
         ),
-        comparisons=f"{RESULTS}/claims_compared.csv",
+        comparisons=report(
+            f"{RESULTS}/claims_compared.csv",
+            category="Claims of the paper",
+            subcategory="Tables",
+            labels={"result": "comparisons"},
+            caption="../report/claims_compared.rst",
+        ),
         page=f"{RESULTS}/claims.md",
         png=report(
             f"{RESULTS}/figures/claims.png",
-            category="claims",
+            category="Claims of the paper",
+            subcategory="Figures",
+            labels={"result": "claims"},
             caption="../report/claims.rst",
         ),
         svg=f"{RESULTS}/figures/claims.svg",
@@ -24,7 +34,7 @@ rule claims:
     benchmark:
         f"{RESULTS}/benchmarks/claims.tsv"
     params:
-        rig=rig_sections("pump"),
+        rig=rig_content("pump"),
         samples_per_revolution=config["windows"]["samples_per_revolution"],
         datasets=[name for name in CHOSEN if name not in RANDOMISED],
     script:
@@ -40,12 +50,16 @@ rule compare_sst:
     output:
         table=report(
             f"{RESULTS}/similarity.csv",
-            category="simulated signals",
+            category="Simulated signals",
+            subcategory="Tables",
+            labels={"result": "similarity of the images"},
             caption="../report/similarity.rst",
         ),
         png=report(
             f"{RESULTS}/figures/sst_compared.png",
-            category="simulated signals",
+            category="Simulated signals",
+            subcategory="Synchrosqueezed images",
+            labels={"result": "recorded and simulated"},
             caption="../report/similarity.rst",
         ),
         svg=f"{RESULTS}/figures/sst_compared.svg",
@@ -58,7 +72,7 @@ rule compare_sst:
             "uncalibrated" if DATASETS[name].line == "pipe" else DATASETS[name].twin
             for name in PRESSURES
         ],
-        rig=rig_sections("pump"),
+        rig=rig_content("pump"),
         sst=config["sst"],
     script:
         "../scripts/compare_sst.py"

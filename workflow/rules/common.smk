@@ -8,9 +8,9 @@ import pandas as pd
 from snakemake.exceptions import WorkflowError
 from snakemake.utils import validate
 
-ROOT = Path(workflow.basedir)
 sys.path[:0] = [str(ROOT / "workflow"), str(ROOT / "src")]
 
+import case_parts
 from config_errors import (
     check_config,
     check_datasets,
@@ -46,32 +46,36 @@ RIG, SHEET = (
 CASE = os.path.dirname(RIG)
 
 
-# whether a recording's state is to be told, or to be checked
-DIAGNOSED_HERE = RECORDED_HERE or any(
-    entry["state"] != "healthy" and entry.get("kind", "periodic") == "periodic"
-    for entry in SHEET["recordings"]
-)
+# the virtual rig has a healthy pump and known faults at one operating point
+HAS_PERIODIC = RECORDED_HERE or case_parts.has_periodic(SHEET)
+DIAGNOSED_HERE = RECORDED_HERE or case_parts.is_diagnosed(SHEET)
+SCORED_HERE = RECORDED_HERE or case_parts.is_scored(SHEET)
+HAS_UNKNOWN = not RECORDED_HERE and bool(case_parts.recordings_for(SHEET, "unknown"))
 
 
-def recordings():
-    """The case's files besides rig.yaml: one folder where the virtual rig makes them."""
+RIG_SECTIONS = ("fluid", "pump", "line", "sensors", "load", "uncertainty")
+
+
+def recordings(purpose):
+    """Files of the case besides rig.yaml that serve a purpose of `case_parts`; one folder where the
+    virtual rig makes them."""
     if RECORDED_HERE:
         return [f"{CASE}/recordings"]
-    files = {SHEET["load"]["impedance"]} if "impedance" in SHEET["load"] else set()
-    for entry in SHEET["recordings"]:
-        files |= {entry["file"], *entry.get("repeats", ())}
-        files |= {entry["flow_ripple"]} if "flow_ripple" in entry else set()
-    return sorted(f"{CASE}/{name}" for name in files)
+    return [f"{CASE}/{name}" for name in case_parts.files_for(SHEET, purpose)]
 
 
 def rig_sheet():
-    """rig.yaml as an input whose age does not matter: `rig_sections` tells what was edited."""
+    """rig.yaml as an input whose age does not matter: `rig_content` tells what was edited."""
     return RIG if RECORDED_HERE else ancient(RIG)
 
 
-def rig_sections(*names):
-    """Params: these sections of rig.yaml, so that editing another one reruns nothing."""
-    return {name: SHEET.get(name) for name in names}
+def rig_content(*sections, recordings=None):
+    """Params: what rig.yaml says in these sections and of the recordings that serve a purpose, in
+    normal form, so that an edit of anything else reruns nothing."""
+    parts = {name: SHEET.get(name) for name in sections}
+    if recordings is not None and not RECORDED_HERE:
+        parts["recordings"] = case_parts.recordings_for(SHEET, recordings)
+    return case_parts.normal_form(parts)
 
 
 # ---- datasets and states --------------------------------------------------------------------
@@ -87,6 +91,8 @@ CHOSEN = [name for name in DATASETS if name in config["datasets"]]
 SIMULATED = [name for name in CHOSEN if DATASETS[name].line != "rig"]
 PRESSURES = [name for name in SIMULATED if DATASETS[name].signal == "pressure"]
 RANDOMISED = [name for name in CHOSEN if DATASETS[name].randomised == "yes"]
+# networks that can be asked about recordings of unknown state
+ASKED = [name for name in RANDOMISED if DATASETS[name].signal == "pressure"]
 STATES = {  # what a dataset's networks learn, and what they are shown besides
     "single": list(CLASSES),
     "compound": ["+".join(faults) for faults in config["faults"]["compound"]],
@@ -113,6 +119,15 @@ def of_domain(domain):
     """The configured networks on time windows, or on images."""
     names = config["architectures"]
     return [name for name in names if ARCHITECTURES[name].domain == domain]
+
+
+# whether networks are asked about recordings of unknown state
+ASKED_HERE = HAS_UNKNOWN and bool(ASKED) and bool(of_domain("time"))
+
+
+def in_words(name):
+    """A figure's file name as a label of the report."""
+    return name.removeprefix("explain_").replace("_", " ")
 
 
 def scripts_sources(script):

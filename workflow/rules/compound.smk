@@ -28,7 +28,9 @@ rule report_compound:
     output:
         report(
             f"{RESULTS}/compound.md",
-            category="compound faults",
+            category="Compound faults",
+            subcategory="Tables",
+            labels={"result": "answers of the networks"},
             caption="../report/compound.rst",
         ),
     log:

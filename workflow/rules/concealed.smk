@@ -139,13 +139,17 @@ rule report_concealed:
     output:
         page=report(
             f"{CONCEALED}/report.md",
-            category="concealed",
+            category="Concealed trial",
+            subcategory="Tables",
+            labels={"result": "scores"},
             caption="../report/concealed.rst",
         ),
         figures=report(
             directory(f"{CONCEALED}/figures"),
             patterns=["{name}.png"],
-            category="concealed",
+            category="Concealed trial",
+            subcategory="Figures",
+            labels=lambda wildcards: {"result": in_words(wildcards.name)},
             caption="../report/concealed.rst",
         ),
     log:

@@ -2,17 +2,25 @@
 rule diagnose:
     input:
         rig=rig_sheet(),
-        recordings=recordings(),
+        recordings=recordings("all"),
         twin=rules.explain.output.twin,
         effects=config["explain"]["effects"],
         faults=[name for name in config["faults"]["files"] if name.endswith(".py")],
         source=scripts_sources("diagnose.py"),
     output:
-        diagnosis=f"{RESULTS}/diagnosis/diagnosis.json",
+        diagnosis=report(
+            f"{RESULTS}/diagnosis/diagnosis.json",
+            category="Diagnosis by the twin",
+            subcategory="Data",
+            labels={"result": "diagnosis of every recording"},
+            caption="../report/diagnosis.rst",
+        ),
         figures=report(
             directory(f"{RESULTS}/diagnosis/figures"),
             patterns=["{name}.png"],
-            category="diagnosis by the twin",
+            category="Diagnosis by the twin",
+            subcategory="Figures",
+            labels=lambda wildcards: {"result": in_words(wildcards.name)},
             caption="../report/diagnose.rst",
         ),
     log:
@@ -22,7 +30,7 @@ rule diagnose:
     resources:
         mem_mb=2000,
     params:
-        rig=rig_sections("pump", "sensors", "recordings"),
+        rig=rig_content(*RIG_SECTIONS, recordings="all"),
         faults=config["faults"]["files"],
     script:
         "../scripts/diagnose.py"

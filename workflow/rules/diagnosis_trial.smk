@@ -49,13 +49,13 @@ rule diagnose_population:
     params:
         out=subpath(output.diagnosis, parent=True),
         cache=f"{TRIAL}/cache",
-        twin=config["diagnosis_trial"]["twin"],
+        columns=config["diagnosis_trial"]["methods"],
     shell:
         "(mkdir -p {params.out} {params.cache};"
         " NUMBA_CACHE_DIR=$(realpath {params.cache}) TMPDIR={params.out}"
         " python -m concealed.jail --read {input.case} --read $(dirname {input.tool[0]})"
         " --write {params.out} --write {params.cache}"
-        " -- python -m diagnosis_trial.tool {input.case} {params.out} {params.twin}) > {log} 2>&1"
+        " -- python -m diagnosis_trial.tool {input.case} {params.out} {params.columns}) > {log} 2>&1"
 
 
 rule commit_diagnoses:
@@ -99,13 +99,17 @@ rule report_diagnosis_trial:
     output:
         page=report(
             f"{TRIAL}/report.md",
-            category="diagnosis trial",
+            category="Diagnosis trial",
+            subcategory="Tables",
+            labels={"result": "scores"},
             caption="../report/diagnosis_trial.rst",
         ),
         figures=report(
             directory(f"{TRIAL}/figures"),
             patterns=["{name}.png"],
-            category="diagnosis trial",
+            category="Diagnosis trial",
+            subcategory="Figures",
+            labels=lambda wildcards: {"result": in_words(wildcards.name)},
             caption="../report/diagnosis_trial.rst",
         ),
     log:
@@ -116,7 +120,6 @@ rule report_diagnosis_trial:
         commit=lambda wildcards: tool_commit(ROOT),
         not_committed=lambda wildcards: not_committed(ROOT),
         number=config["diagnosis_trial"]["number"],
-        twin=config["diagnosis_trial"]["twin"],
     script:
         "../scripts/report_diagnosis_trial.py"
 

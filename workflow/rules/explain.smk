@@ -2,16 +2,24 @@
 rule explain:
     input:
         rig=rig_sheet(),
-        recordings=recordings(),
+        recordings=recordings("fit"),
         effects=config["explain"]["effects"],
         source=scripts_sources("explain.py"),
     output:
-        verdict=f"{RESULTS}/explain/verdict.json",
+        verdict=report(
+            f"{RESULTS}/explain/verdict.json",
+            category="Missing physics",
+            subcategory="Data",
+            labels={"result": "verdict"},
+            caption="../report/verdict.rst",
+        ),
         twin=f"{RESULTS}/explain/twin.json",
         figures=report(
             directory(f"{RESULTS}/explain/figures"),
             patterns=["{name}.png"],
-            category="missing physics",
+            category="Missing physics",
+            subcategory="Figures",
+            labels=lambda wildcards: {"result": in_words(wildcards.name)},
             caption="../report/explain.rst",
         ),
     log:
@@ -24,6 +32,6 @@ rule explain:
     resources:
         mem_mb=3000,
     params:
-        rig=rig_sections("fluid", "pump", "line", "sensors", "load", "uncertainty"),
+        rig=rig_content(*RIG_SECTIONS, recordings="fit"),
     script:
         "../scripts/explain.py"

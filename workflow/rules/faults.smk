@@ -11,7 +11,7 @@ rule simulate_fault:
     benchmark:
         f"{RESULTS}/benchmarks/simulate_fault/{{state}}.tsv"
     params:
-        rig=rig_sections("fluid", "pump", "line", "sensors", "load"),
+        rig=rig_content("fluid", "pump", "line", "sensors", "load"),
         leak_area=leak_area_of,
         pipe_length=config["faults"]["pipe_length"],
     script:

@@ -7,7 +7,9 @@ rule plot_calibration:
         report(
             directory(f"{RESULTS}/figures/calibration"),
             patterns=["{label}.png"],
-            category="calibration",
+            category="Calibration",
+            subcategory="Ripples",
+            labels={"recording": "{label}"},
             caption="../report/calibration.rst",
         ),
     log:
@@ -27,13 +29,17 @@ rule plot_seeds:
     output:
         ripple=report(
             f"{RESULTS}/figures/seeds_{{dataset}}.png",
-            category="simulated signals",
+            category="Simulated signals",
+            subcategory="Ripples",
+            labels={"dataset": "{dataset}"},
             caption="../report/seeds.rst",
         ),
         ripple_svg=f"{RESULTS}/figures/seeds_{{dataset}}.svg",
         sst=report(
             f"{RESULTS}/figures/sst_{{dataset}}.png",
-            category="simulated signals",
+            category="Simulated signals",
+            subcategory="Synchrosqueezed images",
+            labels={"dataset": "{dataset}"},
             caption="../report/sst.rst",
         ),
         sst_svg=f"{RESULTS}/figures/sst_{{dataset}}.svg",
@@ -42,7 +48,7 @@ rule plot_seeds:
     benchmark:
         f"{RESULTS}/benchmarks/plot_seeds/{{dataset}}.tsv"
     params:
-        rig=rig_sections("pump"),
+        rig=rig_content("pump"),
         # the picture has a size of its own
         sst={key: value for key, value in config["sst"].items() if key != "size"},
     script:
@@ -58,13 +64,17 @@ use rule plot_seeds as plot_compound_seeds with:
     output:
         ripple=report(
             f"{RESULTS}/figures/seeds_compound/{{dataset}}.png",
-            category="compound faults",
+            category="Compound faults",
+            subcategory="Ripples",
+            labels={"dataset": "{dataset}"},
             caption="../report/seeds.rst",
         ),
         ripple_svg=f"{RESULTS}/figures/seeds_compound/{{dataset}}.svg",
         sst=report(
             f"{RESULTS}/figures/sst_compound/{{dataset}}.png",
-            category="compound faults",
+            category="Compound faults",
+            subcategory="Synchrosqueezed images",
+            labels={"dataset": "{dataset}"},
             caption="../report/sst.rst",
         ),
         sst_svg=f"{RESULTS}/figures/sst_compound/{{dataset}}.svg",
@@ -82,7 +92,9 @@ rule plot_accuracy:
     output:
         png=report(
             f"{RESULTS}/figures/accuracy.png",
-            category="accuracy",
+            category="Accuracy",
+            subcategory="Figures",
+            labels={"result": "accuracy beside the paper's"},
             caption="../report/accuracy.rst",
         ),
         svg=f"{RESULTS}/figures/accuracy.svg",
@@ -101,7 +113,9 @@ rule plot_confusion:
     output:
         png=report(
             f"{RESULTS}/figures/confusion_{{dataset}}.png",
-            category="confusion matrices",
+            category="Accuracy",
+            subcategory="Confusion matrices",
+            labels={"dataset": "{dataset}"},
             caption="../report/confusion.rst",
         ),
         svg=f"{RESULTS}/figures/confusion_{{dataset}}.svg",
@@ -120,7 +134,9 @@ rule plot_ranks:
     output:
         png=report(
             f"{RESULTS}/figures/attention_ranks.png",
-            category="attention",
+            category="Attention",
+            subcategory="Figures",
+            labels={"result": "ranks of the networks"},
             caption="../report/attention_ranks.rst",
         ),
         svg=f"{RESULTS}/figures/attention_ranks.svg",
@@ -144,13 +160,25 @@ rule plot_attention:
     output:
         simulated=report(
             f"{RESULTS}/figures/attention_{{dataset}}_{{domain}}_simulated.png",
-            category="attention",
+            category="Attention",
+            subcategory="Maps",
+            labels={
+                "dataset": "{dataset}",
+                "domain": "{domain}",
+                "signals": "simulated",
+            },
             caption="../report/attention_simulated.rst",
         ),
         simulated_svg=f"{RESULTS}/figures/attention_{{dataset}}_{{domain}}_simulated.svg",
         recorded=report(
             f"{RESULTS}/figures/attention_{{dataset}}_{{domain}}_recorded.png",
-            category="attention",
+            category="Attention",
+            subcategory="Maps",
+            labels={
+                "dataset": "{dataset}",
+                "domain": "{domain}",
+                "signals": "recorded",
+            },
             caption="../report/attention_recorded.rst",
         ),
         recorded_svg=f"{RESULTS}/figures/attention_{{dataset}}_{{domain}}_recorded.svg",
@@ -160,7 +188,7 @@ rule plot_attention:
         f"{RESULTS}/benchmarks/plot_attention/{{dataset}}_{{domain}}.tsv"
     params:
         architectures=lambda wildcards: of_domain(wildcards.domain),
-        rig=rig_sections("pump"),
+        rig=rig_content("pump"),
         sst=config["sst"],
     script:
         "../scripts/plot_attention.py"

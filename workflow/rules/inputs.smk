@@ -5,21 +5,35 @@ from rippletwin.learning.architectures import LONGEST_TRAININGS
 
 
 def get_final_output():
-    """What a whole run makes with the configured datasets, networks and compound faults."""
+    """What a whole run makes of the case with the configured datasets, networks and faults.
+
+    Networks are trained where there is something to ask them: a recording of a known fault that
+    scores them, or one of unknown state.
+    """
+    wanted = [rules.report_page.output]
+    if HAS_PERIODIC:
+        wanted.append(rules.plot_calibration.output)
+        wanted += expand(rules.plot_seeds.output, dataset=SIMULATED)
+        if PRESSURES:
+            wanted.append(rules.compare_sst.output)
+        if SIMULATED and STATES["compound"]:
+            wanted += expand(rules.plot_compound_seeds.output, dataset=SIMULATED)
+    if ASKED_HERE:
+        wanted.append(rules.ask_networks.output)
+    if RANDOMISED and of_domain("time") and (SCORED_HERE or ASKED_HERE):
+        wanted.append(rules.unlike_table.output)
+    return wanted + (scores() if SCORED_HERE else [])
+
+
+def scores():
+    """What comes of networks that recordings of known faults score."""
     wanted = [
         rules.accuracy_table.output,
         rules.recording_table.output,
-        rules.report_page.output,
         rules.claims.output,
         rules.plot_accuracy.output,
-        rules.plot_calibration.output,
         expand(rules.plot_confusion.output, dataset=CHOSEN),
-        expand(rules.plot_seeds.output, dataset=SIMULATED),
     ]
-    if RANDOMISED and of_domain("time"):
-        wanted.append(rules.unlike_table.output)
-    if PRESSURES:
-        wanted.append(rules.compare_sst.output)
     if corrected_pairs():
         wanted.append(rules.report_cost.output)
     if SIMULATED:
@@ -28,7 +42,6 @@ def get_final_output():
         wanted += expand(rules.plot_attention.output, dataset=SIMULATED, domain=domains)
     if SIMULATED and STATES["compound"]:
         wanted.append(rules.report_compound.output)
-        wanted += expand(rules.plot_compound_seeds.output, dataset=SIMULATED)
     return wanted
 
 
@@ -167,7 +180,7 @@ def cylinder_class_of(wildcards):
 
 def shown_attention():
     """Pictures of attention on the page: of the first simulated dataset, on time windows."""
-    if not SIMULATED or not of_domain("time"):
+    if not SCORED_HERE or not SIMULATED or not of_domain("time"):
         return []
     name = f"{RESULTS}/figures/attention_{SIMULATED[0]}_time_{{windows}}.png"
     return expand(name, windows=["simulated", "recorded"])

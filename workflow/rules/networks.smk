@@ -36,7 +36,9 @@ rule unlike_table:
     output:
         page=report(
             f"{RESULTS}/unlike.md",
-            category="accuracy",
+            category="Accuracy",
+            subcategory="Tables",
+            labels={"result": "recordings unlike the simulations"},
             caption="../report/unlike.rst",
         ),
     log:
@@ -47,3 +49,35 @@ rule unlike_table:
         cells=[(name, network) for name in RANDOMISED for network in of_domain("time")],
     script:
         "../scripts/unlike_table.py"
+
+
+# They are asked about recordings of unknown state: none of the scored networks is needed for that.
+rule ask_networks:
+    input:
+        rig=rig_sheet(),
+        recordings=recordings("unknown"),
+        networks=expand(
+            rules.keep_networks.output.networks,
+            dataset=ASKED,
+            architecture=of_domain("time"),
+        ),
+        source=scripts_sources("ask_networks.py"),
+    output:
+        answers=f"{RESULTS}/diagnosis/networks.json",
+        page=report(
+            f"{RESULTS}/diagnosis/networks.md",
+            category="Diagnosis by networks",
+            subcategory="Tables",
+            labels={"result": "recordings of unknown state"},
+            caption="../report/answers.rst",
+        ),
+    log:
+        f"{RESULTS}/logs/ask_networks.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/ask_networks.tsv"
+    resources:
+        mem_mb=2000,
+    params:
+        rig=rig_content("pump", "sensors", recordings="unknown"),
+    script:
+        "../scripts/ask_networks.py"

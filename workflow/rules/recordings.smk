@@ -26,7 +26,7 @@ if RECORDED_HERE:
 rule cut_windows:
     input:
         rig=rig_sheet(),
-        recordings=recordings(),
+        recordings=recordings("reference"),
         source=scripts_sources("cut_windows.py"),
     output:
         windows=directory(f"{RESULTS}/recordings/pressure.zarr"),
@@ -37,7 +37,7 @@ rule cut_windows:
     resources:
         mem_mb=2000,
     params:
-        rig=rig_sections("pump", "sensors", "recordings"),
+        rig=rig_content("pump", "sensors", recordings="reference"),
         windows=config["windows"]["per_recording"],
         samples=config["windows"]["samples_per_revolution"],
     script:

@@ -11,13 +11,14 @@ rule accuracy_table:
             dataset=CHOSEN,
             architecture=config["architectures"],
         ),
-        recorded=rules.cut_windows.output.windows,
         paper=PAPER,
         source=scripts_sources("accuracy_table.py"),
     output:
         table=report(
             f"{RESULTS}/accuracy.csv",
-            category="accuracy",
+            category="Accuracy",
+            subcategory="Tables",
+            labels={"result": "accuracy beside the paper's"},
             caption="../report/accuracy.rst",
         ),
         page=f"{RESULTS}/accuracy.md",
@@ -48,7 +49,9 @@ rule recording_table:
     output:
         table=report(
             f"{RESULTS}/recordings.csv",
-            category="accuracy",
+            category="Accuracy",
+            subcategory="Tables",
+            labels={"result": "recording by recording"},
             caption="../report/recordings.rst",
         ),
         page=f"{RESULTS}/recordings.md",
@@ -73,7 +76,9 @@ rule report_cost:
     output:
         report(
             f"{RESULTS}/cost_of_missing_physics.md",
-            category="accuracy",
+            category="Accuracy",
+            subcategory="Tables",
+            labels={"result": "cost of missing physics"},
             caption="../report/cost.rst",
         ),
     log:
@@ -90,19 +95,22 @@ rule report_cost:
 rule report_page:
     input:
         rig=rig_sheet(),
-        recordings=recordings(),
+        recordings=recordings("all"),
         verdict=rules.explain.output.verdict,
         twin=rules.explain.output.twin,
         explained=rules.explain.output.figures,
         diagnosis=rules.diagnose.output if DIAGNOSED_HERE else [],
-        table=rules.accuracy_table.output.table,
+        table=rules.accuracy_table.output.table if SCORED_HERE else [],
         paper=PAPER,
+        answers=rules.ask_networks.output.answers if ASKED_HERE else [],
         attention=shown_attention(),
         source=scripts_sources("report_page.py"),
     output:
         report(
             f"{RESULTS}/report.html",
-            category="summary",
+            category="Summary",
+            subcategory="Page",
+            labels={"result": "everything on one page"},
             caption="../report/page.rst",
         ),
     log:
@@ -110,7 +118,7 @@ rule report_page:
     benchmark:
         f"{RESULTS}/benchmarks/report_page.tsv"
     params:
-        rig=rig_sections("fluid", "pump", "line", "sensors", "load", "recordings"),
+        rig=rig_content(*RIG_SECTIONS, recordings="all"),
         recordings="the virtual rig's" if RECORDED_HERE else f"those of {CASE}",
         benchmarks=f"{RESULTS}/benchmarks",
         configuration=config,

@@ -6,17 +6,15 @@ from pathlib import Path
 import pandas as pd
 
 from job import open_log
-from rippletwin import store
-from rippletwin.learning.accuracy import UNKNOWN, result_row, score
+from rippletwin.learning.accuracy import result_row, score
 from rippletwin.learning.architectures import CLASSES
-from rippletwin.learning.tables import accuracy_table, answer_table
+from rippletwin.learning.tables import accuracy_table
 from rippletwin.learning.training import History
 from rippletwin.learning.windows import first_of_each_state
 
 report_progress = open_log(snakemake)
 params, paths = snakemake.params, snakemake.input
-files = dict(enumerate(store.load(paths.recorded).source.split(", ")))
-rows, diagnoses = [], []
+rows = []
 for (dataset, architecture), predictions, histories in zip(
     params.cells, paths.predictions, paths.histories, strict=True
 ):
@@ -28,10 +26,6 @@ for (dataset, architecture), predictions, histories in zip(
         predicted = windows.predicted.map(CLASSES.index).to_numpy()
         scored = score(windows.truth.to_numpy(), predicted, params.signals[dataset], severity)
         rows.append(result_row(architecture, dataset, seed, scored, endings[seed]))
-    unknown = answers[answers.truth == UNKNOWN]
-    if len(unknown):
-        unknown = unknown.assign(recording=unknown.recording.map(files))
-        diagnoses.append(unknown.assign(dataset=dataset, architecture=architecture))
 results = pd.DataFrame(rows)
 results.to_csv(snakemake.output.table, index=False)
 paper = pd.read_csv(paths.paper)
@@ -48,12 +42,5 @@ networks learnt a range of severities.
 {accuracy_table(results, paper.iloc[:0], params.columns, "accuracy_either")}
 {int(results.converged.sum())} of {len(results)} trainings met the convergence rule.
 """
-if diagnoses:
-    page += f"""
-## Recordings of unknown state
-
-Their windows are not scored above. Shares of the answers over windows and seeds, per cent.
-
-{answer_table(pd.concat(diagnoses))}"""
 Path(snakemake.output.page).write_text(page)
 report_progress(f"{len(results)} trainings, {int(results.converged.sum())} of them converged")

@@ -1,4 +1,4 @@
-"""Windows of one revolution from every recording at the diagnosed operating point."""
+"""Windows of one revolution from every reference recording at the diagnosed operating point."""
 
 from pathlib import Path
 
@@ -7,16 +7,19 @@ import xarray as xr
 
 from job import open_log
 from rippletwin import store
-from rippletwin.case.diagnosed_point import recordings_to_diagnose
-from rippletwin.case.load import load_case
+from rippletwin.case.diagnosed_point import reference_recordings
+from rippletwin.case.load import load_case, unread_recordings
+from rippletwin.case.rig_yaml import read_sheet
 from rippletwin.learning.dataset import remove_mean
 from rippletwin.spectra.noise import noise_cycle_scatter, noise_mad
 from rippletwin.spectra.observation import revolutions_of
 
 report_progress = open_log(snakemake)
 params = snakemake.params
-case = load_case(Path(snakemake.input.rig).parent)
-chosen, others = recordings_to_diagnose(case.recordings)
+rig = Path(snakemake.input.rig)
+labels = [recording.label for recording in reference_recordings(unread_recordings(read_sheet(rig)))]
+case = load_case(rig.parent, labels=labels)
+chosen = case.recordings
 cut = [revolutions_of(r, case.rig, params.samples) for r in chosen]
 windows = [revolutions.windows[: params.windows] for revolutions in cut]
 counts = [len(w) for w in windows]
@@ -52,6 +55,3 @@ store.save(
     snakemake.output[0],
 )
 report_progress(f"{sum(counts)} windows of {', '.join(r.label for r in chosen)}")
-if others:
-    labels = ", ".join(r.label for r in others)
-    report_progress(f"at another operating point, not diagnosed: {labels}")

@@ -11,6 +11,8 @@ from rippletwin.twin.effects.library import add_effects
 
 report_progress = open_log(snakemake)
 case = load_case(Path(snakemake.input.rig).parent, states={"healthy"})
+for warning in case.warnings:
+    report_progress(f"warning: {warning}")
 add_effects(snakemake.input.effects, case.rig)
 explanation = explain(
     case, snakemake.threads, lambda what, done, total: report_progress(f"{what}: {done} of {total}")

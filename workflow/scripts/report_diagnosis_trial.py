@@ -9,7 +9,7 @@ from job import open_log
 
 report_progress = open_log(snakemake)
 rows = json.loads(Path(snakemake.input.rows).read_text())
-origin = {name: snakemake.params[name] for name in ("commit", "number", "not_committed", "twin")}
+origin = {name: snakemake.params[name] for name in ("commit", "number", "not_committed")}
 draw_figures(rows, snakemake.output.figures)
 Path(snakemake.output.page).write_text(report_page(rows, origin))
 report_progress(f"{snakemake.output.page} written")

@@ -1,5 +1,6 @@
 """One page with the case, its verdict, its diagnosis, and what the whole run has found."""
 
+import json
 from base64 import b64encode
 from pathlib import Path
 
@@ -12,11 +13,11 @@ from rippletwin.learning.architectures import ARCHITECTURES
 from rippletwin.report.content import WorkflowPart
 from rippletwin.report.page import write_report
 from rippletwin.report.results import read_results
-from rippletwin.report.workflow_tables import accuracy_table, timing_table
+from rippletwin.report.workflow_tables import accuracy_table, answer_table, timing_table
 
 report_progress = open_log(snakemake)
 params, paths = snakemake.params, snakemake.input
-rows = summarise(pd.read_csv(paths.table)).to_dict("records")
+rows = summarise(pd.read_csv(paths.table)).to_dict("records") if paths.table else []
 for row in rows:
     row["title"] = ARCHITECTURES[row["architecture"]].title
 paper = pd.read_csv(paths.paper).itertuples(index=False)
@@ -25,11 +26,15 @@ for path in map(Path, paths.attention):
     windows = path.stem.rpartition("_")[2]
     picture = "data:image/png;base64," + b64encode(path.read_bytes()).decode()
     pictures.append((f"Where the networks look (Grad-CAM): {windows} signals", picture))
+theirs = {(p.architecture, p.dataset): (p.mean, p.std) for p in paper}
+answers = json.loads(Path(paths.answers).read_text()) if paths.answers else {}
+tables = [
+    *([answer_table(answers)] if answers else []),
+    *([accuracy_table(rows, theirs)] if rows else []),
+    timing_table(params.benchmarks),
+]
 workflow = WorkflowPart(
-    tables=(
-        accuracy_table(rows, {(p.architecture, p.dataset): (p.mean, p.std) for p in paper}),
-        timing_table(params.benchmarks),
-    ),
+    tables=tables,
     pictures=pictures,
     notes=[f"The recordings are {params.recordings}."],
     configuration=yaml.safe_dump(params.configuration, sort_keys=False),

@@ -22,6 +22,7 @@ from rippletwin.calibration.likelihood import EVENNESS, Likelihood
 from rippletwin.calibration.misfit import Misfit, misfit
 from rippletwin.calibration.shaft_angles import fit_shaft_angles
 from rippletwin.twin.twin import Twin
+from rippletwin.twin.unknown_load import LoadCurve, load_curve
 
 UNDETERMINED_SD = 0.7  # posterior over prior standard deviation above which data say little
 IMPLAUSIBLE_PULL = 3.0  # prior standard deviations
@@ -56,6 +57,7 @@ class Calibration:
     objective     minus the log posterior at the mode
     before, after misfits of `nominal` and of `twin`
     warnings      in plain words
+    observations  those that were fitted
     """
 
     twin: Twin
@@ -67,11 +69,18 @@ class Calibration:
     before: Misfit
     after: Misfit
     warnings: tuple[str, ...] = field(default=())
+    observations: tuple = field(default=(), repr=False)
 
     @property
     def sd(self) -> np.ndarray:
         """(P,) posterior standard deviations in theta's coordinates: 1 is the prior's."""
         return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def load(self) -> LoadCurve | None:
+        """What the calibrated load reflects where the data sheet does not say; None where it
+        does."""
+        return load_curve(self.twin, self.covariance, self.observations)
 
 
 def calibrate(
@@ -123,6 +132,7 @@ def conclude(model: Likelihood, theta: np.ndarray, settings: Settings = DEFAULTS
         before=misfit(model, nominal),
         after=after,
         warnings=_warnings(fitted, mode.covariance, after),
+        observations=tuple(model.observations),
     )
 
 
@@ -140,8 +150,8 @@ def _warnings(twin: Twin, covariance: np.ndarray, after: Misfit) -> tuple[str, .
             if p.unit == "rad" and value_sd > ANGLE_SD:
                 out.append(f"{p.name} is not determined by the data")
             continue
-        if p.prior.scale == 0.0:
-            continue  # exact by the data sheet
+        if p.prior.scale == 0.0 or not p.stated:
+            continue  # exact by the data sheet, or not on it
         if abs(u) > IMPLAUSIBLE_PULL:
             out.append(
                 f"{p.name} is implausible: {value:.4g} {p.unit} is {abs(u):.1f} standard "

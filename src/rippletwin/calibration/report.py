@@ -12,6 +12,9 @@ import numpy as np
 from rippletwin.calibration.calibrate import Calibration
 from rippletwin.calibration.misfit import Misfit
 from rippletwin.twin import twin_file
+from rippletwin.twin.unknown_load import LoadCurve
+
+LOAD_ROWS_STEP = 8  # frequencies of the load's curve from one row to the next
 
 
 def segment_table(calibration: Calibration) -> list[dict]:
@@ -71,6 +74,7 @@ def to_dict(calibration: Calibration) -> dict:
         "covariance": calibration.covariance.tolist(),
         "parameters": parameter_table(calibration),
         "segments": segment_table(calibration),
+        "load": None if calibration.load is None else calibration.load.as_dict(),
         "error_floor": calibration.model_error,
         "source_sd": calibration.source_sd,
         "minus_log_posterior": calibration.objective,
@@ -110,6 +114,8 @@ def to_markdown(calibration: Calibration) -> str:
             f"| {row['segment']} | {1e3 * row['delay']:.4f} | {1e3 * row['delay_sd']:.2g} "
             f"| {1e-6 * row['impedance']:.5g} | {1e-6 * row['impedance_sd']:.2g} |"
         )
+    if calibration.load is not None:
+        lines += _load_table(calibration.load)
     lines += [
         "",
         "## Parameters",
@@ -133,6 +139,23 @@ def to_markdown(calibration: Calibration) -> str:
         f"relative error of the source: {calibration.source_sd:.2%}.",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _load_table(curve: LoadCurve) -> list[str]:
+    """Reflection coefficient of an unknown load at every LOAD_ROWS_STEPth frequency."""
+    lines = [
+        "",
+        "## Load",
+        "",
+        "Reflection coefficient of the unknown load; all frequencies are in twin.json.",
+        "",
+        "| frequency, Hz | amplitude | phase, deg | sd |",
+        "|---|---|---|---|",
+    ]
+    rows = zip(curve.frequency_hz, curve.reflection, curve.sd)
+    for f, r, sd in list(rows)[::LOAD_ROWS_STEP]:
+        lines.append(f"| {f:.0f} | {abs(r):.3f} | {np.rad2deg(np.angle(r)):.0f} | {sd:.2g} |")
+    return lines
 
 
 def compute_ripples(

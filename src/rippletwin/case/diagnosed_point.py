@@ -31,6 +31,21 @@ def recordings_to_diagnose(
     )
 
 
+def reference_recordings(recordings: Sequence[Recording]) -> list[Recording]:
+    """Recordings at the diagnosed point whose state is known; the first one there where none is.
+
+    Faults are simulated for their operating point and networks are scored with them, so that a
+    further recording of unknown state changes neither.
+    """
+    here = recordings_to_diagnose(recordings)[0]
+    return [r for r in here if r.state != "unknown"] or here[:1]
+
+
+def unknown_recordings(recordings: Sequence[Recording]) -> list[Recording]:
+    """Recordings at the diagnosed point whose state is to be told."""
+    return [r for r in recordings_to_diagnose(recordings)[0] if r.state == "unknown"]
+
+
 def _is_near(recording: Recording, other: Recording) -> bool:
     """Whether two recordings are of one operating point, within the tolerances."""
     pairs = (

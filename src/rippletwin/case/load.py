@@ -22,6 +22,7 @@ from rippletwin.case.model import (
 )
 from rippletwin.case.plausibility import unusual_values
 from rippletwin.case.pressure_units import PASCALS
+from rippletwin.case.readers.layout import Layout
 from rippletwin.case.readers.registry import read_signals
 from rippletwin.case.rig_yaml import faults, find_sheet, parse_sheet
 from rippletwin.case.sheet_checks import missing_files
@@ -42,6 +43,7 @@ def load_case(
     states: Collection[str] | None = None,
     progress: Callable[[str, int, int], None] | None = None,
     band_hz: tuple[float | None, float | None] = (None, None),
+    labels: Collection[str] | None = None,
 ) -> Case:
     """Read and check a case.
 
@@ -52,6 +54,7 @@ def load_case(
         None. The sheet is checked whole in any case.
     progress : called with "reading", how many recordings have been read, and of how many.
     band_hz : lowest and highest frequency to use of every recording, within its own band.
+    labels : read only recordings of these labels; all where None.
 
     Raises
     ------
@@ -66,7 +69,12 @@ def load_case(
     raise_any([*faults(sheet_path, sheet), *missing_files(sheet_path, sheet)])
     rig = rig_of(folder, sheet)
     recordings, errors = [], []
-    chosen = [e for e in sheet["recordings"] if states is None or e["state"] in states]
+    chosen = [
+        entry
+        for entry in sheet["recordings"]
+        if (states is None or entry["state"] in states)
+        and (labels is None or label_of(entry) in labels)
+    ]
     for done, entry in enumerate(chosen, 1):
         try:
             recordings.append(narrow_band(_recording(folder, entry, rig), *band_hz))
@@ -77,6 +85,22 @@ def load_case(
     raise_any(errors)
     warnings = [*unusual_values(sheet_path, sheet), *band_warnings(rig, recordings)]
     return Case(folder=folder, rig=rig, recordings=tuple(recordings), warnings=tuple(warnings))
+
+
+def label_of(entry: dict) -> str:
+    """What a recording is called: its label, or its file's name without folder and suffix."""
+    return entry.get("label", Path(entry["file"]).stem)
+
+
+def unread_recordings(sheet: dict) -> list[Recording]:
+    """The recordings of a sheet without faults as it describes them, none of their files read."""
+    return [Recording(**_described(Path(entry["file"]), entry)) for entry in sheet["recordings"]]
+
+
+def _described(path: Path, entry: dict) -> dict:
+    """Fields of a recording that its entry gives."""
+    fields = {key: entry[key] for key in COPIED_KEYS if key in entry}
+    return {**fields, "file": path, "kind": entry.get("kind", "periodic"), "label": label_of(entry)}
 
 
 def rig_of(folder: Path, sheet: dict) -> Rig:
@@ -105,9 +129,8 @@ def _load(folder: Path, entry: dict) -> Load:
 
 def _recording(folder: Path, entry: dict, rig: Rig) -> Recording:
     path = folder / entry["file"]
-    kind = entry.get("kind", "periodic")
-    fields = {key: entry[key] for key in COPIED_KEYS if key in entry}
-    fields.update(file=path, kind=kind, label=entry.get("label", path.stem))
+    fields = _described(path, entry)
+    kind = fields["kind"]
     if "flow_ripple" in entry:
         ripple = tables.read_flow_ripple(folder / entry["flow_ripple"])
         _check_mean_flow(folder / entry["flow_ripple"], ripple.flow, rig)
@@ -117,7 +140,7 @@ def _recording(folder: Path, entry: dict, rig: Rig) -> Recording:
         names = [sensor.name for sensor in rig.sensors] if kind == "spectrum" else None
         frequency_hz, spectra = tables.read_repeats(files, names)
         return Recording(**fields, frequency_hz=frequency_hz, spectra=spectra)
-    signals = read_signals(path, [sensor.name for sensor in rig.sensors])
+    signals = read_signals(path, Layout.of((sensor.name for sensor in rig.sensors), entry))
     rate = sampling_rate(path, signals, entry.get("sampling_rate_hz"))
     factor = entry.get("scale", 1.0) * PASCALS[entry.get("unit", "Pa")]
     pressure = signals.pressure if factor == 1.0 else signals.pressure * factor

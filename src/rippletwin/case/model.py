@@ -75,7 +75,8 @@ class Sensor:
 
 @dataclass(frozen=True)
 class Load:
-    """What closes the line: orifice, open, closed, anechoic or impedance (measured, from a file).
+    """What closes the line: orifice, open, closed, anechoic, impedance (measured, from a file), or
+    unknown (any passive end, which fits determine).
 
     `coefficient` is K_v of the orifice law q = K_v sqrt(p - back_pressure), m3/s/sqrt(Pa); None
     leaves it to the twin, which takes it from mean flow and load pressure. A measured impedance is
@@ -96,7 +97,10 @@ class Load:
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Standard deviations of the data sheet: relative, except `sensor_position` in metres."""
+    """Standard deviations of the data sheet: relative, except `sensor_position` in metres.
+
+    `sensor_gain` is that of each sensor's complex sensitivity: relative, and in rad of its phase.
+    """
 
     length: float = 0.01
     diameter: float = 0.03
@@ -104,6 +108,7 @@ class Uncertainty:
     viscosity: float = 0.1
     load: float = 0.05
     sensor_position: float = 0.02
+    sensor_gain: float = 0.0
 
 
 @dataclass(frozen=True)

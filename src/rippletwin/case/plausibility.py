@@ -71,6 +71,7 @@ BOTH = {
     "uncertainty.viscosity": Range("", (1e-8, 0.99), (1e-5, 0.5), PER_CENT, zero=True),
     "uncertainty.load": Range("", (1e-8, 0.99), (1e-5, 0.5), PER_CENT, zero=True),
     "uncertainty.sensor_position": Range("m", (1e-8, 0.99), (1e-5, 0.2), MILLIMETRES, zero=True),
+    "uncertainty.sensor_gain": Range("", (1e-8, 0.99), (1e-5, 0.5), PER_CENT, zero=True),
     "pump.piston_diameter": Range("m", (1e-3, 0.3), (4e-3, 0.08), MILLIMETRES),
     "pump.pitch_radius": Range("m", (2e-3, 1.0), (8e-3, 0.2), MILLIMETRES),
     "pump.dead_volume": Range("m3", (1e-10, 1e-2), (5e-8, 1e-4), (("cm3", 1e-6), ("mm3", 1e-9))),
@@ -140,8 +141,9 @@ def _compared(path: Path, sheet: dict) -> Iterator[tuple[list[InputError], list[
     ranges = GAS if "heat_capacity_ratio" in mapping(sheet, "fluid") else LIQUID
     for field, value in leaves(sheet):
         allowed = ranges.get(re.sub(r"\[\d+\]", "", field))
-        good = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if allowed is None or not good or not math.isfinite(value):
+        if not isinstance(value, (int, float)) or isinstance(value, bool):
+            continue
+        if allowed is None or not math.isfinite(value):
             continue
         # what is not above zero where it must be is the schema's matter
         if (value == 0 and allowed.zero) or (value <= 0 and allowed.possible[0] > 0):

@@ -114,11 +114,14 @@ def _unknown(path: Path, field: str, key: str, known: list[str]) -> InputError:
     return InputError(path, field, "unknown key", f"{hint}Known here: {', '.join(known)}")
 
 
-def _wrong_type(path: Path, field: str, value, wanted: str, give: str) -> InputError:
+def _wrong_type(path: Path, field: str, value, wanted: str | list[str], give: str) -> InputError:
     """A value of the wrong type, with what it may have been meant for."""
-    problem = f"{shown(value)} is not {TYPES[wanted]}"
+    kinds = [wanted] if isinstance(wanted, str) else wanted
+    problem = f"{shown(value)} is not {' or '.join(TYPES[kind] for kind in kinds)}"
     if value is None:
         problem = "nothing is given"
+    elif wanted in ("object", "array"):
+        give = f"Give {TYPES[wanted]}"
     elif wanted == "string":
         give = (
             f'Put it in quotes: "{value}"'

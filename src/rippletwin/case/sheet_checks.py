@@ -6,9 +6,11 @@ looks only at values of the right type.
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterator
 from pathlib import Path
 
+from rippletwin.case.readers.registry import FOLDERS
 from rippletwin.case.sheet_values import entries, line_length, mapping, number
 from rippletwin.errors import InputError, printable
 
@@ -79,7 +81,7 @@ def _sensor_errors(path: Path, sheet: dict) -> Iterator[InputError]:
 def _recording_errors(path: Path, sheet: dict) -> Iterator[InputError]:
     names = [sensor.get("name") for sensor in entries(sheet, "sensors")]
     load_kind = mapping(sheet, "load").get("kind")
-    reported = set()
+    reported: set[tuple[str, bool]] = set()
     for index, entry in enumerate(entries(sheet, "recordings")):
         field = f"recordings[{index}]"
         kind = entry.get("kind", "periodic")
@@ -90,15 +92,33 @@ def _recording_errors(path: Path, sheet: dict) -> Iterator[InputError]:
             if whole:  # once for all recordings
                 reported.add((key, whole))
             yield InputError(path, key if whole else f"{field}.{key}", "missing", f"{why}; give it")
+        yield from _channel_errors(path, field, mapping(entry, "channels"), names)
         low, high = number(entry, "min_frequency_hz"), number(entry, "max_frequency_hz")
         if low is not None and high is not None and low >= high:
             problem = f"{low:g} Hz is not below max_frequency_hz, {high:g} Hz"
             yield InputError(path, f"{field}.min_frequency_hz", problem, "Correct one of them")
-        if kind == "random" and len(names) == 1 and "random" not in reported:
-            reported.add("random")
+        if kind == "random" and len(names) == 1 and ("random", True) not in reported:
+            reported.add(("random", True))
             yield InputError(
                 path, "sensors", "one sensor only", "A random recording needs two or more"
             )
+
+
+def _channel_errors(path: Path, field: str, channels: dict, names: list) -> Iterator[InputError]:
+    """Channels of what is no sensor, and channels that two sensors share."""
+    first: dict[object, object] = {}
+    for sensor, channel in channels.items():
+        if sensor not in names:
+            near = difflib.get_close_matches(str(sensor), [n for n in names if isinstance(n, str)])
+            hint = f"Did you mean {near[0]}? " if near else ""
+            remedy = f"{hint}Each key of channels is the name of a sensor of rig.yaml"
+            yield InputError(path, f"{field}.channels.{sensor}", "no such sensor", remedy)
+        elif isinstance(channel, (int, str)) and channel in first:
+            problem = f"{channel} is the channel of {first[channel]} too"
+            remedy = "Give each sensor its own channel"
+            yield InputError(path, f"{field}.channels.{sensor}", problem, remedy)
+        elif isinstance(channel, (int, str)):
+            first[channel] = sensor
 
 
 def _needed(kind: object, load_kind: object) -> list[tuple[str, str]]:
@@ -168,6 +188,8 @@ def _missing(path: Path, field: str, name: str) -> Iterator[InputError]:
         if (path.parent / name).is_file():
             return
         folder = (path.parent / name).is_dir()
+        if folder and Path(name).suffix.lower() in FOLDERS:
+            return
         problem = f"{name} is a folder" if folder else f"there is no file {name} beside rig.yaml"
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error

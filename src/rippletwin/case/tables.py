@@ -9,9 +9,15 @@ import pandas as pd
 
 from rippletwin.case.model import FlowRipple
 from rippletwin.case.readers.file_checks import DOUBLE, check_readable, check_size
-from rippletwin.case.readers.signals import similar_name
-from rippletwin.case.readers.text_tables import fields, first_lines, is_numeric, separator_error
-from rippletwin.errors import InputError, raise_any
+from rippletwin.case.readers.layout import similar_name
+from rippletwin.case.readers.text_tables import (
+    TextFormat,
+    find_format,
+    floats,
+    open_rows,
+    parse_reason,
+)
+from rippletwin.errors import InputError
 
 LARGEST_PLAUSIBLE_FLOW = 1.0  # m3/s; a pump of 60,000 L/min
 SMALLEST_RIPPLE = 1e-9  # of the largest flow; less is rounding
@@ -21,61 +27,58 @@ MAX_TABLE_GIB = 0.05
 def read_table(path: Path, columns: list[str]) -> np.ndarray:
     """The named columns (len(columns), rows) of a text table, finite.
 
-    A table without a header, of numbers only, is taken column by column; it may be separated by
-    white space. Raises InputError where a column is absent or a number is not finite.
+    A table without a header, of numbers only, is taken column by column. Separator and decimal sign
+    are found out. Raises InputError where a column is absent or a number is not finite.
     """
     check_readable(path)
     check_size(path, "file", path.stat().st_size // DOUBLE, MAX_TABLE_GIB)
-    lines = first_lines(path)
-    bare = is_numeric(lines[0])
-    named = set(fields(lines[0])) | set(lines[0].split())
-    if not bare and not set(columns) <= named:
-        raise_any(filter(None, [separator_error(path, lines, columns)]))
+    form = find_format(path, columns)
+    if form.rows_from is None:
+        raise InputError(path, "file", "no rows", f"Columns: {','.join(columns)}")
+    places = _places(path, columns, form)
     try:
-        table = pd.read_csv(
-            path,
-            sep="," if "," in lines[0] else r"\s+",
-            header=None if bare else 0,
-            skipinitialspace=True,
-            encoding="utf-8-sig",
-        )
+        with open_rows(path, form) as file:
+            table = pd.read_csv(file, **form.options)
     except (OSError, ValueError) as error:  # those of pandas are ValueErrors
-        reason = str(error).removeprefix("Error tokenizing data. C error: ").strip()
+        reason = parse_reason(error, form)
         raise InputError(
             path, "file", f"cannot be read as a table ({reason})", f"Columns: {','.join(columns)}"
         ) from error
-    if bare:
-        if table.shape[1] < len(columns):
-            raise InputError(
-                path,
-                columns[table.shape[1]],
-                f"missing: the table has {table.shape[1]} columns",
-                f"Columns, in this order: {','.join(columns)}",
-            )
-        table = table.iloc[:, : len(columns)].set_axis(columns, axis=1)
-    table.columns = [str(column).strip() for column in table.columns]
-    if table.empty:
-        raise InputError(path, "file", "no rows", f"Columns: {','.join(columns)}")
-    for column in columns:
-        if column not in table:
-            near = similar_name(column, table.columns)
-            raise InputError(
-                path,
-                column,
-                f"missing: the table has {', '.join(table.columns)}",
-                f"{f'Did you mean {near}? ' if near else ''}Columns: {','.join(columns)}",
-            )
-        values = pd.to_numeric(table[column], errors="coerce").to_numpy(float)
-        bad = np.flatnonzero(~np.isfinite(values))
+    values = np.array([floats(table.iloc[:, place], form) for place in places])
+    for column, row in zip(columns, values):
+        bad = np.flatnonzero(~np.isfinite(row))
         if bad.size:
             raise InputError(
                 path,
                 column,
-                f"{bad.size} value(s) are not finite numbers, the first in row {bad[0] + 1}",
+                f"{bad.size} value(s) are not finite numbers, the first in row {bad[0] + 1} (line "
+                f"{form.line_of(int(bad[0]) + 1)})",
                 "Correct or remove these rows",
             )
-        table[column] = values
-    return table[columns].to_numpy(float).T
+    return values
+
+
+def _places(path: Path, columns: list[str], form: TextFormat) -> list[int]:
+    """Where the named columns are; a table without a header has them in their order."""
+    if form.names is None:
+        if form.columns < len(columns):
+            raise InputError(
+                path,
+                columns[form.columns],
+                f"missing: the table has {form.columns} columns",
+                f"Columns, in this order: {','.join(columns)}",
+            )
+        return list(range(len(columns)))
+    for column in columns:
+        if column not in form.names:
+            near = similar_name(column, form.names)
+            raise InputError(
+                path,
+                column,
+                f"missing: the table has {', '.join(form.names)}",
+                f"{f'Did you mean {near}? ' if near else ''}Columns: {','.join(columns)}",
+            )
+    return [form.names.index(column) for column in columns]
 
 
 def read_flow_ripple(path: Path) -> FlowRipple:

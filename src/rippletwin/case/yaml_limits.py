@@ -50,7 +50,7 @@ class Loader(yaml.SafeLoader):
         if tag is None or tag.removeprefix(_TAG) in ("bool", "null", "str", "seq", "map")
     }
 
-    def __init__(self, stream):
+    def __init__(self, stream: object):
         super().__init__(stream)
         self._depth = self._nodes = 0
         self._sizes: dict[int, int] = {}  # of finished nodes, by identity

@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from rippletwin.case.new_sheet import NewSegment, NewSheet
 
 MM, BAR, CST, LITRES_A_MINUTE = 1e-3, 1e5, 1e-6, 1 / 60000
-LOADS = ("orifice", "open", "closed", "anechoic")
+LOADS = ("orifice", "open", "closed", "anechoic", "unknown")
 STATES = ("healthy", "unknown", "slipper", "cylinder", "cylinder_slight", "cylinder_severe")
+PRESSURE_UNITS = ("Pa", "kPa", "MPa", "bar", "psi")
 EXAMPLE = ("recordings/healthy_0.h5", "healthy", 1000.0, 95.0)
 
 
@@ -117,6 +118,13 @@ def _quantity(name: str, what: str, unit: str, help: str, default: float | None 
     metavar="FILE,STATE,R/MIN,BAR",
     help=f"Again for each one. States: {', '.join(STATES)}.",
 )
+@click.option(
+    "--unit",
+    type=click.Choice(PRESSURE_UNITS),
+    default="Pa",
+    show_default=True,
+    help="Of the pressure in the recordings.",
+)
 @click.option("--ask/--no-ask", default=None, help="Ask for what is not given; on in a terminal.")
 @options.json_output
 def command(case: Path, ask: bool | None, as_json: bool, **given) -> None:
@@ -153,7 +161,7 @@ def _ask(given: dict) -> None:
         kind = CheckedValue("cSt", lambda text: options.number(str(text), "viscosity", "cSt"))
         question = f"Viscosity at {given['temperature']:g} °C, cSt"
         given["viscosity"] = _prompt(question, kind)
-    for key, question, kind in (
+    for key, question, read in (
         ("segments", "Segment: length,bore,wall in mm, pump first", _segment),
         ("sensors", "Sensor: name,mm from the pump outlet", _sensor),
         ("recordings", "Recording: file,state,r/min,bar", _recording),
@@ -161,7 +169,7 @@ def _ask(given: dict) -> None:
         if given[key]:
             continue
         found: list = []
-        while (one := _prompt(f"{question} (empty: no more)", CheckedValue("", kind), "")) != "":
+        while (one := _prompt(f"{question} (empty: no more)", CheckedValue("", read), "")) != "":
             found.append(one)
         given[key] = tuple(found)
 
@@ -199,6 +207,7 @@ def _sheet(given: dict) -> NewSheet:
     density = density_at(given["density"], given["temperature"])
     modulus = given["bulk_modulus"] * BAR
     recordings = given["recordings"] or (EXAMPLE,)
+    unit = {} if given["unit"] == "Pa" else {"unit": given["unit"]}
     coefficient = None
     if given["flow"] and given["load"] == "orifice":
         flow = given["flow"] * LITRES_A_MINUTE
@@ -208,21 +217,22 @@ def _sheet(given: dict) -> NewSheet:
         viscosity=viscosity * CST,
         temperature=f"at {given['temperature']:g} °C",
         pistons=given["pistons"],
-        segments=[_new_segment(*segment, density, modulus) for segment in given["segments"]],
+        segments=[_new_segment(segment, density, modulus) for segment in given["segments"]],
         sensors=dict(given["sensors"]),
         load=given["load"],
         coefficient=coefficient,
         recordings=[
-            {"file": f, "state": s, "speed_rpm": n, "load_pressure": p * BAR}
+            {"file": f, "state": s, "speed_rpm": n, "load_pressure": p * BAR, **unit}
             for f, s, n, p in recordings
         ],
     )
 
 
-def _new_segment(length, bore, wall, material, speed, density, modulus) -> NewSegment:
+def _new_segment(segment: tuple, density: float, modulus: float) -> NewSegment:
     """A segment with the wave speed that was measured, or follows from oil, bore and wall."""
     from rippletwin.case.new_sheet import NewSegment
 
+    length, bore, wall, material, speed = segment
     if speed is not None:
         return NewSegment(length, bore, speed, "measured", measured=True)
     stiffness = YOUNGS_MODULUS[material or "steel"]

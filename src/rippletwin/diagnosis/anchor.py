@@ -7,7 +7,7 @@ explains, are taken from it and brought to the operating point of the unknown re
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -21,7 +21,7 @@ from rippletwin.twin.twin import Twin
 
 SAME_SPEED, SAME_PRESSURE = 0.01, 0.03  # relative: the same operating point, set twice
 FAR = 0.3  # relative change of the operating point over which the anchor's own part is lost
-ABOUT = 5  # orders of the pistons over which a misfit is averaged
+ABOUT = 5  # orders of a kind, the pistons' or others, over which a misfit is averaged
 ANGLES = 8192  # of a revolution, over which two spectra are aligned
 
 
@@ -92,6 +92,27 @@ def make_anchor(
         unsure = np.mean(np.abs(line.response()[:, :count] * flow) ** 2, axis=0)
         variance = variance + (misfit * share) ** 2 * unsure
     return Anchor(healthy.label, orders, flow, rest, variance, angle, misfit, apart)
+
+
+def without_recording(anchor: Anchor, simulated: np.ndarray, response: np.ndarray, pistons: int):
+    """The anchor that the twin alone is: its own flow, simulated (F,), through its line, a response
+    (S, F), as wrong about each order as the recording of `anchor` shows it to be."""
+    turned = simulated * np.exp(1j * anchor.orders * anchor.angle)
+    left = response * (anchor.flow - turned) + anchor.rest
+    own, power = anchor.orders % pistons == 0, np.mean(np.abs(left) ** 2, axis=0)
+    wrong = np.empty_like(power)
+    for which in (own, ~own):
+        if np.any(which):
+            count = min(ABOUT, int(np.sum(which)))
+            wrong[which] = uniform_filter1d(power[which], count, mode="nearest")
+    return replace(
+        anchor,
+        label="the twin alone",
+        flow=simulated,
+        rest=np.zeros_like(anchor.rest),
+        variance=np.broadcast_to(wrong, anchor.variance.shape),
+        angle=0.0,
+    )
 
 
 def alignment(here: np.ndarray, there: np.ndarray, orders: np.ndarray, pitch: float) -> float:

@@ -34,6 +34,7 @@ def diagnose(
     faults: Sequence[Fault] | None = None,
     progress: Callable[[str, int, int], None] | None = None,
     recalibrate: bool = True,
+    anchored: bool = True,
 ) -> list[Diagnosis]:
     """Diagnose periodic recordings of a case by its twin, each anchored to the healthy recording of
     the nearest operating point, itself excepted.
@@ -43,6 +44,8 @@ def diagnose(
     recalibrate   whether the twin's line is fitted to ratios between sensors (`calibrate_line`) and
                   its pump to the flow that the recordings ask for (`calibrate_pump`), if that
                   lowers its misfit of the healthy ripples
+    anchored      whether a recording is compared with the healthy one or, for comparison, with the
+                  twin's own ripple
 
     `progress` is told what is done, how much of it, and of how much. Raises InputError where the
     twin is that of another rig, and where there is no healthy recording to anchor one to.
@@ -62,7 +65,7 @@ def diagnose(
             other = calibrate_pump(other, one_each_point(healthy_ones))
             # A twin that is right already would only lose what its line owes to the ripple.
             twin = min((twin, other), key=lambda each: healthy_misfit(each, healthy_ones))
-        diagnoser = Diagnoser(twin, faults)
+        diagnoser = Diagnoser(twin, faults, anchored)
         for k, recording in enumerate(recordings):
             if progress:
                 progress("diagnosing", k, len(recordings))

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import logsumexp
 
-from rippletwin.diagnosis.anchor import distance, make_anchor
+from rippletwin.diagnosis.anchor import distance, even_flow, make_anchor, without_recording
 from rippletwin.diagnosis.diagnosis import Diagnosis
 from rippletwin.diagnosis.drifting_line import DriftingLine
 from rippletwin.diagnosis.evidence import ErrorPrior, StateEvidence, scatter_of, weigh_states
@@ -31,10 +31,13 @@ PRIOR = (0.5, 0.4, 0.1)
 
 
 class Diagnoser:
-    """A twin and the faults to try; called with observations of all shaft orders."""
+    """A twin and the faults to try; called with observations of all shaft orders.
 
-    def __init__(self, twin: Twin, faults: Sequence[Fault]):
-        self.twin, self.faults = twin, tuple(faults)
+    Where it is not `anchored`, recordings are compared with the twin's own healthy ripple.
+    """
+
+    def __init__(self, twin: Twin, faults: Sequence[Fault], anchored: bool = True):
+        self.twin, self.faults, self.anchored = twin, tuple(faults), anchored
         self._priors: dict[tuple[str, ...], ErrorPrior] = {}
 
     def __call__(self, observation, healthy: Sequence, start: float = 0.0) -> Diagnosis:
@@ -66,8 +69,13 @@ class Diagnoser:
         mean_flow = None if given is None else float(np.mean(given.flow))
         twin = with_fitted_pump(self.twin, mean_flow, healthy.speed_hz)
         pump, fluid = twin.rig.pump, twin.rig.fluid
-        line = DriftingLine(twin, observation, healthy_flow(pump, fluid, speed_rpm, pressure))
+        ripple = healthy_flow(pump, fluid, speed_rpm, pressure)
+        line = DriftingLine(twin, observation, ripple)
         anchor = make_anchor(twin, healthy, observation, line, speed_rpm, pressure)
+        if not self.anchored:
+            simulated = even_flow(ripple, anchor.orders, pump["pistons"])
+            response = line.response()[:, : len(anchor.orders)]
+            anchor = without_recording(anchor, simulated, response, pump["pistons"])
         flows = {
             fault.name: leak_flow(pump, fluid, speed_rpm, pressure, fault) for fault in self.faults
         }
@@ -76,6 +84,8 @@ class Diagnoser:
     def _error_prior(self, healthy: Sequence) -> ErrorPrior:
         """What the scatter of healthy repeats says of the errors."""
         prior = ErrorPrior()
+        if not self.anchored:  # the twin's errors, which repeats share, are in the anchor
+            return prior
         first, *others = healthy
         repeats = [o for o in others if not between(o, first)][:MOST_REPEATS]
         scatters = [scatter_of(self.model(o, first), prior) for o in repeats]

@@ -26,8 +26,7 @@ def find_networks(results: str | Path, rig: Rig) -> dict[str, KeptNetworks]:
     learnt from another number of sensors than the rig has.
     """
     folder = Path(results) / "networks"
-    found = [load_networks(path) for path in sorted(folder.glob("*/*.pt"))]
-    found = [kept for kept in found if kept.signal == "pressure"]
+    found = read_networks(sorted(folder.glob("*/*.pt")), rig)
     if not found:
         raise InputError(
             folder,
@@ -35,19 +34,29 @@ def find_networks(results: str | Path, rig: Rig) -> dict[str, KeptNetworks]:
             "there are no networks that judge pressure",
             "Give the results folder of a workflow with a randomised dataset, as CFD-MOC-PR",
         )
-    for kept in found:
+    return found
+
+
+def read_networks(files: Sequence[str | Path], rig: Rig) -> dict[str, KeptNetworks]:
+    """The networks that judge pressure among those in files, called as `find_networks` says.
+
+    Raises InputError where they have learnt from another number of sensors than the rig has.
+    """
+    read = [(path, load_networks(path)) for path in map(Path, files)]
+    found = [(path, kept) for path, kept in read if kept.signal == "pressure"]
+    for path, kept in found:
         if len(kept.channels) != len(rig.sensors):
             raise InputError(
-                folder / kept.dataset / f"{kept.architecture}.pt",
+                path,
                 "--networks",
                 f"they have learnt from {len(kept.channels)} sensors, and the case has "
                 f"{len(rig.sensors)}",
                 "Give the results of a workflow that ran on this rig",
             )
-    several = len({kept.dataset for kept in found}) > 1
+    several = len({kept.dataset for _, kept in found}) > 1
     return {
         f"{kept.architecture}@{kept.dataset}" if several else kept.architecture: kept
-        for kept in found
+        for _, kept in found
     }
 
 
@@ -60,9 +69,9 @@ def ask_networks(
     """
     return {
         recording.label: {
-            name: judge_windows(kept, _windows(recording, rig, kept.samples_per_revolution))
+            name: judge_windows(kept, windows_of(recording, rig, kept.samples_per_revolution))
             for name, kept in networks.items()
-            if not _apart(recording, kept)
+            if is_at_their_point(recording, kept)
         }
         for recording in recordings
     }
@@ -81,12 +90,12 @@ def judge_windows(kept: KeptNetworks, windows: np.ndarray) -> dict:
     return {"state": state, "share": share, "unlike": unlike}
 
 
-def _windows(recording: Recording, rig: Rig, samples: int) -> np.ndarray:
+def windows_of(recording: Recording, rig: Rig, samples: int) -> np.ndarray:
     """Windows (R, S, M) of one revolution each, without their means."""
     return remove_mean(revolutions_of(recording, rig, samples).windows)
 
 
-def _apart(recording: Recording, kept: KeptNetworks) -> float:
-    """Distance of the operating points of a recording and of networks."""
+def is_at_their_point(recording: Recording, kept: KeptNetworks) -> bool:
+    """Whether a recording has the operating point at which networks have learnt."""
     speed_hz = recording.speed_rpm / 60.0
-    return distance(speed_hz, kept.speed_hz, recording.load_pressure, kept.load_pressure)
+    return not distance(speed_hz, kept.speed_hz, recording.load_pressure, kept.load_pressure)

@@ -19,7 +19,7 @@ ONE_SENSOR = 0.9  # share of the residual at one sensor that makes it that senso
 
 @dataclass(frozen=True)
 class Unlikeness:
-    """p_value of the residual of the best state; shaft orders and element where it stands out."""
+    """p_value of the best state; shaft orders and element where the residual stands out."""
 
     p_value: float
     orders: tuple[int, ...] = ()
@@ -31,15 +31,33 @@ class Unlikeness:
 
 
 def judge_residual(model: ObservationModel, best: StateEvidence, prior: ErrorPrior) -> Unlikeness:
-    """How often errors as the prior has them leave as large a residual as the best state does.
+    """How often errors as the prior has them leave as large a residual as the best state does, or
+    make the line drift as far: the smaller of the two probabilities.
+
+    A line whose state must drift further than oil and load can is another line. Either test alone
+    calls one in a hundred of the recordings unlike that are not.
+    """
+    model.linearise_line(best.mode)
+    drift = best.mode.drift
+    of_drift = float(gammaincc(0.5 * len(drift), 0.5 * np.sum(drift**2))) if len(drift) else 1.0
+    p = min(_of_residual(model, best, prior), of_drift)
+    if p >= UNLIKE:
+        return Unlikeness(p)
+    parts = model.parts(best.mode)
+    residual = model.values - model.expected_reading(parts, best.errors)
+    usual = model.variance(parts, Errors(prior.scatter, prior.change))
+    orders, element = _where(model, residual, usual)
+    return Unlikeness(p, orders, "line" if p == of_drift else element)
+
+
+def _of_residual(model: ObservationModel, best: StateEvidence, prior: ErrorPrior) -> float:
+    """The probability of a residual as large as the best state's.
 
     The residual is measured in the errors of the prior's medians, the adjustments made to the line
     counted in. What it would be under larger and smaller errors is a gamma distribution of that
     mean, whose freedom allows for residuals that go together.
     """
-    medians = Errors(prior.scatter, prior.change)
-    model.linearise_line(best.mode)
-    parts = model.parts(best.mode)
+    medians, parts = Errors(prior.scatter, prior.change), model.parts(best.mode)
     misfit = model.evaluate(best.mode, medians).square
     usual = model.variance(parts, medians)
     count = 2.0 * usual.size
@@ -51,10 +69,7 @@ def judge_residual(model: ObservationModel, best: StateEvidence, prior: ErrorPri
             ratio = float(np.mean(model.variance(parts, errors) / usual))
             freedom = count / ALIKE / 2.0
             p += chances[i, k] * gammaincc(freedom, freedom * misfit / (count * ratio))
-    if p >= UNLIKE:
-        return Unlikeness(float(p))
-    residual = model.values - model.expected_reading(parts, best.errors)
-    return Unlikeness(float(p), *_where(model, residual, usual))
+    return float(p)
 
 
 def _where(model: ObservationModel, residual, variance) -> tuple[tuple[int, ...], str | None]:

@@ -95,9 +95,10 @@ def explain(
         )
     observations, early, late = _observe_all(case, processes)
     contradiction = find_contradictions(case.rig, case.healthy, observations, early, late)
-    return explain_observations(
+    explanation = explain_observations(
         case.rig, observations, early, late, processes, progress, contradiction, draws
     )
+    return replace(explanation, warnings=case.warnings)
 
 
 def explain_observations(

@@ -123,7 +123,7 @@ def ranks(groups: Mapping[str, tuple[Sequence[str], np.ndarray, np.ndarray, np.n
         ax.set(title=dataset, ylim=(-3, 103))
     fig.supxlabel("alignment of attention with the simulated fault (1: chance)", fontsize=9)
     fig.supylabel("accuracy on recordings / %", fontsize=9)
-    handles = {}
+    handles: dict[str, object] = {}
     for ax in axes.flat:
         handles |= {label: handle for handle, label in zip(*ax.get_legend_handles_labels())}
     fig.legend(handles.values(), handles, loc="outside upper center", ncols=4, fontsize=7)

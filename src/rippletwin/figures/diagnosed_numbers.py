@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -96,7 +97,7 @@ def load(folder: str | Path) -> dict[str, DiagnosedNumbers]:
     }
 
 
-def _rounded(values) -> list:
+def _rounded(values) -> Any:
     """An array as lists of numbers with MAX_DIGITS digits."""
     if np.ndim(values) == 0:
         return float(f"{float(values):.{MAX_DIGITS}g}")

@@ -21,6 +21,7 @@ from rippletwin.explanation.localise.source_free_fits import compare_evidence
 from rippletwin.explanation.verdict.explanation import Explanation
 from rippletwin.explanation.verdict.places import element_and_extent
 from rippletwin.figures.words import name_effect, name_hypothesis
+from rippletwin.twin.unknown_load import LoadCurve, load_curve
 
 FILE = "figures/explain.json"
 SINGLE_EFFECTS_SHOWN = 10
@@ -121,6 +122,7 @@ class ExplainedNumbers:
     threshold: float
     places: Places
     missing: tuple[Missing, ...]
+    load: LoadCurve | None = None
 
 
 def gather(e: Explanation) -> ExplainedNumbers:
@@ -131,6 +133,7 @@ def gather(e: Explanation) -> ExplainedNumbers:
         float(e.min_log_bayes_factor),
         _places(e),
         tuple(_missing(e)),
+        load_curve(e.decision.accepted.twin, e.decision.accepted.covariance, e.observations),
     )
 
 
@@ -223,7 +226,7 @@ def load(folder: str | Path) -> ExplainedNumbers | None:
     if not path.exists():
         return None
     data = json.loads(path.read_text())
-    places = data["places"]
+    places, end = data["places"], data.get("load")
     return ExplainedNumbers(
         tuple(Point(**{k: _array(v) for k, v in each.items()}) for each in data["points"]),
         tuple(Candidate(tuple(c.pop("effects")), **c) for c in data["candidates"]),
@@ -236,6 +239,7 @@ def load(folder: str | Path) -> ExplainedNumbers | None:
             places["elements"],
         ),
         tuple(Missing(**{k: _array(v) for k, v in each.items()}) for each in data["missing"]),
+        LoadCurve(**{k: _array(v) for k, v in end.items()}) if end else None,
     )
 
 

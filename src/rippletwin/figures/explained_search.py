@@ -101,3 +101,27 @@ def plot_immittance(numbers: ExplainedNumbers) -> Figure | None:
     fig.suptitle("What do the effects add to the line, and does the recording ask for it?")
     style.legend_below(fig, axes[0, 0])
     return fig
+
+
+def plot_load(numbers: ExplainedNumbers) -> Figure | None:
+    """Amplitude and phase of the reflection coefficient of an unknown load; None where it is
+    known."""
+    end = numbers.load
+    if end is None:
+        return None
+    fig, axes = style.figure(2, 1, height=1.9, sharex=True)
+    size, sd = np.abs(end.reflection), end.sd / np.sqrt(2)
+    phase = np.rad2deg(np.unwrap(np.angle(end.reflection)))
+    phase_sd = np.rad2deg(np.minimum(sd / np.maximum(size, 1e-12), np.pi))
+    for ax, values, half in zip(np.ravel(axes), (size, phase), (1.96 * sd, 1.96 * phase_sd)):
+        band = dict(color=style.CALIBRATED, alpha=0.25, lw=0, label="95 % interval")
+        ax.fill_between(end.frequency_hz, values - half, values + half, **band)
+        ax.plot(end.frequency_hz, values, color=style.CALIBRATED, label="by the fitted load")
+    upper, lower = np.ravel(axes)
+    upper.set_ylim(0.0, 1.0)
+    upper.set_ylabel("|R|")
+    lower.set_ylabel("phase / deg")
+    lower.set_xlabel("frequency / Hz")
+    fig.suptitle("What share of a wave does the unknown load reflect?")
+    style.legend_below(fig, upper)
+    return fig

@@ -12,7 +12,7 @@ from rippletwin.explanation.verdict.explanation import Explanation
 from rippletwin.figures import explained_numbers, style
 from rippletwin.figures.explained_numbers import ExplainedNumbers
 from rippletwin.figures.explained_ripple import plot_residuals, plot_ripple
-from rippletwin.figures.explained_search import plot_evidence, plot_immittance
+from rippletwin.figures.explained_search import plot_evidence, plot_immittance, plot_load
 from rippletwin.figures.line_drawing import plot_place
 
 FIGURES = {
@@ -21,6 +21,7 @@ FIGURES = {
     "evidence": plot_evidence,
     "place": plot_place,
     "immittance": plot_immittance,
+    "load": plot_load,
 }
 
 

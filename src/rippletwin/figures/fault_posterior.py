@@ -87,11 +87,10 @@ def _plot_areas(ax, d: DiagnosedNumbers) -> None:
         ax.text(0.5, 0.5, "no leak", transform=ax.transAxes, ha="center")
         return
     for (name, leak), colour, line in zip(d.leaks.items(), style.CYCLE, LINES):
-        ends = write_quantity(leak.median, AREA, (leak.low, leak.high))
+        interval = write_quantity(leak.median, AREA, (leak.low, leak.high))
         area = AREA.factor * np.asarray(leak.area)
-        ax.plot(area, leak.density, line, color=colour, label=f"{name_state(name)}: {ends}")
-        ends = AREA.factor * leak.low, AREA.factor * leak.high
-        ax.axvspan(*ends, color=colour, alpha=0.15, lw=0)
+        ax.plot(area, leak.density, line, color=colour, label=f"{name_state(name)}: {interval}")
+        ax.axvspan(AREA.factor * leak.low, AREA.factor * leak.high, color=colour, alpha=0.15, lw=0)
     ax.set_xscale("log")
     low = min(AREA.factor * leak.low for leak in d.leaks.values())
     high = max(AREA.factor * leak.high for leak in d.leaks.values())

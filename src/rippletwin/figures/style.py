@@ -11,6 +11,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
+from matplotlib.rcsetup import cycler
 
 MEASURED, NOMINAL, CALIBRATED, CORRECTED = "#000000", "#E69F00", "#0072B2", "#009E73"
 ALARM, NEUTRAL = "#D55E00", "#8C8C8C"
@@ -30,7 +31,7 @@ mpl.rcParams.update(
         "axes.labelsize": 9,
         "axes.spines.top": False,
         "axes.spines.right": False,
-        "axes.prop_cycle": mpl.cycler(color=CYCLE),
+        "axes.prop_cycle": cycler(color=CYCLE),
         "axes.grid": False,
         "legend.frameon": False,
         "legend.fontsize": 8,

@@ -22,6 +22,7 @@ AT_OTHER = {
     "load_volume": "volume at the load",
     "load_dynamics": "dynamics of the load",
     "end_radiation": "radiation from the open end",
+    "end_reflection": "reflection at the anechoic end",
     "source_impedance": "impedance of the pump",
     "piston_spread": "spread of the pistons",
     "speed_fluctuation": "fluctuation of the speed",
@@ -78,8 +79,10 @@ def name_parameter(name: str) -> str:
     words = PARAMETERS.get(stem, stem.replace("_", " "))
     if index is None:
         return words
-    if stem == "position":
-        return f"position of sensor {index}"
+    if stem in ("position", "gain", "phase"):
+        return f"{stem} of sensor {index}"
+    if stem == "reflection":
+        return f"Schur parameter {index} of the load"
     return f"shaft angle of {index}" if stem == "angle" else f"{words} of segment {index}"
 
 

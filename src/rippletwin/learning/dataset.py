@@ -3,7 +3,8 @@
 The paper's augmentation: one simulated revolution for each class becomes many samples by a random
 cyclic shift (there is no tachometer: the crank angle of a window's first point is unknown) and
 Gaussian noise. Where many revolutions of a class have been simulated, each sample is one of them.
-Only the mean is removed: amplitude is the diagnosis, so nothing is normalised.
+Only the mean is removed: the amplitude carries the information on the fault, so nothing is
+normalised.
 """
 
 from __future__ import annotations

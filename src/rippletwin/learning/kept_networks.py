@@ -48,6 +48,11 @@ class KeptNetworks:
             p_values.append(conformal.p_values(activation_statistics(network, windows)))
         return np.array(said), np.array(p_values)
 
+    def probabilities(self, windows: np.ndarray) -> np.ndarray:
+        """Mean probability (classes,) over seeds and windows (n, channels, M)."""
+        networks = restore_networks(self.architecture, len(self.channels), self.weights)
+        return np.mean([predict(network, windows)[1].mean(axis=0) for network in networks], axis=0)
+
     def save(self, path: str | Path) -> None:
         """Write them to `path`: tensors, lists, text and numbers only."""
         data = vars(self) | {"classes": list(self.classes)}

@@ -9,7 +9,11 @@ from rippletwin.pump.faults import Cylinder, Slipper
 from rippletwin.pump.outlets import ConstantPressure, Pipe
 from rippletwin.pump.simulation import PumpRipple, simulate
 
-FAULT_KINDS = {"S": Slipper, "C1": Cylinder, "C2": Cylinder}
+FAULT_KINDS: dict[str, type[Slipper] | type[Cylinder]] = {
+    "S": Slipper,
+    "C1": Cylinder,
+    "C2": Cylinder,
+}
 """Name of a fault -> its leakage path; C1 and C2 are one fault in two severities."""
 
 

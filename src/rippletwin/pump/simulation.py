@@ -104,8 +104,11 @@ def simulate(
     (zc, half, k_v), line_p, line_q, sensors = pipe_state(
         fluid, outlet, period / steps, cells, mean_flow
     )
-    line_p, behind = absolute(line_p), absolute(outlet.back_pressure if cells else 0.0)
-    given = np.zeros(0) if cells else absolute(pressure_at_steps(outlet.pressure, steps))
+    line_p, behind, given = absolute(line_p), absolute(0.0), np.zeros(0)
+    if isinstance(outlet, Pipe):
+        behind = absolute(outlet.back_pressure)
+    else:
+        given = absolute(pressure_at_steps(outlet.pressure, steps))
     load_pressure = line_p[0] if cells else given.mean()
     delivering = np.arange(geometry.pistons) * 2 > geometry.pistons
     state = np.append(
@@ -125,7 +128,7 @@ def simulate(
         if change < PERIODIC_CHANGE:
             break
         previous = flow
-        if cells and outlet.orifice is None:
+        if isinstance(outlet, Pipe) and outlet.orifice is None:
             k_v = orifice_coefficient(outlet, flow.mean())
     pressures, readings = pressures - ATMOSPHERE, readings - ATMOSPHERE
 

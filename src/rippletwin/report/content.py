@@ -136,7 +136,9 @@ def make_page(results: Results, workflow: WorkflowPart | None = None) -> Page:
         remaining=[] if verdict is None else verdict_words.remaining_sentences(verdict),
         following=[] if verdict is None else verdict_words.next_sentences(verdict),
         diagnoses=[_diagnosis(each, results) for each in results.diagnosis],
-        parameters=results.twin and parameter_table(results.twin, results.covariance),
+        parameters=None
+        if results.twin is None
+        else parameter_table(results.twin, results.covariance),
         recordings=recording_table(case),
         orders=_draw(orders),
         full_sentence="" if verdict is None else verdict.get("sentence", ""),

@@ -77,7 +77,8 @@ def _parameter_row(p: Parameter, u: float, sd: float | None) -> list[Cell]:
     value, nominal = float(p.value(u)), p.nominal
     ends = None
     if sd is not None:
-        ends = tuple(float(p.value(u + side * INTERVAL_SD * sd)) for side in (-1, 1))
+        low, high = (float(p.value(u + side * INTERVAL_SD * sd)) for side in (-1, 1))
+        ends = low, high
     interval = "unknown" if ends is None else write_interval(ends, unit)
     if sd is not None and sd > UNDETERMINED_SD:
         interval += " *"
@@ -132,10 +133,12 @@ def effect_table(effects: Sequence[Mapping]) -> Table:
                     *cells,
                 ]
             )
-    columns = ("Effect", "Support", "Probability", "Parameter", "Value", "95 % interval")
-    is_number = (False, False, True, False, True, True)
+    columns = ["Effect", "Support", "Probability", "Parameter", "Value", "95 % interval"]
+    is_number = [False, False, True, False, True, True]
     if not any(row[1].text for row in rows):
-        columns, is_number, *rows = ((row[0], *row[2:]) for row in (columns, is_number, *rows))
+        del columns[1], is_number[1]
+        for row in rows:
+            del row[1]
     return Table("Effects and their parameters", columns, is_number, rows)
 
 
@@ -162,8 +165,8 @@ def recording_table(case: Case) -> Table:
             rate = Cell(write_number(r.sampling_rate_hz / 1e3), r.sampling_rate_hz)
         state = text(name_state(r.state))
         rows.append([text(r.label), state, text(r.kind), speed, pressure, seconds, rate])
-    columns = ("Recording", "State", "Kind", "Speed / (r/min)", "Load pressure / bar")
-    columns += ("Duration / s", "Sampling rate / kHz")
+    columns = ["Recording", "State", "Kind", "Speed / (r/min)", "Load pressure / bar"]
+    columns += ["Duration / s", "Sampling rate / kHz"]
     return Table("Recordings", columns, (False, False, False, True, True, True, True), rows)
 
 

@@ -73,7 +73,7 @@ def _left(remainder: Mapping) -> str:
 
 def _effects(effects: Sequence[Mapping]) -> str:
     """Effects in words, grouped by how well they are supported where that is known."""
-    groups = {}
+    groups: dict[str, list[str]] = {}
     for effect in effects:
         words = name_effect(effect["name"], effect.get("element"))
         groups.setdefault(effect.get("support", ""), []).append(words)

@@ -1,4 +1,4 @@
-"""Tables of what a whole run of the workflow adds: accuracies beside the paper's, and timings."""
+"""Tables of what a whole run of the workflow adds: accuracies, networks' answers, timings."""
 
 from __future__ import annotations
 
@@ -31,6 +31,26 @@ def accuracy_table(
     )  # fmt: skip
 
 
+def answer_table(answers: Mapping[str, Mapping[str, Mapping]]) -> Table:
+    """What networks say of recordings of unknown state: label -> network -> answer."""
+    cells = [
+        [
+            text(label),
+            text(network),
+            text(said["state"]),
+            *(Cell(f"{100 * said[key]:.0f}", said[key]) for key in ("share", "unlike")),
+        ]
+        for label, networks in answers.items()
+        for network, said in networks.items()
+    ]
+    return Table(
+        "Recordings of unknown state, as networks see them",
+        ("Recording", "Network", "State", "Windows that say so / %", "Unlike all simulated / %"),
+        (False, False, False, True, True),
+        cells,
+    )
+
+
 def _mean(mean: float, sd: float) -> Cell:
     if mean != mean:  # nothing was scored
         return Cell("not scored", -1.0)
@@ -39,7 +59,8 @@ def _mean(mean: float, sd: float) -> Cell:
 
 def timing_table(folder: str | Path) -> Table:
     """Jobs, seconds and largest memory of each rule, of the benchmark files below `folder`."""
-    folder, rules = Path(folder), {}
+    folder = Path(folder)
+    rules: dict[str, list[tuple[float, float]]] = {}
     for path in sorted(folder.rglob("*.tsv")):
         with path.open(newline="") as file:
             for row in csv.DictReader(file, delimiter="\t"):

@@ -16,7 +16,7 @@ from rippletwin.spectra.angular_resampling import Revolutions, cut_revolutions
 from rippletwin.spectra.frequency_selection import select_frequencies
 from rippletwin.spectra.noise import noise_cycle_scatter, noise_mad
 from rippletwin.spectra.speed_regression import harmonics_at_mean_speed, mean_speed
-from rippletwin.spectra.transfer_function import reference_spectra
+from rippletwin.spectra.transfer_function import coherent_spectra
 
 __all__ = [
     "Observation",
@@ -161,7 +161,7 @@ def _check_any(recording: Recording, kept: np.ndarray) -> None:
 
 
 def _observe_random(recording, rig, max_frequency_hz) -> Observation:
-    values, covariance, frequency_hz = reference_spectra(
+    values, covariance, frequency_hz = coherent_spectra(
         recording.pressure, recording.sampling_rate_hz, rig
     )
     keep = frequency_hz <= _highest(max_frequency_hz, recording.sampling_rate_hz)

@@ -21,7 +21,7 @@ width and one variance, which maximise the sum of their likelihoods. Their value
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import NamedTuple
 
@@ -74,7 +74,7 @@ def harmonics_at_mean_speed(
             if progress is not None:
                 progress(done, len(bands))
     weights = weights.reshape(*spectra.shape[1:], count)
-    unknown = unknown.reshape(spectra.shape[1:])
+    unknown = np.reshape(unknown, spectra.shape[1:])
     residual = residual.reshape(spectra.shape)
     scatter = np.einsum("rsf,rtf->fst", residual, residual.conj())
     typical = np.median(np.einsum("fss->fs", scatter).real, axis=0) / freedom
@@ -151,10 +151,10 @@ def _choose_covariances(data, deviation, chirp, blocks) -> tuple[np.ndarray, lis
         plain = plain + (len(own) - 1) * np.log(np.sum(np.abs(contrast) ** 2, axis=0) + 1e-300)
     best = -plain + MIN_GAIN
     chosen = np.full(data.shape[1], -1)
-    tried = []
+    tried: list[tuple[float, Callable]] = []
     for width in WIDTHS:
         likelihood = np.zeros((len(VARIANCE_RATIOS), data.shape[1]))
-        kernels = (_kernel(deviation[own], chirp[own], width) for own in blocks)
+        kernels: Iterable[_Kernel] = (_kernel(deviation[own], chirp[own], width) for own in blocks)
         if len(blocks) == 1:  # kept; of many blocks they are calculated again where they are chosen
             kernels = list(kernels)
         for own, kernel in zip(blocks, kernels, strict=True):

@@ -37,7 +37,7 @@ class FlowSource:
         count = slices[-1].stop if slices else 0
         self.flow, self.admittance = np.ones(count, complex), np.zeros(count, complex)
         self.angles = [twin.index.get(f"angle[{o.label}]") for o in observations]
-        changes = {}
+        changes: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         for o, point, part in zip(observations, points, slices):
             if point.ripple is None:
                 continue

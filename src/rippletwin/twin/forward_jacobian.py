@@ -208,12 +208,14 @@ class DifferentiableForward(ForwardModel):
 
         n, load, shape = len(rig.line), twin.index.get("load"), (count, len(self.s))
         v = Arrays(
-            wave_speeds=[value(k) for k in range(n)],
-            diameters=[value(n + k) for k in range(n)],
-            lengths=[value(2 * n + k) for k in range(n)],
-            positions=base.sensor_positions,
+            wave_speeds=np.array([value(k) for k in range(n)]),
+            diameters=np.array([value(n + k) for k in range(n)]),
+            lengths=np.array([value(2 * n + k) for k in range(n)]),
+            positions=np.asarray(base.sensor_positions),
             viscosity=value(twin.index["viscosity"]),
             load=1.0 if load is None else value(load),
+            reflection=twin.reflection(coordinates),
+            gains=twin.gains(coordinates),
         )
         source, admittance = self._sources(theta, base, shape)
         network = FrequencyDomainLine(
@@ -222,8 +224,9 @@ class DifferentiableForward(ForwardModel):
             series=np.empty((n, *shape), complex),
             shunt=np.empty((n, *shape), complex),
             source_admittance=admittance,
-            load=self._load(v.load),
+            load=self._load(v),
             sensor_positions=v.positions,
+            sensor_factor=v.gains,
         )
         density = rig.fluid.density
         for k, (a, d) in enumerate(zip(v.wave_speeds, v.diameters)):

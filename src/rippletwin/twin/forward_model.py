@@ -21,6 +21,7 @@ from rippletwin.line.frequency_domain.orifice_load import OrificeLoad
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
 from rippletwin.twin.effects.base import LineState
 from rippletwin.twin.flow_source import FlowSource
+from rippletwin.twin.unknown_load import unknown_impedance
 
 if TYPE_CHECKING:
     from rippletwin.twin.twin import Arrays, Twin
@@ -72,7 +73,7 @@ class ForwardModel:
             self.load_impedance = _interpolate(
                 self.frequency_hz, rig.load.frequency_hz, rig.load.impedance
             )
-        self._series_cache = {}
+        self._series_cache: dict[int, tuple] = {}
         self._orifice = None
         self._ripples = [point.ripple for point in points]
         self._periodic = [r for r, ripple in enumerate(self._ripples) if ripple is not None]
@@ -147,8 +148,9 @@ class ForwardModel:
             shunt=shunt,
             source_flow=source * self.source.turn(theta),
             source_admittance=source_admittance,
-            load=self._load(v.load),
+            load=self._load(v),
             sensor_positions=v.positions,
+            sensor_factor=v.gains,
         )
         if twin.effects:
             state = self.line_state(v)
@@ -156,7 +158,7 @@ class ForwardModel:
                 effect.apply(network, state, values, place)
         return network
 
-    def _state_factor(self, theta: np.ndarray) -> np.ndarray:
+    def _state_factor(self, theta: np.ndarray) -> np.ndarray | float:
         """What the state of each recording makes of shunt admittances, (..., F); `theta` may be
         (P, B)."""
         if not self.twin.changing_state:
@@ -209,12 +211,14 @@ class ForwardModel:
             self._series_cache[segment] = (diameter, viscosity), value
         return value
 
-    def _load(self, factor: float) -> tuple:
+    def _load(self, v: Arrays) -> tuple:
         kind = self.twin.rig.load.kind
         if kind == "orifice":
-            return "admittance", self._orifice_admittance(factor)
+            return "admittance", self._orifice_admittance(v.load)
         if kind == "impedance":
-            return "impedance", factor * self.load_impedance
+            return "impedance", v.load * self.load_impedance
+        if kind == "unknown":
+            return "impedance", unknown_impedance(self.s, v, self.twin.rig.fluid.density)
         return kind, None
 
     def _balance(self, network: FrequencyDomainLine, theta: np.ndarray) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -35,7 +36,7 @@ class OperatingCondition:
     """
 
     label: str = ""
-    frequency_hz: np.ndarray = ()
+    frequency_hz: np.ndarray | Sequence[float] = ()
     orders: np.ndarray | None = None
     speed_hz: float | None = None
     load_pressure: float | None = None

@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rippletwin.case.model import Rig
-from rippletwin.twin.priors import Prior, lognormal, normal
+from rippletwin.twin.priors import Prior, bounded, lognormal, normal
+from rippletwin.twin.unknown_load import REFLECTION_SDS
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,7 @@ class Parameter:
            posterior has several local modes along this parameter
     place  what it belongs to: "segment 2", "sensor p1", "load", "recording 1", an effect's label
     flat   no prior: `prior` is only the fit's coordinate
+    stated whether the data sheet says something of it, so that a pull speaks against the sheet
     """
 
     name: str
@@ -35,6 +37,7 @@ class Parameter:
     scan: tuple[float, ...] = (0.0,)
     place: str = ""
     flat: bool = False
+    stated: bool = True
 
     @property
     def nominal(self) -> float:
@@ -83,8 +86,39 @@ PUMP_UNITS = {"bulk_modulus": "Pa", "dead_volume": "m3", "case_leakage": "m3/(Pa
 ANGLE_SCALE = 0.01  # rad of shaft angle a coordinate: a few degrees of phase at the 9th harmonic
 
 
-def line_parameters(rig: Rig, guessed_load: bool) -> list[Parameter]:
-    """Wave speeds, diameters, lengths, sensors' positions, viscosity, and the load's factor."""
+def load_parameters(rig: Rig, guessed_load: bool) -> list[Parameter]:
+    """The load's factor, or the Schur parameters of an unknown one (`unknown_load`)."""
+    if rig.load.kind in ("orifice", "impedance"):
+        sd = GUESSED_LOAD_SD if guessed_load else rig.uncertainty.load
+        return [Parameter("load", "", lognormal(1.0, sd), place="load")]
+    if rig.load.kind == "unknown":
+        return [
+            Parameter(f"reflection[{k}]", "1", bounded(sd), place="load", stated=False)
+            for k, sd in enumerate(REFLECTION_SDS)
+        ]
+    return []
+
+
+def gain_parameters(rig: Rig, absolute: bool) -> list[Parameter]:
+    """Logarithm of the gain and phase of each sensor whose sensitivity is not calibrated.
+
+    Without a known source only ratios show: then (`absolute` False) the first sensor is right.
+    """
+    sd = rig.uncertainty.sensor_gain
+    sensors = rig.sensors if absolute else rig.sensors[1:]
+    return [
+        Parameter(f"{name}[{s.name}]", unit, prior, place=f"sensor {s.name}")
+        for name, unit, prior in (
+            ("gain", "1", lognormal(1.0, sd)),
+            ("phase", "rad", normal(0.0, sd)),
+        )
+        for s in sensors
+        if sd > 0.0
+    ]
+
+
+def line_parameters(rig: Rig) -> list[Parameter]:
+    """Wave speeds, diameters, lengths, sensors' positions and viscosity."""
     sheet = rig.uncertainty
     relative = (
         ("wave_speed", sheet.wave_speed, "m/s"),
@@ -107,9 +141,6 @@ def line_parameters(rig: Rig, guessed_load: bool) -> list[Parameter]:
     ]
     viscosity = lognormal(rig.fluid.kinematic_viscosity, sheet.viscosity)
     out.append(Parameter("viscosity", "m2/s", viscosity, place="fluid"))
-    if rig.load.kind in ("orifice", "impedance"):
-        sd = GUESSED_LOAD_SD if guessed_load else sheet.load
-        out.append(Parameter("load", "", lognormal(1.0, sd), place="load"))
     return out
 
 

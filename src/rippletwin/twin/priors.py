@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr, ndtri
 
+MAX_BOUNDED = 1.0 - 1e-9  # whose coordinate is finite
+
 
 @dataclass(frozen=True)
 class Prior:
@@ -15,6 +17,7 @@ class Prior:
     kind "normal":    x = centre + scale u
     kind "lognormal": x = centre exp(scale u), for positive parameters
     kind "uniform":   x = centre + scale Phi(u), on [centre, centre + scale]
+    kind "bounded":   x = tanh(scale u), on (-1, 1) about zero
 
     In u every prior is N(0, 1): pulls are read off directly and Laplace's integral is over u.
     """
@@ -29,6 +32,8 @@ class Prior:
             return self.centre + self.scale * u
         if self.kind == "lognormal":
             return self.centre * np.exp(self.scale * u)
+        if self.kind == "bounded":
+            return np.tanh(self.scale * u)
         return self.centre + self.scale * ndtr(u)
 
     def coordinate(self, x):
@@ -42,6 +47,8 @@ class Prior:
             return (x - self.centre) / self.scale
         if self.kind == "lognormal":
             return np.log(x / self.centre) / self.scale
+        if self.kind == "bounded":
+            return np.arctanh(np.clip(x, -MAX_BOUNDED, MAX_BOUNDED)) / self.scale
         return ndtri(np.clip((x - self.centre) / self.scale, 1e-3, 1 - 1e-3))
 
 
@@ -58,3 +65,8 @@ def lognormal(median: float, log_deviation: float) -> Prior:
 def uniform(low: float, high: float) -> Prior:
     """Uniform prior on [low, high]."""
     return Prior("uniform", low, high - low)
+
+
+def bounded(deviation: float) -> Prior:
+    """Prior on (-1, 1) about zero, of standard deviation `deviation` where that is small."""
+    return Prior("bounded", 0.0, deviation)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy.signal import resample
@@ -12,8 +13,9 @@ from rippletwin.harmonics import one_period
 from rippletwin.line.time_domain import method_of_characteristics
 from rippletwin.line.time_domain.line_elements import End, Pipe, TimeDomainLine, capacitance
 from rippletwin.twin.effects.base import LineState
-from rippletwin.twin.time_domain_form import apply_in_time
+from rippletwin.twin.time_domain_form import apply_in_time, series_elements
 from rippletwin.twin.twin import Twin
+from rippletwin.twin.unknown_load import unknown_impedance
 
 MAX_PERIODS = 200  # until the line is periodic
 
@@ -71,6 +73,7 @@ def line_in_time(
     factor = twin.values().get("load", 1.0)
     mean = nominal = float(np.mean(healthy_flow))
     coefficient, resistance = 0.0, None
+    unknown = rig.load.kind == "unknown"
     if rig.load.kind == "orifice":
         root = np.sqrt(load_pressure - rig.load.back_pressure)
         coefficient = rig.load.coefficient or factor * mean / root
@@ -81,7 +84,7 @@ def line_in_time(
         pipes=[Pipe(s.length, s.diameter, s.wave_speed) for s in rig.line],
         flow=np.asarray(flow, dtype=float) + change - np.mean(healthy_flow) + mean,
         period=1.0 / speed_hz,
-        end=End(rig.load.kind, pressure, coefficient),
+        end=End("open" if unknown else rig.load.kind, pressure, coefficient),
         density=rig.fluid.density,
         viscosity=rig.fluid.kinematic_viscosity,
         friction=twin.friction,
@@ -89,6 +92,11 @@ def line_in_time(
         mean_flow=mean,
         source=[capacitance(0.0, source_capacitance)] if source_capacitance else [],
     )
+    v = twin.arrays(twin.theta)
+    if unknown:
+        impedance = partial(unknown_impedance, v=v, density=line.density)
+        line.load += series_elements("the unknown load", impedance, line.period)
+    line.sensors += [(k, partial(_gain, g)) for k, g in enumerate(np.ravel(v.gains)) if g != 1.0]
     state = LineState(
         density=line.density,
         viscosity=line.viscosity,
@@ -99,12 +107,17 @@ def line_in_time(
         load_resistance=resistance,
         heat_capacity_ratio=rig.fluid.heat_capacity_ratio,
         prandtl=rig.fluid.prandtl,
-        mean_flow=nominal,
+        mean_flow=np.array(nominal),
         load_passes_flow=rig.load.passes_flow,
     )
     for effect, place, values in twin.effect_values(twin.theta):
         apply_in_time(effect, line, state, values, place)
     return line
+
+
+def _gain(gain: complex, s: np.ndarray) -> np.ndarray:
+    """What an uncalibrated sensor reads over the pressure, at s (F,); real at rest."""
+    return np.where(s == 0.0, np.abs(gain), gain)
 
 
 def pump_change(twin: Twin, healthy_flow, speed_hz: float, load_pressure: float):

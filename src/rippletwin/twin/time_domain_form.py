@@ -56,6 +56,17 @@ def apply_in_time(
             line.sensors.append((index, _reading(probe_of, index)))
 
 
+def series_elements(
+    name: str, impedance: Callable[[np.ndarray], np.ndarray], period: float
+) -> list[Element]:
+    """Series elements of the load whose sum follows `impedance`, a function of s (F,).
+
+    Raises InputError, with `name`, where no passive rational function does.
+    """
+    s = 2j * np.pi * _frequencies(1.0 / period)
+    return _elements(name, 0.0, "series", s, impedance(s))
+
+
 def _frequencies(lowest_hz: float) -> np.ndarray:
     """Frequencies (F,) of the probe, Hz."""
     even = np.linspace(lowest_hz, HIGHEST_HZ, FREQUENCIES // 2)
@@ -82,7 +93,7 @@ def _probe(line: TimeDomainLine, state: LineState, s: np.ndarray) -> FrequencyDo
         )
         for pipe in pipes
     ]
-    load = (line.end.kind, None)
+    load: tuple = (line.end.kind, None)
     if line.end.kind in ("orifice", "resistance"):
         load = "admittance", np.full(len(s), 1.0 / (state.load_resistance or np.inf))
     return FrequencyDomainLine(
@@ -116,7 +127,9 @@ def _refuse_unknown_changes(effect: Effect, before, after) -> None:
             raise _refusal(effect, f"it changes `{name}` of the line")
 
 
-def _refusal(effect: Effect, why: str) -> InputError:
+def _refusal(effect: Effect | str, why: str) -> InputError:
+    if isinstance(effect, str):
+        return InputError("the twin", effect, f"has no time domain: {why}", "Use the other domain")
     return InputError(
         effect.file or effect.name,
         "EFFECT.apply_in_time",
@@ -129,7 +142,7 @@ def _whole(value, s: np.ndarray) -> np.ndarray:
     return np.broadcast_to(np.asarray(value, complex), s.shape)
 
 
-def _elements(effect: Effect, position: float, kind: str, s, immittance) -> list[Element]:
+def _elements(effect: Effect | str, position: float, kind: str, s, immittance) -> list[Element]:
     """Elements (none where it is zero) whose sum follows a one-port's immittance (F,)."""
     fit = fit_passive_terms(s, immittance)
     if not fit.error <= MAX_FIT_ERROR:
@@ -164,6 +177,8 @@ def _change_load(effect: Effect, line: TimeDomainLine, s, before: tuple, after: 
     """Put what the effect made of the load before the end of the line."""
     if after[0] == before[0] and np.array_equal(after[1], before[1]):
         return
+    if line.end.kind == "anechoic":
+        line.end = replace(line.end, kind="open")
     if line.end.kind == "open" and after[0] in ("impedance", "admittance"):
         impedance = after[1] if after[0] == "impedance" else 1.0 / np.asarray(after[1])
         line.load += _elements(effect, 0.0, "series", s, _whole(impedance, s))

@@ -8,6 +8,8 @@ and every prior is N(0, 1). Its entries, in this order (segments and recordings 
     viscosity                               kinematic
     load                                    factor on the orifice's coefficient or on the measured
                                             load impedance; absent for other loads
+    reflection[k]                           Schur parameters of an unknown load
+    gain[NAME], phase[NAME]                 of each sensor that is not calibrated
     bulk_modulus, port_timing, ...          of the pump, where `uncertain_pump` says so
     angle[LABEL]                            shaft angle at a recording's first sample, rad; no prior
     state[LABEL]                            factor on all wave speeds while a recording was made,
@@ -38,7 +40,9 @@ from rippletwin.twin.operating_point import (
 from rippletwin.twin.parameters import (
     angle_parameter,
     effect_parameters,
+    gain_parameters,
     line_parameters,
+    load_parameters,
     pump_parameters,
     state_parameter,
 )
@@ -48,7 +52,11 @@ SOURCE_SD = 0.05
 
 
 class Arrays(NamedTuple):
-    """The line at one theta: segments (n,), sensors (S,), viscosity and load factor scalars."""
+    """The line at one theta: segments (n,), sensors (S,), viscosity and load factor scalars.
+
+    `reflection` has the Schur parameters of an unknown load, each (..., 1); `gains` (S, ..., 1) is
+    what uncalibrated sensors read over the pressure.
+    """
 
     wave_speeds: np.ndarray
     diameters: np.ndarray
@@ -56,6 +64,8 @@ class Arrays(NamedTuple):
     positions: np.ndarray
     viscosity: float
     load: float
+    reflection: tuple = ()
+    gains: np.ndarray | float = 1.0
 
 
 class Twin:
@@ -110,7 +120,9 @@ class Twin:
         self.changing_state = bool(changing_state and len(self.labels) > 1)
         self._effect_parameters = [effect.parameters(rig, place) for effect, place in self.effects]
         self.parameters = (
-            *line_parameters(rig, self.guessed_load),
+            *line_parameters(rig),
+            *load_parameters(rig, self.guessed_load),
+            *gain_parameters(rig, bool(self.labels)),
             *(pump_parameters(rig) if self.uncertain_pump else ()),
             *(angle_parameter(label) for label in self.labels),
             *(state_parameter(label) for label in self.labels if self.changing_state),
@@ -120,7 +132,9 @@ class Twin:
         self.theta = np.zeros(len(self.parameters)) if theta is None else np.asarray(theta, float)
         if self.theta.shape != (len(self.parameters),):
             raise ValueError(f"theta must have {len(self.parameters)} entries")
-        self._ripples, self.kept_changes = {}, {}  # shared by copies with other effects
+        # Shared by copies with other effects: ripples, and the changes that `FlowSource` keeps.
+        self._ripples: dict = {}
+        self.kept_changes: dict = {}
 
     # parameters and their values
 
@@ -136,7 +150,31 @@ class Twin:
         a, d, lengths = u[: 3 * n].reshape(3, n)
         # A sensor stays on the line however the fit stretches it.
         x = np.clip(u[3 * n : k], 0.0, np.sum(lengths))
-        return Arrays(a, d, lengths, x, u[k], self.load_factor(theta))
+        ends = self.reflection(theta), self.gains(theta)
+        return Arrays(a, d, lengths, x, u[k], self.load_factor(theta), *ends)
+
+    def reflection(self, u: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Schur parameters of an unknown load, each (..., 1), at coordinates u (P, ...)."""
+        return tuple(
+            np.asarray(p.value(x))[..., None]
+            for p, x in zip(self.parameters, u)
+            if p.name.startswith("reflection[")
+        )
+
+    def gains(self, u: np.ndarray) -> np.ndarray | float:
+        """What each sensor reads over the pressure, (S, ..., 1), at coordinates u (P, ...); 1 where
+        all are calibrated."""
+        if not self.rig.uncertainty.sensor_gain:
+            return 1.0
+
+        def value(name, otherwise):
+            k = self.index.get(name)
+            return otherwise + 0.0 * u[0] if k is None else self.parameters[k].value(u[k])
+
+        names = [sensor.name for sensor in self.rig.sensors]
+        gain = np.array([value(f"gain[{name}]", 1.0) for name in names])
+        phase = np.array([value(f"phase[{name}]", 0.0) for name in names])
+        return (gain * np.exp(1j * phase))[..., None]
 
     def load_factor(self, theta: np.ndarray) -> float:
         """Factor on the load's coefficient at `theta`; 1 where it is no parameter."""

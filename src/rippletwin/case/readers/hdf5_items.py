@@ -9,39 +9,42 @@ from __future__ import annotations
 from pathlib import Path
 
 import h5py
-import numpy as np
 
-from rippletwin.case.readers.file_checks import check_size
-from rippletwin.case.readers.signals import check_type, numbers
+from rippletwin.case.readers.signals import check_type
 from rippletwin.errors import InputError
 
 MAX_ATTRIBUTE_BYTES = 100_000
+MAX_NAMES = 50
 HERE = "Store the numbers themselves in this file, as a dataset"
 
 
-def names_in(file: h5py.File, most: int = 50) -> list[str]:
-    """Names of what lies at the top of a file, without MATLAB's own."""
+def names_in(file: h5py.Group, most: int = MAX_NAMES) -> list[str]:
+    """Names of what lies at the top of a file or group, without MATLAB's own."""
     return [name for name, _ in zip(file, range(most)) if not name.startswith("#")]
 
 
-def read_dataset(path: Path, file: h5py.File, name: str) -> tuple[np.ndarray, h5py.Dataset] | None:
-    """A dataset's numbers and the dataset; None where there is none of that name.
+def datasets_in(file: h5py.File, most: int = MAX_NAMES) -> list[str]:
+    """Names of the first datasets of a file, those in groups with their path; links are left."""
+    found: list[str] = []
+
+    def visit(name: str, item: object) -> bool | None:
+        if isinstance(item, h5py.Dataset) and not name.startswith("#"):
+            found.append(name)
+        return True if len(found) >= most else None
+
+    file.visititems(visit)
+    return found
+
+
+def find_dataset(path: Path, file: h5py.File, name: str) -> h5py.Dataset | None:
+    """A dataset of real numbers, unread; None where there is none of that name.
 
     Raises InputError where something else has the name, where the data lie in another file, or
-    where they are no real numbers or too many.
+    where they are no real numbers.
     """
-    if not file.id.links.exists(name.encode()):
+    item = _item(path, file, name)
+    if item is None:
         return None
-    kind = file.id.links.get_info(name.encode()).type
-    if kind == h5py.h5l.TYPE_EXTERNAL:
-        raise InputError(path, name, "a link to another file; such links are not followed", HERE)
-    try:
-        item = file[name]
-    except (KeyError, RuntimeError, OSError) as error:
-        if kind == h5py.h5l.TYPE_HARD:
-            raise OSError(str(error)) from error
-        problem = "a link that leads nowhere, to itself or to another file"
-        raise InputError(path, name, problem, HERE) from error
     if not isinstance(item, h5py.Dataset):
         what = f"a group that holds {', '.join(names_in(item)) or 'nothing'}"
         problem = what if isinstance(item, h5py.Group) else "a data type"
@@ -51,13 +54,32 @@ def read_dataset(path: Path, file: h5py.File, name: str) -> tuple[np.ndarray, h5
     if item.shape is None or not item.size:
         raise InputError(path, name, "empty", "Store numbers in it")
     check_type(path, name, item.dtype)
-    check_size(path, name, item.size)
-    return numbers(path, name, item[()]), item
+    return item
 
 
-def read_attribute(path: Path, holders: tuple, name: str):
-    """An attribute's value, from the first of `holders` that has it; None where none does."""
-    for holder in holders:
+def _item(path: Path, file: h5py.File, name: str):
+    """What stands under a name, that may have groups before it; None where nothing does."""
+    item: h5py.Group = file
+    for part in name.strip("/").split("/"):
+        if not isinstance(item, h5py.Group) or not item.id.links.exists(part.encode()):
+            return None
+        kind = item.id.links.get_info(part.encode()).type
+        if kind == h5py.h5l.TYPE_EXTERNAL:
+            problem = "a link to another file; such links are not followed"
+            raise InputError(path, name, problem, HERE)
+        try:
+            item = item[part]
+        except (KeyError, RuntimeError, OSError) as error:
+            if kind == h5py.h5l.TYPE_HARD:
+                raise OSError(str(error)) from error
+            problem = "a link that leads nowhere, to itself or to another file"
+            raise InputError(path, name, problem, HERE) from error
+    return item
+
+
+def read_attribute(path: Path, file: h5py.File, beside: str, name: str):
+    """An attribute of the dataset `beside`, of its group or of the file; None where none has it."""
+    for holder in _holders(path, file, beside):
         if name not in holder.attrs:
             continue
         try:
@@ -68,3 +90,8 @@ def read_attribute(path: Path, holders: tuple, name: str):
             problem = f"the attribute cannot be read ({error})"
             raise InputError(path, name, problem, "Store a number or text") from error
     return None
+
+
+def _holders(path: Path, file: h5py.File, name: str) -> list:
+    dataset = _item(path, file, name) if name else None
+    return [file] if dataset is None else [dataset, dataset.parent, file]

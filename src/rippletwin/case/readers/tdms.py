@@ -1,6 +1,7 @@
-"""TDMS: one channel a sensor, named as the sensor, in whatever group, Pa.
+"""TDMS: one channel a sensor, named as the sensor or as rig.yaml says, in whatever group, Pa.
 
-The sampling rate comes from the channels' `wf_increment` property (s), or from a channel `time_s`.
+The sampling rate comes from the channels' `wf_increment` property (s), from a property that
+rig.yaml names, or from a channel `time_s`. `dataset` of rig.yaml is the group.
 """
 
 from __future__ import annotations
@@ -11,13 +12,14 @@ import numpy as np
 from nptdms import TdmsFile
 
 from rippletwin.case.readers.file_checks import check_readable, check_size
-from rippletwin.case.readers.signals import Signals, missing_sensor, numbers, one_number
-from rippletwin.errors import InputError, raise_any
+from rippletwin.case.readers.layout import Layout, choose, find_time, missing_name
+from rippletwin.case.readers.signals import Signals, numbers, one_number
+from rippletwin.errors import InputError
 
 MAGIC = b"TDSm"  # the first bytes of every TDMS file
 
 
-def read(path: Path, sensors: list[str]) -> Signals:
+def read(path: Path, layout: Layout) -> Signals:
     """Read a TDMS recording; raises InputError."""
     if not check_readable(path).startswith(MAGIC):
         raise InputError(
@@ -28,12 +30,13 @@ def read(path: Path, sensors: list[str]) -> Signals:
         )
     try:
         with TdmsFile.open(path) as file:
-            channels = [channel for group in file.groups() for channel in group.channels()]
-            if not channels:
-                raise ValueError("no channels")
-            chosen = _choose(path, sensors, channels)
-            rows = {name: _numbers(path, name, channel) for name, channel in chosen.items()}
-            steps = {chosen[sensor].properties.get("wf_increment") for sensor in sensors}
+            channels = _channels(path, file, layout)
+            names = [channel.name for channel in channels]
+            chosen = [channels[k] for k in choose(path, layout, names)]
+            time = find_time(path, layout, names)
+            rows = [_numbers(path, s, c) for s, c in zip(layout.sensors, chosen)]
+            time_s = None if time is None else _numbers(path, layout.time_name, channels[time])
+            rate = _rate(path, layout, [{**file.properties, **c.properties} for c in chosen])
     except InputError:
         raise
     except Exception as error:  # npTDMS raises many kinds for a damaged file
@@ -43,29 +46,29 @@ def read(path: Path, sensors: list[str]) -> Signals:
             f"cannot be read, is cut short or not TDMS ({error})",
             "Copy it again from where it was recorded",
         ) from error
-    if len({row.size for row in rows.values()}) > 1:
-        sizes = ", ".join(f"{name} {row.size}" for name, row in rows.items())
+    if len({row.size for row in rows}) > 1:
+        sizes = ", ".join(f"{s} {row.size}" for s, row in zip(layout.sensors, rows))
         raise InputError(path, "channels", f"lengths differ: {sizes}", "Record them together")
-    return Signals(
-        pressure=np.array([rows[sensor] for sensor in sensors]),
-        sampling_rate_hz=_rate(path, steps),
-        time_s=rows.get("time_s"),
-    )
+    return Signals(pressure=np.array(rows), sampling_rate_hz=rate, time_s=time_s)
 
 
-def _choose(path: Path, sensors: list[str], channels: list) -> dict:
-    """Channels of the sensors and of the time, by name."""
-    by_name: dict[str, list] = {}
-    for channel in channels:
-        by_name.setdefault(channel.name, []).append(channel)
-    raise_any(missing_sensor(path, s, by_name) for s in sensors if s not in by_name)
-    for name in sensors:
-        groups = [channel.group_name for channel in by_name[name]]
-        if len(groups) > 1:
-            problem = f"a channel in each of the groups {', '.join(groups)}"
-            raise InputError(path, name, problem, "Save the group that is meant as its own file")
-    wanted = [*sensors, *(["time_s"] if "time_s" in by_name else [])]
-    return {name: by_name[name][0] for name in wanted}
+def _channels(path: Path, file: TdmsFile, layout: Layout) -> list:
+    """The channels of the group that rig.yaml names, or of all groups."""
+    groups = {group.name: group for group in file.groups()}
+    if layout.dataset is not None:
+        if layout.dataset not in groups:
+            raise missing_name(path, "dataset", layout.dataset, groups)
+        return groups[layout.dataset].channels()
+    channels = [channel for group in groups.values() for channel in group.channels()]
+    if not channels:
+        raise ValueError("no channels")
+    for name in layout.names:
+        holders = [channel.group_name for channel in channels if channel.name == name]
+        if len(holders) > 1:
+            problem = f"a channel in each of the groups {', '.join(holders)}"
+            remedy = f"Say which group is meant, in rig.yaml: dataset: {holders[0]}"
+            raise InputError(path, name, problem, remedy)
+    return channels
 
 
 def _numbers(path: Path, name: str, channel) -> np.ndarray:
@@ -73,15 +76,19 @@ def _numbers(path: Path, name: str, channel) -> np.ndarray:
     return numbers(path, name, channel[:])
 
 
-def _rate(path: Path, steps: set) -> float | None:
-    """The sampling rate, Hz, of the channels' time steps."""
-    if len(steps) > 1:
-        raise InputError(
-            path, "wf_increment", f"differs between sensors: {steps}", "Record them together"
-        )
-    step = one_number(path, "wf_increment", next(iter(steps), None))
-    if not step:
+def _rate(path: Path, layout: Layout, properties: list[dict]) -> float | None:
+    """The sampling rate, Hz: the property that rig.yaml names, or that of the time steps."""
+    name = layout.rate or "wf_increment"
+    values = {of_channel.get(name) for of_channel in properties}
+    if len(values) > 1:
+        raise InputError(path, name, f"differs between sensors: {values}", "Record them together")
+    value = one_number(path, name, next(iter(values)))
+    if layout.rate is not None:
+        if value is None:
+            raise missing_name(path, "sampling_rate_name", name, properties[0])
+        return value
+    if not value:
         return None
-    if not step > 0:
-        raise InputError(path, "wf_increment", f"{step:g} s", "Give a positive time step")
-    return 1 / step
+    if not value > 0:
+        raise InputError(path, name, f"{value:g} s", "Give a positive time step")
+    return 1 / value

@@ -103,7 +103,7 @@ def largest_pull(fit: Fit) -> tuple[float, str]:
     pulls = [
         (abs(float(u)), p.name)
         for p, u in zip(fit.twin.parameters, fit.twin.theta)
-        if not p.flat and "@" not in p.name
+        if p.stated and not p.flat and "@" not in p.name
     ]
     return max(pulls, default=(0.0, ""))
 

@@ -170,6 +170,20 @@ def pump_intervals(fit: Fit) -> dict[str, dict]:
     return parameters
 
 
+def sensor_intervals(fit: Fit) -> dict[str, dict]:
+    """Gain and phase of every uncalibrated sensor by its name: value and 95 % interval.
+
+    Empty where all are calibrated. A sensor that is left out is the one that the others refer to.
+    """
+    sensors: dict[str, dict] = {}
+    for k, p in enumerate(fit.twin.parameters):
+        kind, _, name = p.name.rstrip("]").partition("[")
+        if kind in ("gain", "phase") and p.place == f"sensor {name}":
+            value, ends, unit = _value_and_interval(fit, k)
+            sensors.setdefault(name, {})[kind] = {"value": value, "ci95": ends, "unit": unit}
+    return sensors
+
+
 def _value_and_interval(fit: Fit, k: int) -> tuple[float, list[float], str]:
     """Value, 95 % interval and unit of parameter k."""
     p = fit.twin.parameters[k]

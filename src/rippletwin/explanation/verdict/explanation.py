@@ -36,6 +36,7 @@ class Explanation:
     remainder          what the accepted fit leaves; None where it leaves nothing
     null_distribution  of the evidence without an effect, if it was asked for
     calibrated         plain calibration without effects; None where nothing is explained
+    warnings           of the case, in plain words: what of the data sheet is unusual or missing
     """
 
     rig: Rig
@@ -52,6 +53,7 @@ class Explanation:
     remainder: Remainder | None = None
     null_distribution: NullDistribution | None = None
     calibrated: Fit | None = None
+    warnings: tuple[str, ...] = ()
 
     @property
     def without_effects(self) -> Fit:

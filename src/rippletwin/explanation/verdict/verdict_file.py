@@ -10,7 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from rippletwin.explanation.checks.alarms import evidence_p_value
-from rippletwin.explanation.checks.profile_intervals import effect_intervals, pump_intervals
+from rippletwin.explanation.checks.profile_intervals import (
+    effect_intervals,
+    pump_intervals,
+    sensor_intervals,
+)
 from rippletwin.explanation.localise import residual_bands
 from rippletwin.explanation.localise.missing_immittance import is_passive, missing_immittance
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders
@@ -33,6 +37,7 @@ from rippletwin.explanation.verdict.places import (
 from rippletwin.explanation.verdict.summary_text import summary_text
 from rippletwin.twin import twin_file
 from rippletwin.twin.effects.library import generalisations
+from rippletwin.twin.unknown_load import load_curve
 
 WIDE_INTERVAL = 0.15  # of the line's length; a wider one asks for one more sensor
 NOTHING_MISSING = ("consistent", "calibration_only")
@@ -50,6 +55,7 @@ def verdict_dict(explanation: Explanation) -> dict:
         entries = effect_intervals(decision.accepted)
     effects = [*_line_effects(e, entries), *shaft_effects]
     places = equivalent_places(e.search) if verdict in ("named", "ambiguous") else ()
+    curve = load_curve(decision.accepted.twin, decision.accepted.covariance, e.observations)
     result = {
         "verdict": verdict,
         "mismatch": _mismatch(e, verdict, entries),
@@ -60,6 +66,9 @@ def verdict_dict(explanation: Explanation) -> dict:
         "fit": _fit_scores(e),
         "without": [asdict(sensitivity) for sensitivity in e.prior_sensitivity],
         "pump": pump_intervals(decision.accepted),
+        "load": None if curve is None else curve.as_dict(),
+        "sensors": sensor_intervals(decision.accepted),
+        "warnings": list(e.warnings),
         "sentence": "",
     }
     result["sentence"] = summary_text(e, result, entries)

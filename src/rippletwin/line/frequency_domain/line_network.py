@@ -16,6 +16,7 @@ load: nothing overflows however large the loss, and only numbers of like size ar
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -63,7 +64,7 @@ class FrequencyDomainLine:
     source_admittance: np.ndarray | complex = 0.0
     load: tuple = ("closed", None)
     inserts: list = field(default_factory=list)
-    sensor_positions: np.ndarray = ()
+    sensor_positions: np.ndarray | Sequence[float] = ()
     sensor_factor: np.ndarray | complex = 1.0
     opening: np.ndarray | None = None
     nonlinear_compliances: list = field(default_factory=list)
@@ -78,14 +79,14 @@ class FrequencyDomainLine:
         """What the sensors read, (S, F) Pa: pressure at them times `sensor_factor`."""
         return self.pressure_at(self.sensor_positions) * self.sensor_factor
 
-    def pressure_at(self, positions: np.ndarray) -> np.ndarray:
+    def pressure_at(self, positions: np.ndarray | Sequence[float]) -> np.ndarray:
         """Pressure at `positions` (S,), m, in any order: (S, F) Pa.
 
         Beside an insert it is the value on the pump's side. Raises ValueError outside the line.
         """
         return self.respond(positions)[0]
 
-    def flow_at(self, positions: np.ndarray) -> np.ndarray:
+    def flow_at(self, positions: np.ndarray | Sequence[float]) -> np.ndarray:
         """Flow towards the load at `positions` (S,): (S, F) m3/s; beside an insert, on the pump's
         side."""
         return self.respond(positions)[1]
@@ -147,7 +148,7 @@ class FrequencyDomainLine:
         _, _, entry, decay = part.sweep([(1.0, 0.0), (0.0, 1.0)])
         return (entry / decay).transpose(2, 1, 0)
 
-    def respond(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def respond(self, positions: np.ndarray | Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
         """Pressure and flow (S, F) at `positions` with the network's own source and load."""
         pressure, flow, entry, decay = self.sweep([self.load_state()], positions)
         own, *forced = entry[:, 1] + self.source_admittance * entry[:, 0]
@@ -157,7 +158,9 @@ class FrequencyDomainLine:
         scale = (self.source_flow * decay - forced[0]) / own
         return tuple((x[:, 0] * scale + x[:, 1]) / decay for x in (pressure, flow))
 
-    def sweep(self, states: list, positions: np.ndarray = ()) -> tuple[np.ndarray, ...]:
+    def sweep(
+        self, states: list, positions: np.ndarray | Sequence[float] = ()
+    ) -> tuple[np.ndarray, ...]:
         """Propagate m load states (p, q) to x = 0: pressure and flow (S, m, F) at the positions,
         the pairs (m, 2, F) at x = 0, and the decay (F,) of the line.
 
@@ -182,7 +185,7 @@ class FrequencyDomainLine:
             len(positions),
         )
 
-    def _plan(self, positions: np.ndarray, outflows: np.ndarray) -> list[tuple[int, int, float]]:
+    def _plan(self, positions, outflows) -> list[tuple[int, int, float]]:
         """Steps (what, index, distance) from the load to x = 0, for `_sweep`."""
         starts = np.cumsum(self.lengths) - self.lengths
         starts, here = starts.tolist(), self.length

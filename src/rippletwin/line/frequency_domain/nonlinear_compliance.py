@@ -59,7 +59,8 @@ class NonlinearComplianceSolver:
 
     def __init__(self, slices: Sequence[slice], orders: np.ndarray):
         self.tolerance, self.warm_start, self.solved = OUTFLOW_TOLERANCE, False, True
-        self._outflow, self._accelerations = None, []
+        self._outflow: np.ndarray | None = None
+        self._accelerations: list[AndersonAcceleration] = []
         self.recordings = []
         for part in slices:
             own = np.asarray(orders[part]).astype(int)

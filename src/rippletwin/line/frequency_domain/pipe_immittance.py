@@ -81,7 +81,7 @@ def _asymptotic_ratio(terms: int) -> np.ndarray:
     for order, series in ((0, top), (2, bottom)):
         for k in range(1, terms):
             series.append(series[-1] * -(4 * order**2 - (2 * k - 1) ** 2) / (8 * k))
-    ratio = []
+    ratio: list[float] = []
     for k in range(terms):
         ratio.append(top[k] - sum(ratio[i] * bottom[k - i] for i in range(k)))
     return np.array(ratio)

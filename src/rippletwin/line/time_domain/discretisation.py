@@ -11,7 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from rippletwin.line.time_domain.line_elements import Element, Pipe, TimeDomainLine, capacitance
+from rippletwin.line.time_domain.line_elements import (
+    Branch,
+    Element,
+    Pipe,
+    TimeDomainLine,
+    capacitance,
+)
 
 MIN_CELLS = 3  # of a pipe; a shorter piece becomes a pi section
 MAX_PREWARPED = 0.5  # rad a half step: a faster resonance is hardly resolved
@@ -58,7 +64,8 @@ def discretise(line: TimeDomainLine, dt: float) -> tuple[list[Pipe], list[float]
     cuts = {i.position for i in line.inserts if np.min(np.abs(edges - i.position)) > SAME_POSITION}
     stops = np.array(sorted(set(edges) | cuts))
     at = [int(np.argmin(np.abs(stops - i.position))) for i in line.inserts]
-    pipes, starts, joints = [], [], [list(line.source)]
+    pipes, starts = [], []
+    joints: list[list[Element | Branch]] = [[*line.source]]
     for n, x in enumerate(stops):
         if n > 0:
             before = stops[n - 1]

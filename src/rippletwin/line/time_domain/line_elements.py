@@ -117,7 +117,7 @@ class TimeDomainLine:
                at s (F,) of which the first is 0
     """
 
-    pipes: Sequence[Pipe]
+    pipes: list[Pipe]
     flow: np.ndarray
     period: float
     end: End

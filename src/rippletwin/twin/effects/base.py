@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri
 
-from rippletwin.case.model import absolute
+from rippletwin.case.model import Rig, absolute
 from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import uniform
 
@@ -126,8 +126,8 @@ class Effect:
     medium: str
     equation: str
     source: str
-    parameters: Callable[[object, Place], tuple[Parameter, ...]]
-    places: Callable[[object], tuple[Place, ...]]
+    parameters: Callable[[Rig, Place], tuple[Parameter, ...]]
+    places: Callable[[Rig], tuple[Place, ...]]
     apply: Callable[[object, LineState, Mapping[str, object], Place], None]
     apply_in_time: Callable[[object, LineState, Mapping[str, float], Place], None] | None = None
     certain: bool = False

@@ -22,7 +22,8 @@ EFFECT = Effect(
     equation="reading = (1 + g) p",
     source="JCGM 106:2012, sec. 5 (sensitivity error)",
     parameters=lambda rig, place: (Parameter("gain_error", "1", normal(0.0, 0.15)),),
-    places=sensor_places,
+    # An uncalibrated sensor has its gain among the parameters of the line.
+    places=lambda rig: () if rig.uncertainty.sensor_gain else sensor_places(rig),
     apply=_apply,
     apply_in_time=_apply_in_time,
 )

@@ -1,0 +1,49 @@
+"""zarr: array `pressure`, in either orientation, Pa, with the attribute `sampling_rate_hz`.
+
+The attribute may sit on the array or on the store. Optional: attribute `sensors`, the channels'
+names; array `time_s` (samples,). rig.yaml may name others.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import zarr
+
+from rippletwin.case.readers.arrays import ArrayFile, read_arrays
+from rippletwin.case.readers.layout import Layout
+from rippletwin.case.readers.signals import Signals, check_type
+from rippletwin.errors import InputError
+
+
+def read(path: Path, layout: Layout) -> Signals:
+    """Read a recording in a zarr store, a folder; raises InputError."""
+    try:
+        store = zarr.open_group(path, mode="r")
+        members = store.members(max_depth=4)
+        arrays = {name: item for name, item in members if isinstance(item, zarr.Array)}
+
+        def array(name: str) -> zarr.Array | None:
+            item = arrays.get(name)
+            if item is not None and not item.size:
+                raise InputError(path, name, "empty", "Store numbers in it")
+            if item is not None:
+                check_type(path, name, item.dtype)
+            return item
+
+        def attribute(beside: str, name: str):
+            holders: list[zarr.Array | zarr.Group] = [store]
+            if beside in arrays:
+                holders.insert(0, arrays[beside])
+            return next((h.attrs[name] for h in holders if name in h.attrs), None)
+
+        return read_arrays(ArrayFile(path, lambda: list(arrays), array, attribute), layout)
+    except InputError:
+        raise
+    except Exception as error:  # zarr raises many kinds for a damaged store
+        raise InputError(
+            path,
+            "file",
+            f"cannot be read, or is no zarr store ({error})",
+            "Copy it again from where it was recorded",
+        ) from error
