@@ -180,7 +180,7 @@ rippletwin.load_case
 assert "rippletwin.case.load" in sys.modules and "rippletwin.twin.twin" not in sys.modules
 import rippletwin.report.page
 names = [name for name in rippletwin.__all__ if not name.startswith("__")]
-assert len(names) == 6 and all(callable(getattr(rippletwin, name)) for name in names)
+assert len(names) == 7 and all(callable(getattr(rippletwin, name)) for name in names)
 assert set(names) <= set(dir(rippletwin))
 try:
     rippletwin.nothing

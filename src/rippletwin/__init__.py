@@ -11,6 +11,7 @@ _FUNCTIONS = {
     "simulate": "diagnosis.simulated_fault:simulate_fault",
     "diagnose": "diagnosis.diagnose:diagnose",
     "write_report": "report.page:report_case",
+    "to_xarray": "report.labelled_arrays:to_xarray",
 }
 """Functions for notebooks, each imported when it is first asked for: a room's libraries are loaded
 by those who use the room."""

@@ -62,6 +62,20 @@ def test_hdf5_as_rig_yaml_describes_it(tmp_path, name):
     same(read(tmp_path, "r.h5", hdf5(fill), **entry))
 
 
+def test_only_the_sensors_channels_are_read(tmp_path):
+    """All 16000 channels would need 1.8 GiB, more than is read; the two that are asked for need
+    none of it."""
+
+    def wide(file):
+        shape = (PRESSURE.shape[1], 16000)
+        data = file.create_dataset("all", shape, "f8", chunks=(shape[0], 1))
+        data[:, 15999], data[:, 2] = PRESSURE
+        file.attrs["sampling_rate_hz"] = RATE
+
+    entry = {"dataset": "all", "orientation": "samples_by_sensors"}
+    same(read(tmp_path, "r.h5", hdf5(wide), channels={"p1": 16000, "p2": 3}, **entry))
+
+
 def test_a_stated_orientation_is_believed(tmp_path):
     """Told that the first dimension counts samples, two samples of many channels are read as such:
     the shape alone would say the opposite."""

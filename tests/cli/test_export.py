@@ -9,7 +9,10 @@ from scipy.io import loadmat
 
 from case_folders import sheet, write_case
 from leaking_pump import rig
+from rippletwin.case.load import load_case
 from rippletwin.cli import main
+from rippletwin.spectra.observation import observe
+from rippletwin.twin.state_space import line_response
 from rippletwin.twin.twin import Twin
 from rippletwin.twin.twin_file import to_dict
 
@@ -23,7 +26,7 @@ def exported(tmp_path_factory):
     data = {"twin": to_dict(twin), "covariance": (0.25 * np.eye(len(twin.theta))).tolist()}
     (case / "twin.json").write_text(json.dumps(data))
     command = ["export", str(case), "--out", str(case / "out"), "--twin", str(case / "twin.json")]
-    assert main(command) == 0
+    assert main([*command, "--state-space"]) == 0
     return case / "out"
 
 
@@ -78,11 +81,29 @@ def test_twin_has_values_with_units(exported):
     assert speed["sd"] == pytest.approx(0.5 * 0.05 * 1200.0, rel=0.01)
 
 
+def test_state_space_is_the_twins_line(exported):
+    """The matrices in JSON and in MAT, at a frequency between the fitted ones, give what the twin's
+    line responds there (`line_response`, the transfer matrices); the stated error holds."""
+    data = json.loads((exported / "healthy_0_state_space.json").read_text())
+    mat = loadmat(exported / "healthy_0_state_space.mat")
+    a, b, c, d = (np.array(data[name]) for name in "ABCD")
+    np.testing.assert_array_equal(mat["A"], a)
+    assert data["outputs"] == ["pump outlet", "p1", "p2"]
+    frequency = np.array([333.3, 1234.5])
+    found = [c @ np.linalg.solve(2j * np.pi * f * np.eye(len(a)) - a, b) + d for f in frequency]
+    case = load_case(exported.parent)
+    observation = observe(case.recordings[0], case.rig)
+    expected = line_response(Twin(rig()), observation, frequency)
+    np.testing.assert_allclose(np.array(found)[:, :, 0].T, expected, rtol=5e-3)
+    assert max(data["relative_error"]) < 2e-3
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
         (["--recording", "nothing"], "there are healthy_0"),
         (["--twin", "none.json"], "cannot be read"),
+        (["--state-space"], "--twin"),
         (["--max-frequency", "1"], "no frequency of the recording is between"),
     ],
 )

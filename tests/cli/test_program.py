@@ -15,6 +15,7 @@ from case_folders import sheet, spoilt, write_case
 from paths import ROOT
 from rippletwin.cli import main
 from rippletwin.cli.program import COMMANDS
+from rippletwin.cli.progress import progress_bars
 
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT / "src"), "OMP_NUM_THREADS": "1"}
 
@@ -273,3 +274,11 @@ def test_recordings_of_another_point_are_told(tmp_path, capsys):
     assert main(["check", str(tmp_path), "--json"]) == 0
     advice = json.loads(capsys.readouterr().out)["advice"]
     assert [line for line in advice if "Outside it: loaded." in line]
+
+
+def test_no_bar_is_drawn_where_nobody_looks(capsys):
+    """Standard error that is no terminal, as in a log, gets no states of a progress bar."""
+    with progress_bars() as progress:
+        for done in range(3):
+            progress("fits", done, 2)
+    assert capsys.readouterr() == ("", "")

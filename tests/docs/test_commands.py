@@ -45,6 +45,7 @@ NOT_RUN = {
         NETWORK,
         "python -m pip install --help && test -s environment.txt",
     ),
+    "pip install 'rippletwin[readers]'": (NETWORK, "python -m pip install --help"),
     "pip install snakemake-executor-plugin-slurm": (NETWORK, "python -m pip install --help"),
     "apptainer build rippletwin.sif workflow/rippletwin.def": (
         CLUSTER,

@@ -66,6 +66,18 @@ def test_rule_graph_shows_the_rules_of_a_run(monkeypatch):
     assert graph.rules_drawn(graph.PICTURE.read_text()) == set(graph.needs())
 
 
+def test_notebook_is_that_of_the_page():
+    """docs/how-to/notebook.ipynb has the text and the code of notebook.md, which other tests run;
+    else run `python docs/notebook_of_page.py` again. nbformat accepts it."""
+    nbformat = pytest.importorskip("nbformat")
+    spec = importlib.util.spec_from_file_location("made", ROOT / "docs" / "notebook_of_page.py")
+    made = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(made)
+    text = made.NOTEBOOK.read_text()
+    assert text == made.notebook(made.PAGE.read_text())
+    nbformat.validate(nbformat.reads(text, as_version=4))
+
+
 def test_steps_of_explain_are_its_modules():
     """docs/explanation/explain.md has one numbered step a module of src/rippletwin/explanation,
     numbered without a gap."""

@@ -1,4 +1,4 @@
-"""rippletwin export CASE: ripples, spectra and a twin's values for other programs."""
+"""rippletwin export CASE: ripples, spectra, a twin's values and its line for other programs."""
 
 from __future__ import annotations
 
@@ -27,6 +27,12 @@ from rippletwin.cli.progress import progress_bars, warn
     metavar="TWIN.json",
     help="Also write this twin's values with their units to twin_values.json.",
 )
+@click.option(
+    "--state-space",
+    is_flag=True,
+    help="Also write the line of --twin as a state space at each periodic recording's operating "
+    "point.",
+)
 @options.effects("An effect of the twin that a Python file defines as EFFECT, again for more.")
 @options.frequency("--max-frequency", "Export nothing above it; by default 5 kHz of a recording.")
 @options.json_output
@@ -35,6 +41,7 @@ def command(
     out: str,
     labels: tuple[str, ...],
     twin_file: str | None,
+    state_space: bool,
     effects: tuple[str, ...],
     max_frequency: float | None,
     as_json: bool,
@@ -45,10 +52,18 @@ def command(
     """
     from rippletwin.case.load import load_case
     from rippletwin.errors import InputError
-    from rippletwin.report.data_export import export_observation, export_twin
+    from rippletwin.report.data_export import (
+        export_observation,
+        export_state_space,
+        export_twin,
+    )
     from rippletwin.spectra.observation import observe
     from rippletwin.twin.twin_file import load_covariance, load_twin
 
+    if state_space and twin_file is None:
+        raise InputError(
+            "command line", "--state-space", "whose line?", "Give --twin TWIN.json beside it"
+        )
     twin = None if twin_file is None else load_twin(twin_file, effects)
     read = load_case(case, band_hz=(None, max_frequency))
     known = {recording.label: recording for recording in read.recordings}
@@ -63,6 +78,8 @@ def command(
         for done, recording in enumerate(chosen, 1):
             observation = observe(recording, read.rig)
             written += export_observation(observation, out)
+            if state_space and observation.kind == "periodic":
+                written += export_state_space(twin, observation, out)
             progress("exporting", done, len(chosen))
     if twin is not None:
         covariance = load_covariance(twin_file)

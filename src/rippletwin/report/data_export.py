@@ -1,4 +1,4 @@
-"""Ripples, spectra and a twin's values as files that other programs read: CSV, MAT and JSON."""
+"""Ripples, spectra, a twin's values and its line as files for other programs: CSV, MAT, JSON."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from scipy.io import savemat
 
 from rippletwin.harmonics import one_period
 from rippletwin.spectra.observation import Observation
+from rippletwin.twin.state_space import twin_state_space
 from rippletwin.twin.twin import Twin
 
 SAMPLES_AN_ORDER = 4  # at least, of an exported ripple's highest order
@@ -87,6 +88,30 @@ def export_twin(twin: Twin, covariance: np.ndarray | None, path: str | Path) -> 
     }
     path.write_text(json.dumps(result, indent=1) + "\n")
     return path
+
+
+def export_state_space(twin: Twin, observation: Observation, folder: str | Path) -> list[Path]:
+    """Write LABEL_state_space.json and .mat: the twin's line at a recording's operating point from
+    the pump's flow ripple to pressure ripples, valid over the recording's band."""
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    band = [float(observation.frequency_hz[0]), float(observation.frequency_hz[-1])]
+    space = twin_state_space(twin, observation, *band)
+    matrices = {"A": space.a, "B": space.b, "C": space.c, "D": space.d}
+    about = {
+        "label": observation.label,
+        "input": "flow ripple of the pump, m3/s",
+        "outputs": ["pump outlet", *(sensor.name for sensor in twin.rig.sensors)],
+        "output_unit": "Pa",
+        "band_hz": band,
+        "relative_error": space.error,
+    }
+    written = [folder / f"{observation.label}_state_space{suffix}" for suffix in (".json", ".mat")]
+    plain = {name: np.asarray(value).tolist() for name, value in (about | matrices).items()}
+    written[0].write_text(json.dumps(plain, indent=None) + "\n")
+    about["outputs"] = np.array(about["outputs"], dtype=object)
+    savemat(written[1], about | matrices, oned_as="row")
+    return written
 
 
 def _write_csv(path: Path, columns: Mapping[str, np.ndarray]) -> None:

@@ -8,14 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
+from rippletwin.case.readers.file_checks import check_size
 from rippletwin.case.readers.layout import (
+    ArrayLike,
     Layout,
     missing_name,
     missing_sensor,
     rows_of,
     similar_name,
 )
-from rippletwin.case.readers.signals import Signals, one_number
+from rippletwin.case.readers.signals import Signals, numbers, one_number
 from rippletwin.errors import InputError, raise_any
 
 
@@ -24,14 +26,15 @@ class ArrayFile:
     """An open file of named arrays.
 
     present    names of what it holds, for messages; asked for only where something is missing
-    array      name -> its numbers, None where it has none of that name
+    array      name -> an array that is read when it is indexed, None where there is none of that
+               name
     attribute  (array's name, attribute's name) -> value, None where there is none
     separator  between the parts of a nested name
     """
 
     path: Path
     present: Callable[[], Sequence[str]]
-    array: Callable[[str], np.ndarray | None]
+    array: Callable[[str], ArrayLike | None]
     attribute: Callable[[str, str], object]
     separator: str = "/"
 
@@ -42,7 +45,7 @@ def read_arrays(file: ArrayFile, layout: Layout) -> Signals:
     array = file.array(name)
     if array is not None:
         names = file.attribute(name, "sensors")
-        names = None if names is None else [_text(one) for one in np.ravel(names)]
+        names = None if names is None else [_text(one) for one in np.ravel(np.asarray(names))]
         pressure = rows_of(file.path, name, array, layout, names)
     elif layout.dataset is not None:
         raise missing_name(file.path, "dataset", name, file.present())
@@ -54,7 +57,7 @@ def read_arrays(file: ArrayFile, layout: Layout) -> Signals:
     return Signals(
         pressure=pressure,
         sampling_rate_hz=_rate(file, layout, name),
-        time_s=None if time is None else np.ravel(time),
+        time_s=time,
     )
 
 
@@ -74,12 +77,12 @@ def _vectors(file: ArrayFile, layout: Layout) -> np.ndarray:
                 f"{present[0] if present else 'NAME'}",
             )
         raise_any(missing_sensor(file.path, layout, sensor, present) for sensor in missing)
-    lengths = {sensor: vector.size for sensor, vector in found.items()}
+    lengths = {sensor: int(np.prod(vector.shape)) for sensor, vector in found.items()}
     if len(set(lengths.values())) > 1:
         problem = f"lengths {lengths} differ"
         remedy = "One sample of each at a time"
         raise InputError(file.path, ", ".join(layout.sensors), problem, remedy)
-    return np.array([found[sensor].ravel() for sensor in layout.sensors])
+    return np.array([_whole(file.path, s, vector) for s, vector in found.items()])
 
 
 def _rate(file: ArrayFile, layout: Layout, beside: str) -> float | None:
@@ -93,10 +96,17 @@ def _rate(file: ArrayFile, layout: Layout, beside: str) -> float | None:
 
 
 def _beside(file: ArrayFile, name: str, other: str) -> np.ndarray | None:
-    """The array `other` in the group of the array `name`, or at the top of the file."""
+    """The values of `other` in the group of the array `name`, or at the top of the file."""
     group = name.rpartition(file.separator)[0]
     found = file.array(f"{group}{file.separator}{other}") if group else None
-    return file.array(other) if found is None else found
+    found = file.array(other) if found is None else found
+    return None if found is None else _whole(file.path, other, found)
+
+
+def _whole(path: Path, name: str, array: ArrayLike) -> np.ndarray:
+    """All values of an array, in one row."""
+    check_size(path, name, int(np.prod([float(n) for n in array.shape])))
+    return numbers(path, name, array[...]).ravel()
 
 
 def _text(name) -> str:

@@ -85,7 +85,7 @@ def _columns(path: Path, layout: Layout, form: TextFormat) -> tuple[list[int], i
             f"rig.yaml: channels: {{{layout.sensors[0]}: 2}}",
         )
     count = form.columns
-    chosen = [layout.channels[sensor] for sensor in layout.sensors]
+    chosen = [int(layout.channels[sensor]) for sensor in layout.sensors]
     raise_any(
         number_error(path, s, count) for s, k in zip(layout.sensors, chosen) if not 1 <= k <= count
     )

@@ -12,7 +12,7 @@ from pathlib import Path
 import h5py
 
 from rippletwin.case.readers.arrays import ArrayFile, read_arrays
-from rippletwin.case.readers.hdf5_items import datasets_in, read_attribute, read_dataset
+from rippletwin.case.readers.hdf5_items import datasets_in, find_dataset, read_attribute
 from rippletwin.case.readers.layout import Layout
 from rippletwin.case.readers.signals import Signals
 from rippletwin.errors import InputError
@@ -26,7 +26,7 @@ def read(path: Path, layout: Layout) -> Signals:
                 ArrayFile(
                     path,
                     lambda: datasets_in(file),
-                    lambda name: read_dataset(path, file, name),
+                    lambda name: find_dataset(path, file, name),
                     lambda beside, name: read_attribute(path, file, beside, name),
                 ),
                 layout,

@@ -9,10 +9,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import h5py
-import numpy as np
 
-from rippletwin.case.readers.file_checks import check_size
-from rippletwin.case.readers.signals import check_type, numbers
+from rippletwin.case.readers.signals import check_type
 from rippletwin.errors import InputError
 
 MAX_ATTRIBUTE_BYTES = 100_000
@@ -38,11 +36,11 @@ def datasets_in(file: h5py.File, most: int = MAX_NAMES) -> list[str]:
     return found
 
 
-def read_dataset(path: Path, file: h5py.File, name: str) -> np.ndarray | None:
-    """A dataset's numbers; None where there is none of that name.
+def find_dataset(path: Path, file: h5py.File, name: str) -> h5py.Dataset | None:
+    """A dataset of real numbers, unread; None where there is none of that name.
 
     Raises InputError where something else has the name, where the data lie in another file, or
-    where they are no real numbers or too many.
+    where they are no real numbers.
     """
     item = _item(path, file, name)
     if item is None:
@@ -56,8 +54,7 @@ def read_dataset(path: Path, file: h5py.File, name: str) -> np.ndarray | None:
     if item.shape is None or not item.size:
         raise InputError(path, name, "empty", "Store numbers in it")
     check_type(path, name, item.dtype)
-    check_size(path, name, item.size)
-    return numbers(path, name, item[()])
+    return item
 
 
 def _item(path: Path, file: h5py.File, name: str):

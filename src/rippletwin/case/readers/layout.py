@@ -6,9 +6,12 @@ import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
+from rippletwin.case.readers.file_checks import check_size
+from rippletwin.case.readers.signals import numbers
 from rippletwin.errors import InputError, raise_any
 
 SENSORS_BY_SAMPLES, SAMPLES_BY_SENSORS = "sensors_by_samples", "samples_by_sensors"
@@ -106,69 +109,101 @@ def find_time(path: Path, layout: Layout, present: Sequence[str]) -> int | None:
     return None
 
 
+class ArrayLike(Protocol):
+    """An array of a file or in memory; what is indexed is read."""
+
+    shape: tuple[int, ...]
+
+    def __getitem__(self, index): ...
+
+
 def rows_of(
-    path: Path, field: str, array: np.ndarray, layout: Layout, names: Sequence[str] | None
+    path: Path, field: str, array: ArrayLike, layout: Layout, names: Sequence[str] | None
 ) -> np.ndarray:
-    """The sensors' rows (S, N) of an array, `field`, that holds them and maybe others.
+    """The sensors' rows (S, N) of an array, `field`; no other row of it is read.
 
     names : of the array's channels, in their order; None where the file does not name them. Then
         the channels are those of the sensors, in the rig's order, unless rig.yaml numbers them.
     """
-    if array.ndim not in (1, 2):
+    shape = tuple(array.shape)
+    if len(shape) not in (1, 2):
         raise InputError(
             path,
             field,
-            f"has {array.ndim} dimensions, shape {array.shape}",
+            f"has {len(shape)} dimensions, shape {shape}",
             "Store it as (sensors, samples) or (samples, sensors)",
         )
-    rows = np.atleast_2d(array)
     turned = layout.orientation == SAMPLES_BY_SENSORS
-    if layout.orientation is None or array.ndim == 1:
-        turned = rows.shape[0] > rows.shape[1]
-    rows = rows.T if turned else rows
+    if layout.orientation is None:
+        turned = len(shape) == 2 and shape[0] > shape[1]
+    if len(shape) == 1:
+        count, samples = 1, shape[0]
+    else:
+        count, samples = shape[::-1] if turned else shape
+    chosen = _chosen_rows(path, field, shape, (count, samples), layout, names)
+    check_size(path, field, len(chosen) * samples)
+    rows = None
+    for place, k in enumerate(chosen):
+        row = numbers(
+            path, field, array[:] if len(shape) == 1 else array[:, k] if turned else array[k]
+        )
+        rows = np.empty((len(chosen), samples), row.dtype) if rows is None else rows
+        rows[place] = row
+    return rows
+
+
+def _chosen_rows(
+    path: Path,
+    field: str,
+    shape: tuple[int, ...],
+    size: tuple[int, int],
+    layout: Layout,
+    names: Sequence[str] | None,
+) -> list[int]:
+    """Which channels of an array of so many channels and samples are the sensors'."""
+    count, samples = size
     if names is not None:
-        if len(names) != len(rows) or len(set(names)) < len(names):
+        if len(names) != count or len(set(names)) < len(names):
             raise InputError(
                 path,
                 "sensors",
-                f"names {', '.join(names)} for {len(rows)} channel(s) of {field}",
+                f"names {', '.join(names)} for {count} channel(s) of {field}",
                 "Give each channel one name, in their order",
             )
-    elif layout.channels:
-        names = [""] * len(rows)
+        return choose(path, layout, names)
+    if layout.channels:
         unnumbered = [s for s in layout.sensors if not isinstance(layout.channel(s), int)]
         raise_any(
             InputError(
                 path,
                 sensor,
-                f"the {len(rows)} channels of {field} have no names",
-                "Give every sensor's number: channels: {" + f"{sensor}: 1" + "}",
+                f"the {count} channels of {field} have no names",
+                f"Give every sensor's number: channels: {{{sensor}: 1}}",
             )
             for sensor in unnumbered
         )
-    elif len(rows) != len(layout.sensors):
+        return choose(path, layout, [""] * count)
+    if count != len(layout.sensors):
         raise InputError(
             path,
             field,
-            f"shape {array.shape}: {len(rows)} channel(s) of {rows.shape[1]} samples, but rig.yaml "
-            f"lists {len(layout.sensors)} sensor(s)",
+            f"shape {shape}: {count} channel(s) of {samples} samples, but rig.yaml lists "
+            f"{len(layout.sensors)} sensor(s)",
             f"Say which is which: channels: {{{layout.sensors[0]}: 1, ...}}, counted from 1"
-            if len(rows) > len(layout.sensors)
+            if count > len(layout.sensors)
             else "Take the missing sensors out of `sensors`, or add them to the file",
         )
-    else:
-        return np.ascontiguousarray(rows)
-    return np.ascontiguousarray(rows[choose(path, layout, names)])
+    return list(range(count))
 
 
 def missing_sensor(
     path: Path, layout: Layout, sensor: str, present: Iterable[object]
 ) -> InputError:
     """The error for a file that lacks the channel of a sensor, by name."""
-    present = [str(other) for other in present]
+    known = [str(other) for other in present]
     name = str(layout.channel(sensor))
-    found = ", ".join(present) or "nothing"
-    near = similar_name(name, present)
+    found = ", ".join(known) or "nothing"
+    near = similar_name(name, known)
     hint = "Add it to the file"
     if near:
         quoted = near if near.replace("_", "").isalnum() else repr(near)

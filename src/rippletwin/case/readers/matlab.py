@@ -15,7 +15,7 @@ import scipy.io
 
 from rippletwin.case.readers.arrays import ArrayFile, read_arrays
 from rippletwin.case.readers.file_checks import check_size
-from rippletwin.case.readers.hdf5_items import datasets_in, read_dataset
+from rippletwin.case.readers.hdf5_items import datasets_in, find_dataset
 from rippletwin.case.readers.layout import Layout
 from rippletwin.case.readers.signals import Signals, numbers
 from rippletwin.errors import InputError
@@ -78,7 +78,7 @@ def _read_v73(path: Path, layout: Layout) -> Signals:
             ArrayFile(
                 path,
                 lambda: [name.replace("/", ".") for name in datasets_in(file)],
-                lambda name: read_dataset(path, file, name.replace(".", "/")),
+                lambda name: find_dataset(path, file, name.replace(".", "/")),
                 _no_attribute,
                 ".",
             ),

@@ -8,13 +8,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import zarr
 
 from rippletwin.case.readers.arrays import ArrayFile, read_arrays
-from rippletwin.case.readers.file_checks import check_size
 from rippletwin.case.readers.layout import Layout
-from rippletwin.case.readers.signals import Signals, check_type, numbers
+from rippletwin.case.readers.signals import Signals, check_type
 from rippletwin.errors import InputError
 
 
@@ -22,20 +20,21 @@ def read(path: Path, layout: Layout) -> Signals:
     """Read a recording in a zarr store, a folder; raises InputError."""
     try:
         store = zarr.open_group(path, mode="r")
-        arrays = {name: item for name, item in store.members(max_depth=4) if _is_array(item)}
+        members = store.members(max_depth=4)
+        arrays = {name: item for name, item in members if isinstance(item, zarr.Array)}
 
-        def array(name: str) -> np.ndarray | None:
+        def array(name: str) -> zarr.Array | None:
             item = arrays.get(name)
-            if item is None:
-                return None
-            if not item.size:
+            if item is not None and not item.size:
                 raise InputError(path, name, "empty", "Store numbers in it")
-            check_type(path, name, item.dtype)
-            check_size(path, name, item.size)
-            return numbers(path, name, item[...])
+            if item is not None:
+                check_type(path, name, item.dtype)
+            return item
 
         def attribute(beside: str, name: str):
-            holders = [arrays[beside], store] if beside in arrays else [store]
+            holders: list[zarr.Array | zarr.Group] = [store]
+            if beside in arrays:
+                holders.insert(0, arrays[beside])
             return next((h.attrs[name] for h in holders if name in h.attrs), None)
 
         return read_arrays(ArrayFile(path, lambda: list(arrays), array, attribute), layout)
@@ -48,7 +47,3 @@ def read(path: Path, layout: Layout) -> Signals:
             f"cannot be read, or is no zarr store ({error})",
             "Copy it again from where it was recorded",
         ) from error
-
-
-def _is_array(item: object) -> bool:
-    return isinstance(item, zarr.Array)

@@ -57,9 +57,9 @@ def fit_passive_terms(s: np.ndarray, immittance: np.ndarray) -> PassiveFit:
     weight = 1.0 / np.maximum(np.abs(h), FLOOR)
     best = None
     for order in ORDERS:
-        poles = _first_poles(z, order)
+        poles = first_poles(z, order)
         for _ in range(RELOCATIONS if order else 1):
-            poles = _relocate(z, h, poles, weight) if order else poles
+            poles = relocate_poles(z, h, poles, weight) if order else poles
             fit = _passive_residues(z, h, poles, weight)
             if best is None or fit.error < best.error:
                 best = fit
@@ -68,14 +68,14 @@ def fit_passive_terms(s: np.ndarray, immittance: np.ndarray) -> PassiveFit:
     return PassiveFit(tuple(_in_units(term, unit, rate) for term in best.terms), best.error)
 
 
-def _first_poles(z: np.ndarray, order: int) -> np.ndarray:
+def first_poles(z: np.ndarray, order: int) -> np.ndarray:
     """Lightly damped pairs spread over the frequencies, as vector fitting begins."""
     w = np.geomspace(np.abs(z[0]), np.abs(z[-1]), order // 2)
     pairs = np.column_stack([-0.01 * w + 1j * w, -0.01 * w - 1j * w])
     return pairs.ravel()
 
 
-def _columns(z: np.ndarray, poles: np.ndarray) -> np.ndarray:
+def partial_fractions(z: np.ndarray, poles: np.ndarray) -> np.ndarray:
     """Partial fractions (F, N) whose real combinations are those of real functions."""
     columns = []
     for p in poles:
@@ -87,9 +87,9 @@ def _columns(z: np.ndarray, poles: np.ndarray) -> np.ndarray:
     return np.array(columns).T
 
 
-def _relocate(z, h, poles, weight) -> np.ndarray:
+def relocate_poles(z, h, poles, weight) -> np.ndarray:
     """One step of vector fitting: the zeros of the common denominator become the poles."""
-    parts = _columns(z, poles)
+    parts = partial_fractions(z, poles)
     rows = np.column_stack([parts, np.ones_like(z), z, -h[:, None] * parts]) * weight[:, None]
     target = h * weight
     size = np.linalg.norm(rows, axis=0)
