@@ -2,11 +2,13 @@
 
 import json
 
+import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner
 
 from case_folders import ripple, write_hdf5
+from rippletwin.case.load import load_case
 from rippletwin.case.rig_yaml import read_sheet
 from rippletwin.cli import main
 from rippletwin.cli.new import command
@@ -46,6 +48,16 @@ def test_units_of_the_bench_become_si(tmp_path, capsys):
     assert sheet["recordings"][0]["load_pressure"] == 9.5e6
     write_hdf5(case / "recordings" / "a.h5", ripple())
     assert main(["check", str(case)]) == 0
+
+
+def test_recordings_in_bar_are_read_as_bar(tmp_path):
+    """With --unit bar a file of bars is what the file of pascals is without."""
+    pressure = ripple()
+    for name, options, factor in (("pa", [], 1.0), ("bar", ["--unit", "bar"], 1e-5)):
+        assert main(["new", str(tmp_path / name), *flags(), *options]) == 0
+        write_hdf5(tmp_path / name / "recordings" / "a.h5", factor * pressure)
+    in_bar, in_pa = (load_case(tmp_path / name).recordings[0].pressure for name in ("bar", "pa"))
+    np.testing.assert_allclose(in_bar, in_pa, rtol=1e-12)
 
 
 def test_every_number_is_explained(tmp_path):

@@ -144,6 +144,27 @@ def test_without_the_healthy_recording_the_twin_s_misfit_is_an_error(diagnoses):
     assert errors[0] > 100.0 * errors[1]
 
 
+def test_a_user_s_fault_is_diagnosed(tmp_path):
+    """Two worn slippers side by side, of a user's file: the state, its probability and the leak
+    area of both together are told under the user's name."""
+    path = tmp_path / "own.py"
+    path.write_text(
+        "from rippletwin.diagnosis.faults.base import Fault\n"
+        "from rippletwin.pump.faults import Slipper\n"
+        "FAULT = Fault('two_slippers', 'two worn slippers', lambda area, piston, pistons: [\n"
+        "    Slipper(area / 2, piston), Slipper(area / 2, piston + 1)], 'inspection')\n"
+    )
+    rng = np.random.default_rng(0)
+    anchor = leaking_pump.record("anchor", turn=FIRST_TURN, rng=rng)
+    leaks = [Slipper(2e-7, 2), Slipper(2e-7, 3)]
+    recording = leaking_pump.record("worn", leaks, TURN, rng)
+    diagnoser = Diagnoser(Twin(leaking_pump.rig(), [anchor]), select_faults([path]))
+    (entry,) = diagnosis_dict([diagnoser(recording, [anchor])])["recordings"]
+    assert entry["state"] == "two_slippers" and entry["probabilities"]["two_slippers"] > 0.95
+    low, high = entry["severity"]["two_slippers"]["ci95"]
+    assert low < 4e-7 < high
+
+
 def test_the_file_has_the_contract_s_keys(diagnoses):
     """diagnosis.json, key by key."""
     (entry,) = diagnosis_dict([diagnoses["slipper"]])["recordings"]

@@ -37,6 +37,8 @@ HOURS = "it takes a quarter of an hour and more"
 NOT_RUN = {
     "make run": (SCHEDULED, "make --dry-run run"),
     "make smoke": (SCHEDULED, "make --dry-run smoke"),
+    "make lint": ("it makes an environment", "make --dry-run lint"),
+    "make docs-site": ("it makes an environment", "make --dry-run docs-site"),
     "make test": ("it runs this test", "make --dry-run test"),
     "make test-long": ("it runs this test", "make --dry-run test-long"),
     "python3 -m venv .venv": (NETWORK, "python3 -m venv --help"),

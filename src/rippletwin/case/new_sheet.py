@@ -18,6 +18,8 @@ GENERIC_PUMP = """\
   # swash_angle_deg: 17           # at the working point
   # dead_volume: 3.5e-6           # m3, of a chamber at the end of delivery
   # port_area: 1.2e-4             # m2, fully open
+  # port_opening_deg: 30          # shaft angle over which a port opens; it shapes the ripple most
+  # port_overlap_deg: 5           # about each dead centre, where a chamber is shut off
 """
 UNCERTAINTY = """\
 # How well the numbers above are known: relative standard deviations, sensor_position in metres.

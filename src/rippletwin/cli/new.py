@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 MM, BAR, CST, LITRES_A_MINUTE = 1e-3, 1e5, 1e-6, 1 / 60000
 LOADS = ("orifice", "open", "closed", "anechoic", "unknown")
 STATES = ("healthy", "unknown", "slipper", "cylinder", "cylinder_slight", "cylinder_severe")
+PRESSURE_UNITS = ("Pa", "kPa", "MPa", "bar", "psi")
 EXAMPLE = ("recordings/healthy_0.h5", "healthy", 1000.0, 95.0)
 
 
@@ -117,6 +118,13 @@ def _quantity(name: str, what: str, unit: str, help: str, default: float | None 
     metavar="FILE,STATE,R/MIN,BAR",
     help=f"Again for each one. States: {', '.join(STATES)}.",
 )
+@click.option(
+    "--unit",
+    type=click.Choice(PRESSURE_UNITS),
+    default="Pa",
+    show_default=True,
+    help="Of the pressure in the recordings.",
+)
 @click.option("--ask/--no-ask", default=None, help="Ask for what is not given; on in a terminal.")
 @options.json_output
 def command(case: Path, ask: bool | None, as_json: bool, **given) -> None:
@@ -199,6 +207,7 @@ def _sheet(given: dict) -> NewSheet:
     density = density_at(given["density"], given["temperature"])
     modulus = given["bulk_modulus"] * BAR
     recordings = given["recordings"] or (EXAMPLE,)
+    unit = {} if given["unit"] == "Pa" else {"unit": given["unit"]}
     coefficient = None
     if given["flow"] and given["load"] == "orifice":
         flow = given["flow"] * LITRES_A_MINUTE
@@ -213,7 +222,7 @@ def _sheet(given: dict) -> NewSheet:
         load=given["load"],
         coefficient=coefficient,
         recordings=[
-            {"file": f, "state": s, "speed_rpm": n, "load_pressure": p * BAR}
+            {"file": f, "state": s, "speed_rpm": n, "load_pressure": p * BAR, **unit}
             for f, s, n, p in recordings
         ],
     )
