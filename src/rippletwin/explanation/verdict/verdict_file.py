@@ -85,7 +85,7 @@ def _line_effects(e: Explanation, entries: list[dict]) -> list[dict]:
             "element": entry["place"].element,
             "parameters": entry["parameters"],
             "probability": probabilities[entry["effect"].name],
-            "support": levels[entry["effect"].name, str(entry["place"])],
+            "support": levels.get((entry["effect"].name, str(entry["place"])), "suggested"),
             "limit_of": generalisations(entry["effect"], entry["place"]),
         }
         for entry in entries
