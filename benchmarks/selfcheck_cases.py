@@ -69,11 +69,15 @@ def pump_ripple(rig, pump: dict, speed_hz: float, pressure: float) -> FlowRipple
     return FlowRipple(simulated.angle_deg, simulated.flow, pressure)
 
 
-def draw_case(rng, kind: str, geometry: bool = False):
-    """(rig, observations, twin with the true values) of a case; see explain_selfcheck.py."""
+def draw_case(rng, kind: str, geometry: bool = False, draw_unlisted=None, points: int = 1):
+    """(rig, observations, twin with the true values) of a case; see explain_selfcheck.py.
+
+    draw_unlisted(rng, rig) gives the effects in place of those of the library; `points` is the
+    least number of operating points.
+    """
     rig = draw_rig(rng)
     noise = rng.uniform(0.5e3, 4e3)
-    speeds = rng.permutation([1000, 1200, 1500])[: rng.integers(1, 4)] / 60
+    speeds = rng.permutation([1000, 1200, 1500])[: rng.integers(points, 4)] / 60
     shape = {
         "depth": rng.uniform(0.3, 0.6),
         "width": rng.uniform(0.03, 0.06),
@@ -117,7 +121,10 @@ def draw_case(rng, kind: str, geometry: bool = False):
             if geometry
             else kinematic_ripple(speed, pressure, **shape)
         )
-    effects = draw_effects(rng, rig, observations, EFFECT_COUNTS[kind])
+    if draw_unlisted is None:
+        effects = draw_effects(rng, rig, observations, EFFECT_COUNTS[kind])
+    else:
+        effects = draw_unlisted(rng, rig)
     twin = Twin(rig, observations, effects=effects)
     theta = np.clip(rng.normal(size=len(twin.theta)), -2.5, 2.5)
     for k, p in enumerate(twin.parameters):

@@ -149,3 +149,15 @@ def test_an_effect_without_a_source_free_fit_is_left_out():
     source_free = [base, made_fit(-np.inf, HOSE), made_fit(3.0, VOLUME)]
     (row,) = compare_evidence(search.leading_fits, source_free)
     assert (row["effects"], row["source_free"]) == ("line_volume, position", 3.0)
+
+
+def test_a_network_without_what_was_named_establishes_nothing():
+    """Begun anew, the network explains more without the wall that was established beside another
+    line. With the wall it keeps the name."""
+    base, best = made_fit(0.0), made_fit(100.0, HOSE, model_error=0.05)
+    for hypothesis, verdict in (((NETWORK,), "unexplained"), ((HOSE, NETWORK), "named")):
+        network = made_fit(200.0, *hypothesis)
+        search = Search(base, [best], best, passive_networks=[network])
+        decision = decide(search, NO_ALARM, [support("established")])
+        assert decision.verdict == verdict and decision.accepted is network
+        assert bool(decision.supports) == (verdict == "named")

@@ -1,4 +1,10 @@
-"""Passive networks without a name, which stand in for physics that the library does not have."""
+"""Passive networks without a name, which stand in for physics that the library does not have.
+
+A network is a shunt or a series element at a free place. It is added to the best explanation. Where
+that leaves the line badly fitted, the named effects may have bent it: the network is then begun
+anew as well, along the whole line and beside the usual effects only. Several networks, each at a
+place of its own, are a short two-port with series and shunt elements.
+"""
 
 from __future__ import annotations
 
@@ -6,23 +12,51 @@ from rippletwin.calibration.fit import Fit
 from rippletwin.explanation.fit_jobs import FitJob, Workers, rank_by_evidence
 from rippletwin.explanation.search.stepwise_moves import extension_job
 from rippletwin.explanation.search.stepwise_search import Search
-from rippletwin.explanation.thresholds import GOOD_MODEL_ERROR
+from rippletwin.explanation.thresholds import GOOD_MODEL_ERROR, MIN_LOG_BAYES_FACTOR
 from rippletwin.twin.effects import library
+
+BENT_MODEL_ERROR = 0.02
+"""Relative model error above which the line beside named effects may be in a wrong local mode. It
+saves work only."""
+MAX_NETWORKS = 3  # in one line
 
 
 def fit_passive_networks(workers: Workers, best: Fit) -> list[Fit]:
-    """Fits of a passive network alone and added to `best`, best first; none where `best` is good.
+    """Fits of passive networks alone and added to `best`, best first; none where `best` is good.
 
     A good fit leaves nothing that a network could explain.
     """
     if best.model_error <= GOOD_MODEL_ERROR:
         return []
-    rig = workers.base.rig
-    networks = library.candidates(rig, named=False)
-    jobs = [extension_job(best, network) for network in networks]
-    if not best.hypothesis:
-        jobs += [FitJob((network,)) for network in networks]
-    return rank_by_evidence(workers.fit(jobs))
+    networks = library.candidates(workers.base.rig, named=False)
+    fits = workers.fit([extension_job(best, network) for network in networks])
+    if not best.hypothesis or min(f.model_error for f in fits) > BENT_MODEL_ERROR:
+        usual = tuple(member for member in best.hypothesis if member[0].usual)
+        fits += workers.fit([FitJob((*usual, network)) for network in networks])
+    fits = rank_by_evidence(fits)
+    if fits[0].evidence <= best.evidence + MIN_LOG_BAYES_FACTOR:
+        return fits
+    return [*_with_further_networks(workers, fits[0], networks), *fits]
+
+
+def _with_further_networks(workers: Workers, leading: Fit, networks: list) -> list[Fit]:
+    """Fits with more networks than `leading`, best first, while each adds enough evidence."""
+    found: list[Fit] = []
+    while leading.model_error > GOOD_MODEL_ERROR and _count(leading) < MAX_NETWORKS:
+        jobs = [
+            extension_job(leading, another)
+            for network in networks
+            if (another := library.next_instance(network, leading.hypothesis)) is not None
+        ]
+        more = rank_by_evidence(workers.fit(jobs))[0]
+        if more.evidence <= leading.evidence + MIN_LOG_BAYES_FACTOR:
+            break
+        found, leading = [more, *found], more
+    return found
+
+
+def _count(fit: Fit) -> int:
+    return sum(not effect.named for effect, _ in fit.hypothesis)
 
 
 def best_explanation(search: Search) -> Fit:

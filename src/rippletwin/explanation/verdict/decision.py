@@ -73,6 +73,9 @@ def decide(
     if null_distribution is not None and best.hypothesis:
         if search.log_bayes_factor(best) < null_distribution.threshold:
             return _nothing_missing(search.base, alarms)
+    if network is not None and not set(best.hypothesis) <= set(network.hypothesis):
+        # Begun anew, and better than all that was named: the supports are those of another line.
+        return Decision("unexplained", network)
     accepted, supports = network or best, tuple(supports)
     levels = {support.level for support in supports}
     if "established" in levels:

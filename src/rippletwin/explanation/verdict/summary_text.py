@@ -178,6 +178,11 @@ def _remainder(remainder: dict | None) -> list[str]:
     if network is not None:
         passive = "passive" if network["passive"] else "not passive"
         sentences.append(f"A {network['form']} ({passive}) stands in for it in the twin.")
+        sentences += [
+            f"Beside it acts a {more['form']} at {more['parameters']['position']['value']:.2f} m"
+            + (f", {more['follows']}." if more["follows"] else ".")
+            for more in network.get("beside", ())
+        ]
     return sentences
 
 

@@ -85,7 +85,7 @@ def _line_effects(e: Explanation, entries: list[dict]) -> list[dict]:
             "element": entry["place"].element,
             "parameters": entry["parameters"],
             "probability": probabilities[entry["effect"].name],
-            "support": levels[entry["effect"].name, str(entry["place"])],
+            "support": levels.get((entry["effect"].name, str(entry["place"])), "suggested"),
             "limit_of": generalisations(entry["effect"], entry["place"]),
         }
         for entry in entries
@@ -201,13 +201,13 @@ def _next_recording(e: Explanation, places: tuple) -> str | None:
 
 def _remainder(e: Explanation, entries: list[dict]) -> dict | None:
     """What remains beside the explanation, and the network that stands in for it in the twin."""
-    stand_in = None
-    if entries and not entries[-1]["effect"].named:
-        stand_in = _stand_in(e, entries[-1])
+    networks = [k for k, entry in enumerate(entries) if not entry["effect"].named]
+    stand_in = _stand_in(e, entries, networks[0]) if networks else None
     r = e.remainder
     if r is None and stand_in is None:
         return None
     if stand_in is not None:
+        stand_in["beside"] = [_stand_in(e, entries, k) for k in networks[1:]]
         element, position = stand_in.pop("element"), stand_in["parameters"]["position"]["ci95"]
         law = stand_in.pop("follows")
     elif r.element is None:
@@ -227,14 +227,15 @@ def _remainder(e: Explanation, entries: list[dict]) -> dict | None:
     }
 
 
-def _stand_in(e: Explanation, entry: dict) -> dict:
-    """The passive network of the corrected twin."""
-    missing = missing_immittance(e.decision.accepted, e.observations)
+def _stand_in(e: Explanation, entries: list[dict], index: int) -> dict:
+    """A passive network of the corrected twin, the effect `index` of the explanation."""
+    entry = entries[index]
+    missing = missing_immittance(e.decision.accepted, e.observations, index)
     element, _ = element_and_extent(e.rig, entry["effect"], entry["place"], entry["parameters"])
     return {
         "form": f"{entry['place'].form} one-port",
         "element": element,
-        "passive": is_passive(e.decision.accepted),
+        "passive": is_passive(e.decision.accepted, index),
         "parameters": entry["parameters"],
         "follows": None if missing is None else missing.law_in_words,
     }
