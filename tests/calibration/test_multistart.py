@@ -35,7 +35,7 @@ def test_score_test_keeps_a_start_near_the_true_position(place):
         thetas.append(transfer_theta(without, VOLUME, base))
         for name, u in start.items():
             thetas[-1][twin.index[name]] = u
-    kept = select_by_score_test(base, Posterior(twin, observations), thetas)
+    kept, _ = select_by_score_test(base, Posterior(twin, observations), thetas)
     positions = [twin.values(theta)["line_volume@position.position"] for theta in kept]
     assert len(kept) == MAX_FOLLOWED
     assert min(abs(x - place) for x in positions) < 1000 / 4000 / 8

@@ -10,6 +10,7 @@ from rippletwin.twin.effects.library import EFFECTS
 
 VOLUME = (EFFECTS["line_volume"], Place("position"))
 BRANCH = (EFFECTS["side_branch"], Place("position"))
+WALL = (EFFECTS["viscoelastic_wall"], Place("segment 1", 0))
 
 
 def test_an_exchange_that_simplifying_undoes_ends_the_search(monkeypatch):
@@ -31,3 +32,30 @@ def test_an_exchange_that_simplifying_undoes_ends_the_search(monkeypatch):
     start = Search(base, [], volume)
     found = _search_stepwise(SimpleNamespace(), start, [VOLUME, BRANCH], None)
     assert found.best.hypothesis == (VOLUME,) and len(rounds) == 1
+
+
+def test_an_exchange_back_to_an_earlier_explanation_ends_the_search(monkeypatch):
+    """From a volume the search comes to a volume and a wall, from there an exchange leads back to
+    the volume alone. The search ends with both after one exchange."""
+    volume = made_fit(100.0, VOLUME)
+    both, exchanged = made_fit(120.0, VOLUME, WALL), made_fit(122.0, BRANCH, WALL)
+    exchanges = []
+
+    def exchange(workers, best, fits):
+        exchanges.append(best.label)
+        return exchanged
+
+    def revise(workers, best, candidates):
+        return volume if best is exchanged else best
+
+    def extend(workers, best, candidates, progress):
+        return [both] if best.hypothesis == (VOLUME,) else []
+
+    monkeypatch.setattr(stepwise_search, "exchange_effects", exchange)
+    monkeypatch.setattr(stepwise_search, "_revise", revise)
+    monkeypatch.setattr(stepwise_search, "move_to_best_position", lambda w, fit: (fit, []))
+    monkeypatch.setattr(stepwise_search, "fit_extensions", extend)
+    monkeypatch.setattr(stepwise_search, "fit_substitutes", lambda *_: [])
+    start = Search(made_fit(0.0), [], volume)
+    found = _search_stepwise(SimpleNamespace(), start, [VOLUME, BRANCH, WALL], None)
+    assert found.best is both and len(exchanges) == 1

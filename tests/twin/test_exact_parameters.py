@@ -23,6 +23,6 @@ def test_prior_without_width(prior):
 def test_exact_data_sheet_has_coordinates():
     """Values by name go to coordinates and back where every uncertainty is 0."""
     exact = Uncertainty(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    parameters = line_parameters(replace(paper_rig(), uncertainty=exact), guessed_load=False)
+    parameters = line_parameters(replace(paper_rig(), uncertainty=exact))
     nominal = values(parameters, np.zeros(len(parameters)))
     assert np.array_equal(coordinates(parameters, nominal), np.zeros(len(parameters)))

@@ -61,8 +61,13 @@ class ErrorModel(Protocol):
     def is_valid(self, prediction: Prediction) -> bool:
         """Whether the last prediction is finite and its nonlinear equations were solved."""
 
-    def estimate_errors(self, prediction: Prediction, theta: np.ndarray) -> None:
-        """Set the standard deviations of the errors to their most likely values."""
+    def estimate_errors(
+        self, prediction: Prediction, theta: np.ndarray, near: bool = False
+    ) -> None:
+        """Set the standard deviations of the errors to their most likely values.
+
+        With `near` values next to the present ones suffice.
+        """
 
     def objective(self, theta: np.ndarray, prediction: Prediction) -> float:
         """Minus the log posterior but for a constant; infinite where it is not valid."""

@@ -49,6 +49,8 @@ STARTS_KEPT = ((4, 2, 1), (8, 4, 1))  # after the first, the second and every la
 MAX_STEPS = (12, 8, 6)  # below the first, the second and every later limit but the last
 MAX_LAST_STEPS = 30  # of a descent with all data
 ROUGHLY_CONVERGED = 0.5  # gain of the last step of a descent that another one follows
+FOLLOWED_MARGIN = 5.0
+"""Of minus the log posterior: after a rough descent, starts this close to the best are followed."""
 MAX_REFREEZES = 6  # times that the nonlinear compliance is frozen again
 STEP_SHARES = (1.0, 0.5, 0.25)  # of the way that a frozen compliance suggests
 JACOBIAN_ROUNDS = 4  # descents with the full Jacobian
@@ -149,13 +151,17 @@ def refine(
     model = _error_model(base, hypothesis, observations, source_free, plain)
     thetas = [np.asarray(theta, dtype=float) for theta in thetas]
     if len(thetas) > 1:
-        thetas = select_by_score_test(base, model, thetas)
+        thetas, _ = select_by_score_test(base, model, thetas)
     else:
         model.predict(thetas[0])
         model.forward.freeze_compliance = True
+    rounds = JACOBIAN_ROUNDS if exact and len(thetas) == 1 else 0
+    if len(thetas) > 1:
+        rough = [descend(model, t, MAX_STEPS[-1], converged=ROUGHLY_CONVERGED) for t in thetas]
+        least = min(value for _, value in rough)
+        thetas = [theta for theta, value in rough if value <= least + FOLLOWED_MARGIN]
     modes = [descend(model, theta, MAX_LAST_STEPS) for theta in thetas]
     best = min(modes, key=lambda mode: mode[1])[0]
-    rounds = JACOBIAN_ROUNDS if exact and len(modes) == 1 else 0
     return laplace_fit(model, hypothesis, _unfreeze_and_refit(model, best, rounds))
 
 

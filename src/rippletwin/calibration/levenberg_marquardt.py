@@ -9,6 +9,8 @@ import numpy as np
 from rippletwin.calibration.error_model import ErrorModel
 
 CONVERGED = 1e-2  # change of minus the log posterior: evidence is compared in whole units
+PROMISED_SHARE = 0.1
+"""Of `converged`: a step is tried if the quadratic model promises at least this gain."""
 MAX_STEP = 1.5  # longest step of a coordinate, in prior standard deviations
 FIRST_DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-2, 1e-9, 1e6  # relative to the Hessian's diagonal
 DAMPING_RISE, DAMPING_FALL = 6.0, 8.0  # factors after a refused and after an accepted step
@@ -48,8 +50,11 @@ def descend(
         accepted = False
         while damping < MAX_DAMPING:
             step = -np.linalg.solve(hessian + np.diag(damping * scale), gradient)
+            step = np.clip(step, -MAX_STEP, MAX_STEP)
+            if -step @ (gradient + 0.5 * hessian @ step) < PROMISED_SHARE * converged:
+                break  # not even the quadratic model promises a gain
             new = theta.copy()
-            new[free] += np.clip(step, -MAX_STEP, MAX_STEP)
+            new[free] += step
             new_prediction = model.predict(new)
             new_value = model.objective(new, new_prediction)
             if new_value < value:
@@ -61,7 +66,7 @@ def descend(
         damping = max(damping / DAMPING_FALL, MIN_DAMPING)
         theta, prediction = new, new_prediction
         if errors:
-            model.estimate_errors(prediction, theta)
+            model.estimate_errors(prediction, theta, near=True)
         last, value = value, min(new_value, model.objective(theta, prediction))
         if last - value < converged:
             break

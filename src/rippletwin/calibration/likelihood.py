@@ -153,7 +153,9 @@ class Likelihood:
         jacobian = np.concatenate([*columns, np.eye(len(theta))[self.prior]])
         return np.concatenate([*residuals, theta[self.prior]]), jacobian
 
-    def estimate_errors(self, prediction: Sequence[np.ndarray], theta: np.ndarray) -> None:
+    def estimate_errors(
+        self, prediction: Sequence[np.ndarray], theta: np.ndarray, near: bool = False
+    ) -> None:
         """Set model error and source error to their most likely values given the residuals.
 
         The sum of squares is scaled up for the degrees of freedom that the parameters take.

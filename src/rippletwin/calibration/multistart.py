@@ -103,8 +103,9 @@ def distinct_modes(modes: Sequence[State], distance: float = 0.05) -> list[State
 
 def select_by_score_test(
     base: Twin, posterior: Posterior, thetas: Sequence[np.ndarray]
-) -> list[np.ndarray]:
-    """At most MAX_FOLLOWED of the starts `thetas` of the newest effect, the most promising first.
+) -> tuple[list[np.ndarray], float]:
+    """At most MAX_FOLLOWED of the starts `thetas` of the newest effect, the most promising first,
+    and what the objective loses at most, to first order, if the effect is added at the first.
 
     The score of a start is what the objective loses, to first order, on the way from the prediction
     without the effect to that of the start, everything else refitted: a score test (Rao 1948, Math.
@@ -133,4 +134,11 @@ def select_by_score_test(
             np.abs(ways[:, kept].T @ ways[:, k]) < MAX_CORRELATION
         ):
             kept.append(k)
-    return [thetas[k] for k in kept]
+    # Along its own parameters the effect can go on from there: the score test of all of them.
+    start = thetas[kept[0]]
+    own_slopes = posterior.slopes(start, posterior.predict(start))[len(theta) :]
+    freed = own.linearise(theta, prediction, own_slopes)[1]
+    freed = np.column_stack([freed[:, len(theta) :], ways[:, kept[0]]])
+    freed = freed - jacobian @ np.linalg.lstsq(jacobian, freed, rcond=None)[0]
+    found = np.linalg.lstsq(freed, r, rcond=1e-9)[0]
+    return [thetas[k] for k in kept], 0.5 * float(np.sum((freed @ found) ** 2))

@@ -207,10 +207,14 @@ class Posterior:
         error = np.sqrt(self._variance(self.model_error)) * normal(*h.shape)
         return source * h + np.einsum("fsk,kf->sf", np.conj(self._noise.rotation), error)
 
-    def estimate_errors(self, prediction: np.ndarray, theta: np.ndarray) -> None:
+    def estimate_errors(
+        self, prediction: np.ndarray, theta: np.ndarray, near: bool = False
+    ) -> None:
         """Set model error and source errors to their most likely values given the residuals.
 
-        The sum of squares is scaled up for the degrees of freedom that the parameters take.
+        The sum of squares is scaled up for the degrees of freedom that the parameters take. With
+        `near` only values next to the present ones are tried: on the way of a descent they move
+        little from step to step.
         """
         taken = min(len(self.prior), 0.5 * self.count)
         scale = self.count / max(self.count - taken, 1.0)
@@ -224,6 +228,9 @@ class Posterior:
         any_nominal = len(self._smooth.frequencies) > 0
         sds = SOURCE_SDS if any_nominal else SOURCE_SDS[:1]
         taus = SMOOTH_SDS if any_nominal else np.zeros(1)
+        if near:
+            model_errors = _neighbours(model_errors, self.model_error)
+            sds, taus = _neighbours(sds, self.source_sd), _neighbours(taus, self.smooth_sd)
         for _ in range(2):
             weight = 1.0 / self._variance(model_errors[:, None, None])
             square = np.sum(squares * weight, axis=1)  # (D, F)
@@ -316,3 +323,9 @@ class Posterior:
 
     def _rotate(self, x: np.ndarray) -> np.ndarray:
         return self._noise.rotate(x)
+
+
+def _neighbours(grid: np.ndarray, value: float) -> np.ndarray:
+    """The values of an ascending grid next to `value`: the nearest, one below and one above."""
+    nearest = int(np.argmin(np.abs(np.log(np.maximum(grid, 1e-9) / max(value, 1e-9)))))
+    return grid[max(nearest - 1, 0) : nearest + 2]

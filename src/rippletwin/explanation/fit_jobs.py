@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from multiprocessing import get_context
 
@@ -18,6 +18,8 @@ from threadpoolctl import threadpool_limits
 
 from rippletwin.calibration.fit import Fit, Hypothesis
 from rippletwin.calibration.frequency_continuation import fit_hypothesis, refine
+from rippletwin.calibration.multistart import select_by_score_test
+from rippletwin.calibration.posterior import Posterior
 from rippletwin.twin.twin import Twin
 
 WEAK_COORDINATE = -2.0  # of a weak effect's strength, in prior standard deviations
@@ -66,10 +68,12 @@ class FromTheta:
 class NearFit:
     """Start on all frequencies at another `neighbour` fit, with the newest effect added.
 
-    The newest effect starts from its scan and from small strengths at many positions.
+    The newest effect starts from its scan and from small strengths at many positions. `thetas` are
+    the starts that a score test has selected, if one was made (`score_extension`).
     """
 
     neighbour: Fit
+    thetas: tuple[np.ndarray, ...] = ()
 
     def count_starts(self, rig, hypothesis: Hypothesis) -> int:
         """Number of starts in the effect's scan."""
@@ -77,6 +81,11 @@ class NearFit:
 
     def fit(self, base: Twin, hypothesis: Hypothesis, observations, source_free: bool) -> Fit:
         """Fit `hypothesis` from the best of the starts near `neighbour`."""
+        thetas = self.thetas or self.all_thetas(base, hypothesis, observations)
+        return refine(base, hypothesis, observations, thetas, source_free, exact=False)
+
+    def all_thetas(self, base: Twin, hypothesis: Hypothesis, observations) -> list[np.ndarray]:
+        """All starts, each (P,), before a score test."""
         highest_hz = max(o.frequency_hz[-1] for o in observations)
         positions = int(np.ceil(POSITIONS_PER_WAVELENGTH * base.rig.delay * highest_hz))
         starts = scan_starts(base.rig, hypothesis)
@@ -91,7 +100,7 @@ class NearFit:
             for name, u in start.items():
                 theta[twin.index[name]] = u
             thetas.append(theta)
-        return refine(base, hypothesis, observations, thetas, source_free, exact=False)
+        return thetas
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +145,15 @@ def run_fit_job(base: Twin, observations: Sequence, job: FitJob) -> Fit:
         observations = [observations[k] for k in job.observations]
     base = base if job.base is None else job.base
     return job.start.fit(base, job.hypothesis, observations, job.source_free)
+
+
+def score_extension(base: Twin, observations: Sequence, job: FitJob) -> tuple[float, FitJob]:
+    """What the newest effect of a job that starts near a fit promises, and the job with the
+    starts that promise most (`select_by_score_test`); for `Workers.map`."""
+    posterior = Posterior(base.with_(effects=job.hypothesis), observations, None, job.source_free)
+    thetas = job.start.all_thetas(base, job.hypothesis, observations)
+    kept, score = select_by_score_test(base, posterior, thetas)
+    return score, replace(job, start=replace(job.start, thetas=tuple(kept)))
 
 
 def job_from(fit: Fit, **options) -> FitJob:

@@ -44,14 +44,13 @@ class FlowSource:
             s = 2j * np.pi * o.frequency_hz
             self.flow[part] = flow_harmonics(point.ripple, o.orders)
             self.admittance[part] = point.ripple.source_admittance(s)
-            mean = flow_harmonics(point.ripple, np.zeros(1))[0].real
-            for k, change in twin.pump_changes(o.speed_hz, point.load_pressure):
-                flow, own = changes.setdefault(
+            for k, slopes, own in _pump_changes(twin, o, point):
+                flow, added = changes.setdefault(
                     k, (np.zeros((2, count), complex), np.zeros(count, complex))
                 )
-                flow[:, part] = _modulate_change(change, point.ripple, o.orders, mean)
+                flow[:, part] = slopes
                 if np.any(self.admittance[part]):  # a ripple given is an ideal source
-                    own[part] = change.source_admittance(s)
+                    added[part] = own
         self.changes = [(k, *each) for k, each in changes.items()]
 
     def at(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -69,6 +68,26 @@ class FlowSource:
             if index is not None:
                 turn[part] = np.exp(1j * self._parameters[index].value(theta[index]) * orders)
         return turn
+
+
+def _pump_changes(twin: Twin, observation, point: OperatingPoint) -> list[tuple]:
+    """(index, slope and curvature (2, F) of the flow, slope (F,) of the admittance) for each of the
+    pump's parameters at an observation's frequencies.
+
+    The twin and its copies keep them: a search makes hundreds of forward models of few recordings.
+    """
+    o, ripple = observation, point.ripple
+    # The ripple is part of the key because of its modulation; kept, its id stays its own.
+    key = o.speed_hz, point.load_pressure, np.asarray(o.orders).tobytes(), id(ripple)
+    if key not in twin.kept_changes:
+        mean = flow_harmonics(ripple, np.zeros(1))[0].real
+        s = 2j * np.pi * o.frequency_hz
+        changes = [
+            (k, _modulate_change(change, ripple, o.orders, mean), change.source_admittance(s))
+            for k, change in twin.pump_changes(o.speed_hz, point.load_pressure)
+        ]
+        twin.kept_changes[key] = ripple, changes
+    return twin.kept_changes[key][1]
 
 
 def _modulate_change(

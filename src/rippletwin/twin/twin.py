@@ -132,7 +132,9 @@ class Twin:
         self.theta = np.zeros(len(self.parameters)) if theta is None else np.asarray(theta, float)
         if self.theta.shape != (len(self.parameters),):
             raise ValueError(f"theta must have {len(self.parameters)} entries")
+        # Shared by copies with other effects: ripples, and the changes that `FlowSource` keeps.
         self._ripples: dict = {}
+        self.kept_changes: dict = {}
 
     # parameters and their values
 
@@ -255,6 +257,9 @@ class Twin:
         labels = [OperatingCondition(label) for label in self.labels]
         twin = Twin(self.rig, labels, **{**state, **changes})
         twin._ripples = self._ripples
+        # The parameters' indices belong to it, and effects come last.
+        if twin.uncertain_pump == self.uncertain_pump:
+            twin.kept_changes = self.kept_changes
         return twin
 
     def fitted_pump(self) -> dict:

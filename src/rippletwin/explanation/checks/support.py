@@ -87,8 +87,8 @@ def _judge_each(
     jobs = [(best, None, elements)]
     for each in without:
         start = transfer_theta(best, each.stated.hypothesis, workers.base)
-        jobs += [(each.stated, None, elements), (each.wide, None, elements)]
-        jobs += [(each.stated, start, elements)]
+        jobs += [(each.stated, None, elements), (each.stated, start, elements)]
+        jobs += [(each.wide, None, elements[:1])]  # without a correction
     tables = workers.map(evaluate_corrections, jobs)
     present, absent = tables[0], tables[1:]
     supports = []

@@ -54,15 +54,21 @@ class MissingImmittance:
         return describe_law(self.frequency_hz, self.points, 1.0 / np.maximum(self.sd, 1e-300) ** 2)
 
 
-def observable_of(posterior: Posterior, network: FrequencyDomainLine) -> np.ndarray:
-    """The observed quantity of a network, (S, F): pressures, or reflection coefficients."""
+def observable_of(
+    posterior: Posterior, network: FrequencyDomainLine, theta: np.ndarray | None = None
+) -> np.ndarray:
+    """The observed quantity of a network, (S, F): pressures, or reflection coefficients.
+
+    `theta` (P,) are the parameters of the network, by default those of the posterior's twin.
+    """
     twin = posterior.twin
+    theta = twin.theta if theta is None else theta
     if posterior.observations[0].kind != "input_impedance":
         return network.readings()
     impedance = network.input_impedance()
     scale = np.concatenate(
         [
-            np.full(len(o.frequency_hz), twin.reference_impedance(twin.theta, o))
+            np.full(len(o.frequency_hz), twin.reference_impedance(theta, o))
             for o in posterior.observations
         ]
     )

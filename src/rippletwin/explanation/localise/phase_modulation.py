@@ -11,8 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from rippletwin.calibration.frequency_continuation import fit_hypothesis
+from rippletwin.calibration.frequency_continuation import fit_hypothesis, refine
 from rippletwin.case.model import FlowRipple
+from rippletwin.explanation.fit_jobs import transfer_theta
 from rippletwin.explanation.localise.shaft_orders import (
     ShaftOrders,
     analyse_shaft_orders,
@@ -36,15 +37,20 @@ def estimate_phase_modulation(rig, observations: Sequence, highest_hz: float) ->
         level_and_p = shaft_order_level(observations, rig.pump["pistons"], highest_hz)
     if level_and_p is None or level_and_p[0] < MIN_SHAFT_ORDER_LEVEL:
         return None
-    shaft_orders = None
+    shaft_orders, fit = None, None
     for uncertain_pump in (False, True):
         # The pump's parameters come second: before the ripple is modulated, they would absorb what
         # the modulation takes from the piston orders.
         modulated = with_phase_modulation(observations, shaft_orders)
         data = select_fitted_frequencies(modulated, rig, highest_hz)
         base = Twin(rig, data, uncertain_pump=uncertain_pump)
-        twin = fit_hypothesis(base, (), data).twin
-        shaft_orders = analyse_shaft_orders(twin, observations, highest_hz, ROUGH_MODULATION_SHARE)
+        if fit is None:
+            fit = fit_hypothesis(base, (), data)
+        else:
+            fit = refine(base, (), data, [transfer_theta(fit, (), base)], exact=False)
+        shaft_orders = analyse_shaft_orders(
+            fit.twin, observations, highest_hz, ROUGH_MODULATION_SHARE
+        )
     return shaft_orders
 
 

@@ -12,6 +12,8 @@ first order about a mode theta, so every amplitude is integrated out in closed f
 
 r whitened residual, J its Jacobian, G the changes that a unit of the correction makes. The
 amplitude a and the relative model error are unknown: the likelihood is averaged over grids of both.
+What linearising gains or loses at the most likely amplitudes is put right: there the square sum is
+calculated without it.
 (Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63:425; Rasmussen and Williams 2006, Gaussian
 Processes for Machine Learning, eq. 2.30.)
 """
@@ -19,7 +21,7 @@ Processes for Machine Learning, eq. 2.30.)
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
@@ -38,6 +40,9 @@ MODEL_ERRORS = np.geomspace(1e-3, 1.5, 13)
 ERRORS_BELOW, ERRORS_ABOVE = 5, 1  # grid values of the model error around that of the fit
 MIN_EIGENVALUE = 1e-3  # share of the kernel's largest; smaller ones are left out
 MAX_POSITIONS = 12  # along the line, each a shunt and a series element
+STEP_SHARES = (1.0, 0.5, 0.25, 0.0)
+"""Of the way to the most likely correction. A linear step may overshoot: near a sharp resonance a
+small correction changes the prediction by much."""
 FLAT_SD = 1e3  # of a coordinate without a prior
 
 NONE = "nothing"
@@ -55,7 +60,7 @@ class SmoothCorrections:
         self._prediction = self._posterior.predict(self.theta)
         self._posterior.estimate_errors(self._prediction, self.theta)
         self.network = self._posterior.forward.network(self.theta)
-        self._observed = observable_of(self._posterior, self.network)
+        self._observed = observable_of(self._posterior, self.network, self.theta)
         self._basis = smooth_basis(self._posterior.forward.frequency_hz)
         slopes = self._posterior.slopes(self.theta, self._prediction)
         at = int(np.searchsorted(MODEL_ERRORS, self._posterior.model_error))
@@ -71,51 +76,96 @@ class SmoothCorrections:
         scale = np.where(prior, 1.0, FLAT_SD)[:, None]
         return r - start @ jacobian, jacobian * scale, self._posterior.log_determinant()
 
-    def log_evidence(self, change: np.ndarray | None = None) -> float:
-        """Log evidence if the prediction may change by a smooth multiple of `change` (S, F).
+    def log_evidence(self, element: tuple = (NONE, None)) -> float:
+        """Log evidence if an element, as in `elements_of`, may have a smooth correction.
 
         A constant that is common to all models of these data is left out.
         """
-        values = []
-        for error, (r, jacobian, log_determinant) in zip(self._errors, self._expanded):
-            columns = jacobian
-            amplitudes = np.zeros(1)
-            if change is not None:
-                self._posterior.model_error = float(error)
-                free = np.concatenate([self._basis, 1j * self._basis])[:, None] * change
-                free = self._posterior.whiten_slopes(self._prediction, free)[1]
-                columns, amplitudes = np.concatenate([jacobian, free]), AMPLITUDES
-            gram, along = columns @ columns.T, columns @ r
-            scales = np.ones((len(amplitudes), len(columns)))
-            scales[:, len(jacobian) :] = amplitudes[:, None]
-            each = [_log_likelihood(r, gram, along, scale) for scale in scales]
-            values.append(logsumexp(each) - np.log(len(each)) - log_determinant)
-        return float(logsumexp(values) - np.log(len(MODEL_ERRORS)))
+        return self._solve(element).log_evidence
 
     def most_likely(self, element: tuple) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Frequencies (F,), the most likely correction (F,) of an element, and how well each
         frequency determines it: the power (F,) of what a unit of it changes, whitened."""
-        change, best = self.change(element), (-np.inf, None)
-        free = np.concatenate([self._basis, 1j * self._basis])[:, None] * change
-        for error, (r, jacobian, log_determinant) in zip(self._errors, self._expanded):
-            self._posterior.model_error = float(error)
-            whitened = self._posterior.whiten_slopes(self._prediction, free)[1]
-            columns = np.concatenate([jacobian, whitened])
-            gram, along = columns @ columns.T, columns @ r
-            for a in AMPLITUDES:
-                scale = np.concatenate([np.ones(len(jacobian)), np.full(len(free), a)])
-                value = _log_likelihood(r, gram, along, scale) - log_determinant
-                if value > best[0]:
-                    precision = scale[:, None] * gram * scale + np.eye(len(scale))
-                    # The columns are derivatives of the residual: measured less predicted.
-                    found = -scale * np.linalg.solve(precision, scale * along)
-                    best = value, found[len(jacobian) :], error
-        _, found, error = best
-        self._posterior.model_error = float(error)
-        count = len(self._basis)
-        correction = (found[:count] + 1j * found[count:]) @ self._basis
-        weight = np.sum(np.abs(change) ** 2, axis=0) / self._posterior.power / error**2
-        return self._posterior.forward.frequency_hz, correction, weight
+        solved, change = self._solve(element), self.change(element)
+        weight = np.sum(np.abs(change) ** 2, axis=0) / self._posterior.power
+        return (
+            self._posterior.forward.frequency_hz,
+            solved.correction,
+            weight / solved.model_error**2,
+        )
+
+    def _solve(self, element: tuple) -> _Solved:
+        """Average over model errors and amplitudes of a correction, and the most likely of them."""
+        change = self.change(element)
+        amplitudes = np.zeros(1) if change is None else AMPLITUDES
+        values = np.empty((len(self._errors), len(amplitudes)))
+        linear = []
+        for k, (r, jacobian, log_determinant) in enumerate(self._expanded):
+            columns = jacobian
+            if change is not None:
+                self._posterior.model_error = float(self._errors[k])
+                free = np.concatenate([self._basis, 1j * self._basis])[:, None] * change
+                free = self._posterior.whiten_slopes(self._prediction, free)[1]
+                columns = np.concatenate([jacobian, free])
+            linear.append((r, columns @ columns.T, columns @ r))
+            for m, a in enumerate(amplitudes):
+                scale = self._scale(a, len(columns))
+                values[k, m] = _log_likelihood(*linear[k], scale) - log_determinant
+        solved = []
+        for m, a in enumerate(amplitudes):
+            k = int(np.argmax(values[:, m]))
+            gain, correction = self._delinearise(element, float(self._errors[k]), a, *linear[k])
+            values[:, m] += gain
+            solved.append((values[k, m], float(self._errors[k]), correction))
+        evidence = logsumexp(values) - np.log(len(amplitudes) * len(MODEL_ERRORS))
+        return _Solved(float(evidence), *max(solved, key=lambda each: each[0])[1:])
+
+    def _scale(self, amplitude: float, count: int) -> np.ndarray:
+        """Prior standard deviations of the parameters and of the correction's amplitudes."""
+        scale = np.ones(count)
+        scale[len(self.theta) :] = amplitude
+        return scale
+
+    def _delinearise(
+        self, element: tuple, error: float, amplitude: float, r, gram, along
+    ) -> tuple[float, np.ndarray]:
+        """Log likelihood at the most likely parameters and correction without linearising less
+        that with it, and the correction (F,)."""
+        scale = self._scale(amplitude, len(gram))
+        precision = scale[:, None] * gram * scale + np.eye(len(scale))
+        # The columns are derivatives of the residual: measured less predicted.
+        unit = -np.linalg.solve(precision, scale * along)
+        linear = 0.5 * float(r @ r + (scale * along) @ unit)
+        count = len(self.theta)
+        theta = np.where(self._posterior.prior, unit[:count], self.theta + FLAT_SD * unit[:count])
+        amplitudes = scale[count:] * unit[count:]
+        half = len(amplitudes) // 2
+        correction = (amplitudes[:half] + 1j * amplitudes[half:]) @ self._basis[:half]
+        self._posterior.model_error = error
+        return linear - self._least_objective(element, theta, correction, unit), correction
+
+    def _least_objective(
+        self, element: tuple, theta: np.ndarray, correction: np.ndarray, unit: np.ndarray
+    ) -> float:
+        """Least half square sum on the way to a most likely theta (P,) and `correction` (F,) of an
+        element, without linearising.
+
+        unit   parameters and amplitudes there, in standard deviations
+        """
+        posterior, count = self._posterior, len(theta)
+        start = np.where(posterior.prior, self.theta, 0.0)
+        least = np.inf
+        for share in STEP_SHARES:
+            here = self.theta + share * (theta - self.theta)
+            network = posterior.forward.network(here)
+            prediction = self._observe(network, element, share * correction, here)
+            if not posterior.is_valid(prediction):
+                continue
+            square = np.sum(np.abs(posterior.whitened(prediction)[0]) ** 2)
+            square += 0.5 * np.sum((start + share * (unit[:count] - start)) ** 2)
+            square += 0.5 * np.sum((share * unit[count:]) ** 2)
+            least = min(least, float(square))
+        return least
 
     def unit(self, element: tuple) -> np.ndarray:
         """The immittance (F,) of which a correction is a multiple, of an element of the line."""
@@ -128,32 +178,44 @@ class SmoothCorrections:
 
     def by_element(self, elements: Sequence[tuple]) -> dict[tuple, float]:
         """Log evidence with the correction of each of `elements`, keys as in `elements_of`."""
-        return {e: self.log_evidence(self.change(e)) for e in elements}
+        return {e: self.log_evidence(e) for e in elements}
 
     def change(self, element: tuple) -> np.ndarray | None:
-        """Change (S, F) of the prediction that a unit correction of an element makes."""
-        kind, where = element
-        network, line = self.network, {}
-        if kind == NONE:
+        """Change (S, F) of the prediction that a unit correction of an element makes; None without
+        an element."""
+        if element[0] == NONE:
             return None
-        if kind == "source":
-            return self._prediction
-        if kind == "sensor":
-            row = np.zeros_like(self._prediction)
-            row[where] = self._prediction[where]
-            return row
+        moved = self._observe(self.network, element, PROBE_SHARE, self.theta)
+        return (moved - self._observed) / PROBE_SHARE
+
+    def _observe(self, network, element: tuple, correction, theta: np.ndarray) -> np.ndarray:
+        """What is observed (S, F) of a network at theta with a `correction`, (F,) or a number, of
+        an element."""
+        (kind, where), line = element, {}
         if kind in ("segment series", "segment shunt"):
             name = kind.split()[1]
             per_metre = getattr(network, name).copy()
             rows = [where] if isinstance(where, int) else list(where)
-            per_metre[rows] = per_metre[rows] * (1.0 + PROBE_SHARE)
+            per_metre[rows] = per_metre[rows] * (1.0 + correction)
             line[name] = per_metre
-        else:
+        elif kind in ("shunt", "series"):
             at = float(np.clip(where, 0.0, network.length))
-            probe = Insert(at, kind, PROBE_SHARE * self.unit(element))
-            line["inserts"] = [*network.inserts, probe]
-        moved = observable_of(self._posterior, replace(network, **line))
-        return (moved - self._observed) / PROBE_SHARE
+            line["inserts"] = [*network.inserts, Insert(at, kind, correction * self.unit(element))]
+        observed = observable_of(self._posterior, replace(network, **line), theta)
+        if kind == "source":
+            return observed * (1.0 + correction)
+        if kind == "sensor":
+            observed[where] = observed[where] * (1.0 + correction)
+        return observed
+
+
+@dataclass(frozen=True)
+class _Solved:
+    """Log evidence with a correction (F,), and the most likely one with its model error."""
+
+    log_evidence: float
+    model_error: float
+    correction: np.ndarray
 
 
 def elements_of(rig, observations: Sequence, own: Sequence[tuple] = ()) -> list[tuple]:

@@ -20,6 +20,7 @@ from rippletwin.explanation.fit_jobs import (
     progress_callback,
     rank_by_evidence,
     scan_starts,
+    score_extension,
 )
 from rippletwin.explanation.thresholds import (
     GOOD_MODEL_ERROR,
@@ -35,6 +36,8 @@ MAX_MODEL_ERROR_FOR_EXACT_MODE = 10.0 * MIN_MODEL_ERROR
 """Relative model error below which derivatives of the nonlinear compliance lead to the mode."""
 LOST_MODEL_ERROR = 0.1
 """Relative model error above which a line is probably in a wrong local mode."""
+PROMISING = 8
+"""Candidates of a round that are fitted, those with the best score tests (`score_extension`)."""
 RESTARTED = 3  # extensions of a fit that are also fitted from the data sheet
 MIN_IMPROVEMENT = 1.0  # log evidence by which an exchange or another position must be better
 
@@ -43,10 +46,13 @@ def fit_extensions(workers: Workers, best: Fit, candidates: Sequence, progress) 
     """Fits of `best` with each further candidate added, best first.
 
     None goes beyond MAX_EFFECTS and MAX_OF_ONE_EFFECT. Of an effect at a free position one more is
-    a candidate.
+    a candidate. Beside an effect that was searched for only the most promising are fitted.
     """
     rig = workers.base.rig
     jobs = [extension_job(best, c) for c in _additions(best.hypothesis, candidates)]
+    if len(jobs) > PROMISING and not all(effect.usual for effect, _ in best.hypothesis):
+        scored = workers.map(score_extension, jobs)
+        jobs = [job for _, job in sorted(scored, key=lambda pair: -pair[0])[:PROMISING]]
     report = progress_callback(progress, f"{len(best.hypothesis) + 1} effects", len(jobs))
     fits = rank_by_evidence(workers.fit(jobs, report))
     if fits and fits[0].model_error > GOOD_MODEL_ERROR:

@@ -132,7 +132,7 @@ def _search_stepwise(workers: Workers, start: Search, candidates: Sequence, prog
     extensions = single_effect_fits
     if not any(f.hypothesis[:-1] == best.hypothesis for f in extensions):
         extensions = fit_extensions(workers, best, candidates, progress)
-    ended = set()  # labels of fits that no extension improves
+    visited = {best.label}
     while True:
         extended = _accepted_extension(best, extensions)
         if extended is None:
@@ -140,14 +140,14 @@ def _search_stepwise(workers: Workers, start: Search, candidates: Sequence, prog
             moved, other_positions = move_to_best_position(workers, exchanged)
             if exchanged is not best:
                 moved = _revise(workers, moved, candidates)
-            ended.add(best.label)
-            if moved is best or (exchanged is not best and moved.label in ended):
+            if moved is best or (exchanged is not best and moved.label in visited):
                 break  # a simpler effect is preferred to a slightly better one: no way round
             best = moved
         else:
             if extensions is not single_effect_fits:
                 rivals = [*rivals, *extensions]
             best = _revise(workers, extended, candidates)
+        visited.add(best.label)
         extensions = fit_extensions(workers, best, candidates, progress)
     substitutes = fit_substitutes(workers, best, candidates)
     if substitutes and substitutes[0].evidence > best.evidence + MIN_IMPROVEMENT:

@@ -13,12 +13,14 @@ def friction_excess(s, viscosity, diameter, density):
 
     Bessel functions take the time: they are evaluated once for each distinct nu/R^2 of the batch.
     """
-    rate = np.atleast_1d(4.0 * viscosity / diameter**2)
-    distinct, inverse = np.unique(rate, return_inverse=True)
-    excess = np.stack([nu * (scaled_friction(s / nu) - 8.0) - s for nu in distinct])
-    excess = excess[np.ravel(inverse)]
-    area = 0.25 * np.pi * diameter**2
-    return (excess if np.ndim(diameter) or np.ndim(viscosity) else excess[0]) * density / area
+    rate = 4.0 * viscosity / diameter**2
+    if np.ndim(rate):
+        distinct, inverse = np.unique(rate, return_inverse=True)
+        excess = np.stack([nu * (scaled_friction(s / nu) - 8.0) - s for nu in distinct])
+        excess = excess[np.ravel(inverse)]
+    else:
+        excess = rate * (scaled_friction(s / rate) - 8.0) - s
+    return excess * density / (0.25 * np.pi * diameter**2)
 
 
 def _apply(network, state, values, place):
