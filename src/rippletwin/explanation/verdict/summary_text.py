@@ -65,7 +65,7 @@ def summary_text(e: Explanation, result: dict, entries: Sequence[dict]) -> str:
             sentences.append("Its place or form is not determined: see equivalents.")
         sentences += _source_free(e)
     sentences += _remainder(result["remainder"])
-    if entries:
+    if entries and any(o.source == "nominal" for o in e.observations):
         sentences += _ripple_error(result["fit"])
     sentences += pump_sentences(result["pump"])
     sentences += load_sentences(result["load"])
