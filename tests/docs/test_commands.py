@@ -62,6 +62,10 @@ NOT_RUN = {
         "the measurements are not part of the project",
         "python benchmarks/measured_tube.py --help",
     ),
+    "python benchmarks/measured_holes.py MEASURED holes": (
+        "the measurements are not part of the project",
+        "python benchmarks/measured_holes.py --help",
+    ),
     "python benchmarks/measured_duct.py MEASURED duct": (
         "the measurements are not part of the project",
         "python benchmarks/measured_duct.py --help",

@@ -5,10 +5,9 @@ from types import SimpleNamespace
 import pytest
 
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders
+from rippletwin.explanation.verdict.number_text import load_sentences, sensor_sentences
 from rippletwin.explanation.verdict.summary_text import (
-    _load,
     _ripple_error,
-    _sensors,
     liquid_like_air,
     summary_text,
 )
@@ -132,11 +131,11 @@ def test_an_unknown_load_and_uncalibrated_sensors_are_told():
         "frequency_hz": [100.0, 800.0, 1500.0],
         "reflection": {"re": [0.3, 0, 0], "im": [0.4, 0.1, 0]},
     }
-    (said,) = _load(load)
+    (said,) = load_sentences(load)
     assert "0.50 at 100 Hz, 0.10 at 800 Hz and 0.00 at 1500 Hz" in said
-    (said,) = _sensors({"m2": {"gain": {"value": 1.12}, "phase": {"value": 0.1}}})
+    (said,) = sensor_sentences({"m2": {"gain": {"value": 1.12}, "phase": {"value": 0.1}}})
     assert "m2 1.120 (phase +5.7 deg)" in said
-    assert _load(None) == [] and _sensors({}) == []
+    assert load_sentences(None) == [] and sensor_sentences({}) == []
 
 
 def test_numbers_up_to_a_million_have_no_power_of_ten():

@@ -118,11 +118,15 @@ def compare_without_each_effect(
                 nominal=parameter.nominal,
                 unit=parameter.unit,
                 pull=pull,
-                rivals=misfit < WIDE_PRIOR_MISFIT_RATIO * accepted_misfit
-                or lost < MIN_LOG_BAYES_FACTOR,
+                rivals=bool(
+                    misfit < WIDE_PRIOR_MISFIT_RATIO * accepted_misfit
+                    or lost < MIN_LOG_BAYES_FACTOR
+                ),
                 # A misfit below the model error says nothing.
-                refutes=pull > PULL_ALARM
-                and WIDE_PRIOR_MISFIT_RATIO * max(misfit, MIN_MODEL_ERROR) < accepted_misfit,
+                refutes=bool(
+                    pull > PULL_ALARM
+                    and WIDE_PRIOR_MISFIT_RATIO * max(misfit, MIN_MODEL_ERROR) < accepted_misfit
+                ),
             )
         )
     return tuple(results)

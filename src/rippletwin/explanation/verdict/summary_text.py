@@ -4,20 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from rippletwin.explanation.checks.alarms import largest_pull
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders
 from rippletwin.explanation.localise.source_free_fits import compare_evidence
 from rippletwin.explanation.thresholds import PULL_ALARM
 from rippletwin.explanation.verdict.decision import equivalent_places
 from rippletwin.explanation.verdict.explanation import Explanation
+from rippletwin.explanation.verdict.number_text import (
+    load_sentences,
+    parameter_sentence,
+    plain_number,
+    pump_sentences,
+    sensor_sentences,
+    spaced,
+)
 from rippletwin.explanation.verdict.places import element_and_extent, join_words
 
 SAME_PRESSURE = 0.05  # relative; mean pressures closer than this count as one
 SOURCE_FREE_SHARE = 0.2  # of the evidence that must remain if the source is unknown
 RIPPLE_ERROR_RATIO = 3.0
-LARGEST_PLAIN = 1e6  # larger numbers are written with a power of ten
 """Misfit over model error from which nearly all of the misfit is an error of the pump's ripple: the
 rest, a tenth in power, is the model error."""
 OPENINGS = {
@@ -60,11 +65,11 @@ def summary_text(e: Explanation, result: dict, entries: Sequence[dict]) -> str:
             sentences.append("Its place or form is not determined: see equivalents.")
         sentences += _source_free(e)
     sentences += _remainder(result["remainder"])
-    if entries:
+    if entries and any(o.source == "nominal" for o in e.observations):
         sentences += _ripple_error(result["fit"])
-    sentences += _pump(result["pump"])
-    sentences += _load(result["load"])
-    sentences += _sensors(result["sensors"])
+    sentences += pump_sentences(result["pump"])
+    sentences += load_sentences(result["load"])
+    sentences += sensor_sentences(result["sensors"])
     sentences += _shaft_orders(e.shaft_orders)
     sentences += _drift(e)
     sentences += _pulls(e, is_off_data_sheet=verdict == "calibration_only" and not e.alarms.raised)
@@ -83,10 +88,10 @@ def _named(e: Explanation, result: dict, entries: Sequence[dict]) -> list[str]:
         f"misfit on held-out data goes from {before:.1%} to {after:.1%} of the measured ripple."
     ]
     for entry in certain:
-        sentences += [_parameter(name, p) for name, p in entry["parameters"].items()]
+        sentences += [parameter_sentence(name, p) for name, p in entry["parameters"].items()]
         if entry["effect"].certain:
             sentences.append(
-                f"{_words(entry['effect'].name).capitalize()} is always present, so it is included "
+                f"{spaced(entry['effect'].name).capitalize()} is always present, so it is included "
                 "unless the data contradict it."
             )
     sentences = list(dict.fromkeys(sentences))  # two effects may act through one parameter
@@ -99,27 +104,6 @@ def _named(e: Explanation, result: dict, entries: Sequence[dict]) -> list[str]:
         classes = "; ".join(join_words(names) for names in result["equivalents"])
         sentences.append(f"These recordings cannot discriminate between {classes}.")
     return sentences
-
-
-def _load(load: dict | None) -> list[str]:
-    """How much an unknown load reflects, over the observed band."""
-    if load is None:
-        return []
-    parts, frequency_hz = load["reflection"], load["frequency_hz"]
-    size = np.hypot(parts["re"], parts["im"])
-    said = [
-        f"{size[k]:.2f} at {frequency_hz[k]:.0f} Hz" for k in (0, len(size) // 2, len(size) - 1)
-    ]
-    return [f"The unknown load reflects {join_words(said)} of a wave's amplitude."]
-
-
-def _sensors(sensors: Mapping[str, dict]) -> list[str]:
-    """Gains and phases of uncalibrated sensors."""
-    said = [
-        f"{name} {one['gain']['value']:.3f} (phase {np.rad2deg(one['phase']['value']):+.1f} deg)"
-        for name, one in sensors.items()
-    ]
-    return [f"Gains of the sensors: {join_words(said)}."] if said else []
 
 
 def _level(levels: Mapping[tuple[str, str], str], entry: dict) -> str:
@@ -201,37 +185,11 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _parameter(name: str, parameter: dict) -> str:
-    """A parameter's value and interval."""
-    low, high = parameter["ci95"]
-    unit = "" if parameter["unit"] == "1" else f" {parameter['unit']}"
-    name = _words(name).capitalize()
-    value, low, high = map(_number, (parameter["value"], low, high))
-    return f"{name}: {value}{unit} (95 % interval {low} to {high})."
-
-
-def _number(value: float) -> str:
-    """Three digits, without a power of ten up to a million: 3000, not 3e+03."""
-    text = f"{value:.3g}"
-    return f"{float(text):.0f}" if "e+" in text and abs(value) < LARGEST_PLAIN else text
-
-
-def _pump(parameters: dict) -> list[str]:
-    """The pump's parameters whose intervals exclude the data sheet's value."""
-    off = [
-        f"{_words(name)} {_number(p['value'])}{'' if p['unit'] == '1' else ' ' + p['unit']} (data "
-        f"sheet {_number(p['sheet'])})"
-        for name, p in parameters.items()
-        if not p["ci95"][0] <= p["sheet"] <= p["ci95"][1]
-    ]
-    return [f"The ripple indicates of the pump: {join_words(off)}."] if off else []
-
-
 def _data_sheet_rivals(e: Explanation) -> list[str]:
     """Fits without an effect that only the data sheet rejects."""
     return [
-        f"Without {_words(s.effect)} the line would fit to {s.misfit:.1%} with {s.parameter} at "
-        f"{_number(s.value)} {s.unit}. That is {s.pull:.0f} standard deviations from the data "
+        f"Without {spaced(s.effect)} the line would fit to {s.misfit:.1%} with {s.parameter} at "
+        f"{plain_number(s.value)} {s.unit}. That is {s.pull:.0f} standard deviations from the data "
         "sheet, and only the data sheet rejects it."
         for s in e.prior_sensitivity
         if s.rivals and s.pull > PULL_ALARM
@@ -308,7 +266,7 @@ def _pulls(e: Explanation, is_off_data_sheet: bool = False) -> list[str]:
 
 
 def _effect_and_place(e: Explanation, entry: dict) -> str:
-    return f"{_words(entry['effect'].name)} ({_place(e, entry)})"
+    return f"{spaced(entry['effect'].name)} ({_place(e, entry)})"
 
 
 def _place(e: Explanation, entry: dict) -> str:
@@ -319,7 +277,3 @@ def _place(e: Explanation, entry: dict) -> str:
     if "position" in entry["parameters"]:
         return f"{element}, {low:.2f} to {high:.2f} m from the pump"
     return element
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")
