@@ -86,7 +86,12 @@ def readings(*names):
         FlowRipple(angle, plain), true.sensors,
     )  # fmt: skip
     placed = [
-        next(c for c in candidates(true) if (c[0].name, c[1].element) == (e.name, e.element))
+        next(
+            (effect, place)
+            for effect, place in candidates(true)
+            if (effect.name, place.element) == (e.name, e.element)
+            and {p.name for p in effect.parameters(true, place)} >= set(e.parameters)
+        )
         for e in effects
     ]
     twin = Twin(true, friction="steady", effects=placed)

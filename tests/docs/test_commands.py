@@ -199,9 +199,14 @@ def test_commands_of_a_page_run_in_order(page: str, tmp_path: Path):
     commands = [c for b in blocks_of(ROOT / page) if b.language == "sh" for c in b.commands]
     if not any(c.startswith("virtualrig record --out my_case") for c in commands):
         run("virtualrig record --out my_case --points smoke --seconds 2 --processes 2", folder)
+        sheet_file = folder / "my_case" / "rig.yaml"  # a reader's own: one state is not known
+        sheet_file.write_text(sheet_file.read_text().replace("state: slipper", "state: unknown"))
     write_overlay(folder, page)
+    text = (ROOT / page).read_text()
+    for name, content in re.findall(r"Save this as `(\S+)`.*?```python\n(.*?)```", text, re.S):
+        (folder / name).write_text(content)
     for command in commands:
-        run(stand_in(command), folder)
+        run(stand_in(command).replace("healthy_0", "healthy_1000_95"), folder)
 
 
 def test_every_fence_says_its_language():
