@@ -6,15 +6,14 @@ import pytest
 from rippletwin.calibration import multistart
 from rippletwin.calibration.frequency_continuation import refine
 from rippletwin.calibration.multistart import (
-    MAX_FOLLOWED,
     RANDOM_START_SD,
     RANDOM_STARTS,
     SCALINGS,
     choose_starts,
     distinct_modes,
-    select_by_score_test,
 )
 from rippletwin.calibration.posterior import Posterior
+from rippletwin.calibration.score_test import MAX_FOLLOWED, ScoreTest
 from rippletwin.explanation.fit_jobs import transfer_theta, weak_effect_starts
 from rippletwin.twin.twin import Twin
 from synthetic_effects import VOLUME
@@ -35,7 +34,7 @@ def test_score_test_keeps_a_start_near_the_true_position(place):
         thetas.append(transfer_theta(without, VOLUME, base))
         for name, u in start.items():
             thetas[-1][twin.index[name]] = u
-    kept, _ = select_by_score_test(base, Posterior(twin, observations), thetas)
+    kept = ScoreTest(base, Posterior(twin, observations), thetas).starts
     positions = [twin.values(theta)["line_volume@position.position"] for theta in kept]
     assert len(kept) == MAX_FOLLOWED
     assert min(abs(x - place) for x in positions) < 1000 / 4000 / 8

@@ -2,8 +2,6 @@
 Snakemake's real records of a finished run."""
 
 import re
-import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -40,15 +38,6 @@ def finished(tmp_path_factory) -> Path:
     result = snakemake(folder)
     assert result.returncode == 0, result.stderr
     return folder
-
-
-@pytest.fixture
-def workflow(finished, tmp_path) -> Path:
-    """A copy of the finished run to edit."""
-    folder = tmp_path / "workflow"
-    subprocess.run(["cp", "-a", finished, folder], check=True)
-    yield folder
-    shutil.rmtree(folder)
 
 
 def other_order(rig: str) -> str:

@@ -36,9 +36,9 @@ from rippletwin.calibration.multistart import (
     choose_starts,
     distinct_modes,
     draw_around_modes,
-    select_by_score_test,
 )
 from rippletwin.calibration.posterior import Posterior
+from rippletwin.calibration.score_test import ScoreTest
 from rippletwin.twin.twin import Twin
 
 LIMITS_HZ = (800.0, 1500.0, 2500.0, 4000.0)
@@ -150,19 +150,24 @@ def refine(
     """
     model = _error_model(base, hypothesis, observations, source_free, plain)
     thetas = [np.asarray(theta, dtype=float) for theta in thetas]
+    rounds = JACOBIAN_ROUNDS if exact and len(thetas) == 1 else 0
     if len(thetas) > 1:
-        thetas, _ = select_by_score_test(base, model, thetas)
+        thetas = _follow_best(model, ScoreTest(base, model, thetas).starts)
     else:
         model.predict(thetas[0])
         model.forward.freeze_compliance = True
-    rounds = JACOBIAN_ROUNDS if exact and len(thetas) == 1 else 0
-    if len(thetas) > 1:
-        rough = [descend(model, t, MAX_STEPS[-1], converged=ROUGHLY_CONVERGED) for t in thetas]
-        least = min(value for _, value in rough)
-        thetas = [theta for theta, value in rough if value <= least + FOLLOWED_MARGIN]
     modes = [descend(model, theta, MAX_LAST_STEPS) for theta in thetas]
     best = min(modes, key=lambda mode: mode[1])[0]
     return laplace_fit(model, hypothesis, _unfreeze_and_refit(model, best, rounds))
+
+
+def _follow_best(model: ErrorModel, thetas: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Where rough descents from several starts end, those near the best."""
+    if len(thetas) == 1:
+        return list(thetas)
+    rough = [descend(model, theta, MAX_STEPS[-1], converged=ROUGHLY_CONVERGED) for theta in thetas]
+    least = min(value for _, value in rough)
+    return [theta for theta, value in rough if value <= least + FOLLOWED_MARGIN]
 
 
 def _error_model(

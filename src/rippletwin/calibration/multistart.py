@@ -1,4 +1,4 @@
-"""Starts of fits: scaled wave speeds, draws around the modes of lower harmonics, a score test."""
+"""Starts of fits: scaled wave speeds, draws around the modes of lower harmonics."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ import numpy as np
 
 from rippletwin.calibration.error_model import ErrorModel
 from rippletwin.calibration.laplace import hessian
-from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.shaft_angles import align_shaft_angles
-from rippletwin.twin.twin import Twin
 
 SCALINGS = (0.0, -0.7, 0.7, -1.4, 1.4, -2.1, 2.1)
 """Of the wave speed of the longest segment and of those of all others, in prior standard
@@ -22,9 +20,6 @@ a data sheet may be further off than it says."""
 FEW_STARTS = 3
 """With more starts than this, as for a position along the line, all wave speeds are scaled
 together: pairs of scalings would be too many."""
-MAX_FOLLOWED, MAX_CORRELATION = 4, 0.7
-"""Most starts that the score test selects, and the correlation of the changes that two of them
-make in the prediction above which they count as one."""
 MAX_MODEL_ERROR_BELOW_LIMIT = 0.1
 """Largest model error before the last frequency limit. With a larger one the priors decide, and
 the fit never leaves a wrong local mode."""
@@ -99,46 +94,3 @@ def distinct_modes(modes: Sequence[State], distance: float = 0.05) -> list[State
         if all(np.max(np.abs(mode[1] - k[1])) > distance for k in kept):
             kept.append(mode)
     return kept
-
-
-def select_by_score_test(
-    base: Twin, posterior: Posterior, thetas: Sequence[np.ndarray]
-) -> tuple[list[np.ndarray], float]:
-    """At most MAX_FOLLOWED of the starts `thetas` of the newest effect, the most promising first,
-    and what the objective loses at most, to first order, if the effect is added at the first.
-
-    The score of a start is what the objective loses, to first order, on the way from the prediction
-    without the effect to that of the start, everything else refitted: a score test (Rao 1948, Math.
-    Proc. Cambridge Philos. Soc. 44:50). From here on `posterior` freezes the nonlinear compliance
-    as it is without the effect.
-    """
-    twin = posterior.twin
-    without = base.with_(effects=twin.effects[:-1])
-    theta = np.array([thetas[0][twin.index[p.name]] for p in without.parameters])
-    own = Posterior(without, posterior.observations, None, posterior.source_free)
-    own.predict(theta)
-    posterior.forward.hold_as(own.forward)
-    own.forward.freeze_compliance = True
-    prediction = own.predict(theta)
-    own.estimate_errors(prediction, theta)
-    ways = np.array([posterior.predict(start) for start in thetas]) - prediction
-    ways = np.where(np.isfinite(ways), ways, 0.0)  # an infinite prediction is no start
-    r, jacobian = own.linearise(theta, prediction, ways)
-    jacobian, ways = jacobian[:, : len(theta)], jacobian[:, len(theta) :]
-    both = np.linalg.lstsq(jacobian, np.column_stack([r, ways]), rcond=None)[0]
-    r, ways = r - jacobian @ both[:, 0], ways - jacobian @ both[:, 1:]
-    ways = ways / np.maximum(np.linalg.norm(ways, axis=0), 1e-300)
-    kept = []
-    for k in np.argsort(ways.T @ r):
-        if len(kept) < MAX_FOLLOWED and np.all(
-            np.abs(ways[:, kept].T @ ways[:, k]) < MAX_CORRELATION
-        ):
-            kept.append(k)
-    # Along its own parameters the effect can go on from there: the score test of all of them.
-    start = thetas[kept[0]]
-    own_slopes = posterior.slopes(start, posterior.predict(start))[len(theta) :]
-    freed = own.linearise(theta, prediction, own_slopes)[1]
-    freed = np.column_stack([freed[:, len(theta) :], ways[:, kept[0]]])
-    freed = freed - jacobian @ np.linalg.lstsq(jacobian, freed, rcond=None)[0]
-    found = np.linalg.lstsq(freed, r, rcond=1e-9)[0]
-    return [thetas[k] for k in kept], 0.5 * float(np.sum((freed @ found) ** 2))

@@ -18,8 +18,8 @@ from threadpoolctl import threadpool_limits
 
 from rippletwin.calibration.fit import Fit, Hypothesis
 from rippletwin.calibration.frequency_continuation import fit_hypothesis, refine
-from rippletwin.calibration.multistart import select_by_score_test
 from rippletwin.calibration.posterior import Posterior
+from rippletwin.calibration.score_test import ScoreTest
 from rippletwin.twin.twin import Twin
 
 WEAK_COORDINATE = -2.0  # of a weak effect's strength, in prior standard deviations
@@ -149,11 +149,11 @@ def run_fit_job(base: Twin, observations: Sequence, job: FitJob) -> Fit:
 
 def score_extension(base: Twin, observations: Sequence, job: FitJob) -> tuple[float, FitJob]:
     """What the newest effect of a job that starts near a fit promises, and the job with the
-    starts that promise most (`select_by_score_test`); for `Workers.map`."""
+    starts that promise most (`ScoreTest`); for `Workers.map`."""
     posterior = Posterior(base.with_(effects=job.hypothesis), observations, None, job.source_free)
     thetas = job.start.all_thetas(base, job.hypothesis, observations)
-    kept, score = select_by_score_test(base, posterior, thetas)
-    return score, replace(job, start=replace(job.start, thetas=tuple(kept)))
+    test = ScoreTest(base, posterior, thetas)
+    return test.gain(), replace(job, start=replace(job.start, thetas=tuple(test.starts)))
 
 
 def job_from(fit: Fit, **options) -> FitJob:

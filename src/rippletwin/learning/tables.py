@@ -80,7 +80,7 @@ def cost_table(
 
 
 def answer_table(answers: pd.DataFrame) -> str:
-    """Markdown of the predicted classes of recordings of unknown state: shares in per cent.
+    """Markdown of the predicted classes of signals that are not scored: shares in per cent.
 
     answers : columns recording, dataset, architecture and predicted (of ``CLASSES``), a row a
     window and seed.

@@ -64,7 +64,11 @@ def series_elements(
     Raises InputError, with `name`, where no passive rational function does.
     """
     s = 2j * np.pi * _frequencies(1.0 / period)
-    return _elements(name, 0.0, "series", s, impedance(s))
+    elements, problem = _fit_elements(0.0, "series", s, impedance(s))
+    if problem:
+        problem = f"has no time domain: {problem}"
+        raise InputError("the twin", name, problem, "Use the other domain")
+    return elements
 
 
 def _frequencies(lowest_hz: float) -> np.ndarray:
@@ -127,9 +131,7 @@ def _refuse_unknown_changes(effect: Effect, before, after) -> None:
             raise _refusal(effect, f"it changes `{name}` of the line")
 
 
-def _refusal(effect: Effect | str, why: str) -> InputError:
-    if isinstance(effect, str):
-        return InputError("the twin", effect, f"has no time domain: {why}", "Use the other domain")
+def _refusal(effect: Effect, why: str) -> InputError:
     return InputError(
         effect.file or effect.name,
         "EFFECT.apply_in_time",
@@ -142,14 +144,20 @@ def _whole(value, s: np.ndarray) -> np.ndarray:
     return np.broadcast_to(np.asarray(value, complex), s.shape)
 
 
-def _elements(effect: Effect | str, position: float, kind: str, s, immittance) -> list[Element]:
+def _elements(effect: Effect, position: float, kind: str, s, immittance) -> list[Element]:
     """Elements (none where it is zero) whose sum follows a one-port's immittance (F,)."""
-    fit = fit_passive_terms(s, immittance)
+    elements, problem = _fit_elements(position, kind, s, immittance)
+    if problem:
+        raise _refusal(effect, problem)
+    return elements
+
+
+def _fit_elements(position: float, kind: str, s, immittance) -> tuple[list[Element], str]:
+    """The same, and why they do not follow it; empty where they do."""
+    fit, problem = fit_passive_terms(s, immittance), ""
     if not fit.error <= MAX_FIT_ERROR:
-        raise _refusal(
-            effect, f"a passive rational function follows its {kind} to {fit.error:.1%} only"
-        )
-    return [Element(position, kind, *term) for term in fit.terms]
+        problem = f"a passive rational function follows its {kind} to {fit.error:.1%} only"
+    return [Element(position, kind, *term) for term in fit.terms], problem
 
 
 def _change_walls(effect: Effect, line: TimeDomainLine, s, factor: np.ndarray) -> None:

@@ -129,6 +129,9 @@ class Twin:
             *effect_parameters(self.effects, self._effect_parameters),
         )
         self.index = {p.name: k for k, p in enumerate(self.parameters)}
+        self._reflection = [
+            k for k, p in enumerate(self.parameters) if p.name.startswith("reflection[")
+        ]
         self.theta = np.zeros(len(self.parameters)) if theta is None else np.asarray(theta, float)
         if self.theta.shape != (len(self.parameters),):
             raise ValueError(f"theta must have {len(self.parameters)} entries")
@@ -156,9 +159,7 @@ class Twin:
     def reflection(self, u: np.ndarray) -> tuple[np.ndarray, ...]:
         """Schur parameters of an unknown load, each (..., 1), at coordinates u (P, ...)."""
         return tuple(
-            np.asarray(p.value(x))[..., None]
-            for p, x in zip(self.parameters, u)
-            if p.name.startswith("reflection[")
+            np.asarray(self.parameters[k].value(u[k]))[..., None] for k in self._reflection
         )
 
     def gains(self, u: np.ndarray) -> np.ndarray | float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from rippletwin.errors import InputError
@@ -41,3 +43,23 @@ def check_size(path: Path, field: str, count: int, limit_gib: float = MAX_GIB) -
             f"{limit_gib:.3g} GiB",
             "Cut the recording to a shorter stretch; a hundred revolutions and more are enough",
         )
+
+
+@contextmanager
+def refuse_damaged(
+    path: Path,
+    guess: str,
+    remedy: str = "Copy it again from where it was recorded",
+    errors: type[Exception] | tuple[type[Exception], ...] = Exception,
+) -> Iterator[None]:
+    """Turn `errors` of the library that reads a file into an InputError.
+
+    Libraries raise a dozen kinds for a damaged file, hence all by default. `guess` is what the file
+    may be instead, as "or is no zarr store".
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except errors as error:
+        raise InputError(path, "file", f"cannot be read, {guess} ({error})", remedy) from error

@@ -10,12 +10,12 @@ from typing import Protocol
 
 import numpy as np
 
+from rippletwin.case.pressure_units import PASCALS
 from rippletwin.case.readers.file_checks import check_size
 from rippletwin.case.readers.signals import numbers
 from rippletwin.errors import InputError, raise_any
 
 SENSORS_BY_SAMPLES, SAMPLES_BY_SENSORS = "sensors_by_samples", "samples_by_sensors"
-UNITS = ("Pa", "kPa", "MPa", "bar", "psi")
 
 KEYS = {"rate": "sampling_rate_name"}
 """Keys of rig.yaml that are called otherwise than the fields of a layout."""
@@ -208,7 +208,7 @@ def missing_sensor(
     if near:
         quoted = near if near.replace("_", "").isalnum() else repr(near)
         hint = f"Did you mean {near}? Give channels: {{{sensor}: {quoted}}} in rig.yaml"
-        unit = next((u for u in UNITS if u.casefold() in _words(near[len(name) :])), None)
+        unit = next((u for u in PASCALS if u.casefold() in _words(near[len(name) :])), None)
         hint += f" and unit: {unit}" if unit else ""
     called = "" if name == sensor else f" ({name})"
     return InputError(

@@ -14,28 +14,19 @@ import numpy as np
 import scipy.io
 
 from rippletwin.case.readers.arrays import ArrayFile, read_arrays
-from rippletwin.case.readers.file_checks import check_size
+from rippletwin.case.readers.file_checks import check_size, refuse_damaged
 from rippletwin.case.readers.hdf5_items import datasets_in, find_dataset
 from rippletwin.case.readers.layout import Layout
 from rippletwin.case.readers.signals import Signals, numbers
-from rippletwin.errors import InputError
 
 STRUCTS = ("struct", "object")
 
 
 def read(path: Path, layout: Layout) -> Signals:
     """Read a MATLAB recording; raises InputError."""
-    try:
+    again = "Save it again from MATLAB: save(file, 'pressure', 'sampling_rate_hz')"
+    with refuse_damaged(path, "is cut short or not a MATLAB file", again):
         return _read_v73(path, layout) if h5py.is_hdf5(path) else _read_v5(path, layout)
-    except InputError:
-        raise
-    except Exception as error:  # scipy raises a dozen kinds for a damaged file
-        raise InputError(
-            path,
-            "file",
-            f"cannot be read, is cut short or not a MATLAB file ({error})",
-            "Save it again from MATLAB: save(file, 'pressure', 'sampling_rate_hz')",
-        ) from error
 
 
 def _read_v5(path: Path, layout: Layout) -> Signals:

@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from rippletwin.case.readers.file_checks import check_size
+from rippletwin.case.readers.file_checks import check_size, refuse_damaged
 from rippletwin.case.readers.layout import Layout, choose, find_time
 from rippletwin.case.readers.signals import Signals, numbers
 from rippletwin.errors import InputError
@@ -16,23 +16,17 @@ from rippletwin.errors import InputError
 
 def read(path: Path, layout: Layout) -> Signals:
     """Read a Parquet recording; raises InputError."""
-    try:
-        with pq.ParquetFile(path) as file:
-            names = file.schema_arrow.names
-            chosen, time = choose(path, layout, names), find_time(path, layout, names)
-            check_size(path, "file", file.metadata.num_rows * len(chosen))
-            if not file.metadata.num_rows:
-                raise InputError(path, "file", "no rows", "Export the recording again")
-            wanted = [names[k] for k in (*chosen, *([] if time is None else [time]))]
-            table = file.read(columns=wanted)
-            columns = [_column(path, name, table.column(name)) for name in wanted]
-    except (pa.ArrowException, OSError) as error:
-        raise InputError(
-            path,
-            "file",
-            f"cannot be read, is cut short or not Parquet ({error})",
-            "Copy it again from where it was recorded",
-        ) from error
+    errors = pa.ArrowException, OSError
+    damaged = refuse_damaged(path, "is cut short or not Parquet", errors=errors)
+    with damaged, pq.ParquetFile(path) as file:
+        names = file.schema_arrow.names
+        chosen, time = choose(path, layout, names), find_time(path, layout, names)
+        check_size(path, "file", file.metadata.num_rows * len(chosen))
+        if not file.metadata.num_rows:
+            raise InputError(path, "file", "no rows", "Export the recording again")
+        wanted = [names[k] for k in (*chosen, *([] if time is None else [time]))]
+        table = file.read(columns=wanted)
+        columns = [_column(path, name, table.column(name)) for name in wanted]
     return Signals(
         pressure=np.array(columns[: len(chosen)]),
         time_s=None if time is None else columns[-1],

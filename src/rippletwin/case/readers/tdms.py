@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from nptdms import TdmsFile
 
-from rippletwin.case.readers.file_checks import check_readable, check_size
+from rippletwin.case.readers.file_checks import check_readable, check_size, refuse_damaged
 from rippletwin.case.readers.layout import Layout, choose, find_time, missing_name
 from rippletwin.case.readers.signals import Signals, numbers, one_number
 from rippletwin.errors import InputError
@@ -28,24 +28,14 @@ def read(path: Path, layout: Layout) -> Signals:
             "cannot be read: it does not begin as TDMS files do",
             "Copy it again from where it was recorded, or correct the suffix of its name",
         )
-    try:
-        with TdmsFile.open(path) as file:
-            channels = _channels(path, file, layout)
-            names = [channel.name for channel in channels]
-            chosen = [channels[k] for k in choose(path, layout, names)]
-            time = find_time(path, layout, names)
-            rows = [_numbers(path, s, c) for s, c in zip(layout.sensors, chosen)]
-            time_s = None if time is None else _numbers(path, layout.time_name, channels[time])
-            rate = _rate(path, layout, [{**file.properties, **c.properties} for c in chosen])
-    except InputError:
-        raise
-    except Exception as error:  # npTDMS raises many kinds for a damaged file
-        raise InputError(
-            path,
-            "file",
-            f"cannot be read, is cut short or not TDMS ({error})",
-            "Copy it again from where it was recorded",
-        ) from error
+    with refuse_damaged(path, "is cut short or not TDMS"), TdmsFile.open(path) as file:
+        channels = _channels(path, file, layout)
+        names = [channel.name for channel in channels]
+        chosen = [channels[k] for k in choose(path, layout, names)]
+        time = find_time(path, layout, names)
+        rows = [_numbers(path, s, c) for s, c in zip(layout.sensors, chosen)]
+        time_s = None if time is None else _numbers(path, layout.time_name, channels[time])
+        rate = _rate(path, layout, [{**file.properties, **c.properties} for c in chosen])
     if len({row.size for row in rows}) > 1:
         sizes = ", ".join(f"{s} {row.size}" for s, row in zip(layout.sensors, rows))
         raise InputError(path, "channels", f"lengths differ: {sizes}", "Record them together")

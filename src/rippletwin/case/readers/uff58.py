@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pyuff
 
-from rippletwin.case.readers.file_checks import check_size
+from rippletwin.case.readers.file_checks import check_size, refuse_damaged
 from rippletwin.case.readers.layout import Layout, choose
 from rippletwin.case.readers.signals import Signals, numbers
 from rippletwin.errors import InputError
@@ -24,7 +24,8 @@ SAME_STEP = 1e-6  # relative
 def read(path: Path, layout: Layout) -> Signals:
     """Read a recording from a universal file; raises InputError."""
     check_size(path, "file", path.stat().st_size // BYTES_PER_VALUE)
-    try:
+    guess = "is cut short or no universal file"
+    with refuse_damaged(path, guess, "Export it again, as data sets 58"):
         file = pyuff.UFF(str(path))
         heads = {
             k: file.read_sets(k, header_only=True)
@@ -36,15 +37,6 @@ def read(path: Path, layout: Layout) -> Signals:
             raise ValueError("it has no data set 58 with a function of time")
         names = [str(heads[k]["id1"]).strip() for k in functions]
         sets = [file.read_sets(functions[k]) for k in choose(path, layout, names)]
-    except InputError:
-        raise
-    except Exception as error:  # pyuff raises bare exceptions
-        raise InputError(
-            path,
-            "file",
-            f"cannot be read, is cut short or no universal file ({error})",
-            "Export it again, as data sets 58",
-        ) from error
     rows = [numbers(path, s, one["data"]) for s, one in zip(layout.sensors, sets)]
     lengths = sorted({row.size for row in rows})
     if len(lengths) > 1 or not lengths[0]:

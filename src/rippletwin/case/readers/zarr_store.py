@@ -11,6 +11,7 @@ from pathlib import Path
 import zarr
 
 from rippletwin.case.readers.arrays import ArrayFile, read_arrays
+from rippletwin.case.readers.file_checks import refuse_damaged
 from rippletwin.case.readers.layout import Layout
 from rippletwin.case.readers.signals import Signals, check_type
 from rippletwin.errors import InputError
@@ -18,7 +19,7 @@ from rippletwin.errors import InputError
 
 def read(path: Path, layout: Layout) -> Signals:
     """Read a recording in a zarr store, a folder; raises InputError."""
-    try:
+    with refuse_damaged(path, "or is no zarr store"):
         store = zarr.open_group(path, mode="r")
         members = store.members(max_depth=4)
         arrays = {name: item for name, item in members if isinstance(item, zarr.Array)}
@@ -38,12 +39,3 @@ def read(path: Path, layout: Layout) -> Signals:
             return next((h.attrs[name] for h in holders if name in h.attrs), None)
 
         return read_arrays(ArrayFile(path, lambda: list(arrays), array, attribute), layout)
-    except InputError:
-        raise
-    except Exception as error:  # zarr raises many kinds for a damaged store
-        raise InputError(
-            path,
-            "file",
-            f"cannot be read, or is no zarr store ({error})",
-            "Copy it again from where it was recorded",
-        ) from error

@@ -40,9 +40,9 @@ MODEL_ERRORS = np.geomspace(1e-3, 1.5, 13)
 ERRORS_BELOW, ERRORS_ABOVE = 5, 1  # grid values of the model error around that of the fit
 MIN_EIGENVALUE = 1e-3  # share of the kernel's largest; smaller ones are left out
 MAX_POSITIONS = 12  # along the line, each a shunt and a series element
-STEP_SHARES = (1.0, 0.5, 0.25, 0.0)
-"""Of the way to the most likely correction. A linear step may overshoot: near a sharp resonance a
-small correction changes the prediction by much."""
+STEP_SHARES = (1.0, 0.5, 0.25)
+"""Of the way to the most likely correction, besides none of it. A linear step may overshoot: near a
+sharp resonance a small correction changes the prediction by much."""
 FLAT_SD = 1e3  # of a coordinate without a prior
 
 NONE = "nothing"
@@ -65,16 +65,18 @@ class SmoothCorrections:
         slopes = self._posterior.slopes(self.theta, self._prediction)
         at = int(np.searchsorted(MODEL_ERRORS, self._posterior.model_error))
         self._errors = MODEL_ERRORS[max(at - ERRORS_BELOW, 0) : at + ERRORS_ABOVE + 1]
-        self._expanded = [self._expand(error, slopes) for error in self._errors]
+        self._expanded, self._at_mode = zip(*(self._expand(e, slopes) for e in self._errors))
 
-    def _expand(self, model_error: float, slopes: np.ndarray) -> tuple:
-        """Residual at theta = 0, scaled Jacobian (P, N) and log determinant at a model error."""
+    def _expand(self, model_error: float, slopes: np.ndarray) -> tuple[tuple, float]:
+        """Residual at theta = 0, scaled Jacobian (P, N) and log determinant at a model error; and
+        half the square sum at the mode."""
         prior = self._posterior.prior
         self._posterior.model_error = float(model_error)
         r, jacobian = self._posterior.whiten_slopes(self._prediction, slopes)
         start = np.where(prior, self.theta, 0.0)
         scale = np.where(prior, 1.0, FLAT_SD)[:, None]
-        return r - start @ jacobian, jacobian * scale, self._posterior.log_determinant()
+        expanded = r - start @ jacobian, jacobian * scale, self._posterior.log_determinant()
+        return expanded, 0.5 * float(r @ r + start @ start)
 
     def log_evidence(self, element: tuple = (NONE, None)) -> float:
         """Log evidence if an element, as in `elements_of`, may have a smooth correction.
@@ -86,13 +88,10 @@ class SmoothCorrections:
     def most_likely(self, element: tuple) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Frequencies (F,), the most likely correction (F,) of an element, and how well each
         frequency determines it: the power (F,) of what a unit of it changes, whitened."""
-        solved, change = self._solve(element), self.change(element)
-        weight = np.sum(np.abs(change) ** 2, axis=0) / self._posterior.power
-        return (
-            self._posterior.forward.frequency_hz,
-            solved.correction,
-            weight / solved.model_error**2,
-        )
+        solved = self._solve(element)
+        power = self._posterior.power * solved.model_error**2
+        weight = np.sum(np.abs(solved.change) ** 2, axis=0) / power
+        return self._posterior.forward.frequency_hz, solved.correction, weight
 
     def _solve(self, element: tuple) -> _Solved:
         """Average over model errors and amplitudes of a correction, and the most likely of them."""
@@ -100,13 +99,15 @@ class SmoothCorrections:
         amplitudes = np.zeros(1) if change is None else AMPLITUDES
         values = np.empty((len(self._errors), len(amplitudes)))
         linear = []
+        free = None
+        if change is not None:
+            free = np.concatenate([self._basis, 1j * self._basis])[:, None] * change
         for k, (r, jacobian, log_determinant) in enumerate(self._expanded):
             columns = jacobian
-            if change is not None:
+            if free is not None:
                 self._posterior.model_error = float(self._errors[k])
-                free = np.concatenate([self._basis, 1j * self._basis])[:, None] * change
-                free = self._posterior.whiten_slopes(self._prediction, free)[1]
-                columns = np.concatenate([jacobian, free])
+                whitened = self._posterior.whiten_slopes(self._prediction, free)[1]
+                columns = np.concatenate([jacobian, whitened])
             linear.append((r, columns @ columns.T, columns @ r))
             for m, a in enumerate(amplitudes):
                 scale = self._scale(a, len(columns))
@@ -114,11 +115,11 @@ class SmoothCorrections:
         solved = []
         for m, a in enumerate(amplitudes):
             k = int(np.argmax(values[:, m]))
-            gain, correction = self._delinearise(element, float(self._errors[k]), a, *linear[k])
+            gain, correction = self._delinearise(element, k, a, *linear[k])
             values[:, m] += gain
             solved.append((values[k, m], float(self._errors[k]), correction))
         evidence = logsumexp(values) - np.log(len(amplitudes) * len(MODEL_ERRORS))
-        return _Solved(float(evidence), *max(solved, key=lambda each: each[0])[1:])
+        return _Solved(float(evidence), *max(solved, key=lambda each: each[0])[1:], change)
 
     def _scale(self, amplitude: float, count: int) -> np.ndarray:
         """Prior standard deviations of the parameters and of the correction's amplitudes."""
@@ -127,10 +128,10 @@ class SmoothCorrections:
         return scale
 
     def _delinearise(
-        self, element: tuple, error: float, amplitude: float, r, gram, along
+        self, element: tuple, error: int, amplitude: float, r, gram, along
     ) -> tuple[float, np.ndarray]:
         """Log likelihood at the most likely parameters and correction without linearising less
-        that with it, and the correction (F,)."""
+        that with it, and the correction (F,); `error` is the index of a model error."""
         scale = self._scale(amplitude, len(gram))
         precision = scale[:, None] * gram * scale + np.eye(len(scale))
         # The columns are derivatives of the residual: measured less predicted.
@@ -141,8 +142,9 @@ class SmoothCorrections:
         amplitudes = scale[count:] * unit[count:]
         half = len(amplitudes) // 2
         correction = (amplitudes[:half] + 1j * amplitudes[half:]) @ self._basis[:half]
-        self._posterior.model_error = error
-        return linear - self._least_objective(element, theta, correction, unit), correction
+        self._posterior.model_error = float(self._errors[error])
+        on_the_way = self._least_objective(element, theta, correction, unit)
+        return linear - min(self._at_mode[error], on_the_way), correction
 
     def _least_objective(
         self, element: tuple, theta: np.ndarray, correction: np.ndarray, unit: np.ndarray
@@ -211,11 +213,13 @@ class SmoothCorrections:
 
 @dataclass(frozen=True)
 class _Solved:
-    """Log evidence with a correction (F,), and the most likely one with its model error."""
+    """Log evidence with a correction, the most likely one (F,) with its model error, and the change
+    (S, F) that a unit of it makes, None where there is none."""
 
     log_evidence: float
     model_error: float
     correction: np.ndarray
+    change: np.ndarray | None
 
 
 def elements_of(rig, observations: Sequence, own: Sequence[tuple] = ()) -> list[tuple]:
