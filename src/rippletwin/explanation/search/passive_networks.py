@@ -1,16 +1,18 @@
 """Passive networks without a name, which stand in for physics that the library does not have.
 
-A network is a shunt or a series element at a free place. It is added to the best explanation. Where
-that leaves the line badly fitted, the named effects may have bent it: the network is then begun
-anew as well, along the whole line and beside the usual effects only. Several networks, each at a
-place of its own, are a short two-port with series and shunt elements.
+A network is a shunt, a series element or a short piece of another pipe, at a free place. It is
+added to the best explanation. Where that leaves the line badly fitted, the named effects may have
+bent it: the network is then begun anew as well, along the whole line and beside the usual effects
+only. Where no network fits the line, it may be in a wrong local mode: the best are fitted again
+from starts about their places. Several networks may stand in together.
 """
 
 from __future__ import annotations
 
 from rippletwin.calibration.fit import Fit
 from rippletwin.explanation.fit_jobs import FitJob, Workers, rank_by_evidence
-from rippletwin.explanation.search.stepwise_moves import extension_job
+from rippletwin.explanation.search.single_effects import refit_poor_fits
+from rippletwin.explanation.search.stepwise_moves import LOST_MODEL_ERROR, extension_job
 from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.thresholds import GOOD_MODEL_ERROR, MIN_LOG_BAYES_FACTOR
 from rippletwin.twin.effects import library
@@ -34,7 +36,9 @@ def fit_passive_networks(workers: Workers, best: Fit) -> list[Fit]:
         usual = tuple(member for member in best.hypothesis if member[0].usual)
         fits += workers.fit([FitJob((*usual, network)) for network in networks])
     fits = rank_by_evidence(fits)
-    if fits[0].evidence <= best.evidence + MIN_LOG_BAYES_FACTOR:
+    if fits and fits[0].model_error > LOST_MODEL_ERROR:
+        fits = refit_poor_fits(workers, fits)
+    if not fits or fits[0].evidence <= best.evidence + MIN_LOG_BAYES_FACTOR:
         return fits
     return [*_with_further_networks(workers, fits[0], networks), *fits]
 
