@@ -7,7 +7,6 @@ from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
 from rippletwin.twin.effects.base import LineState, Place
 from rippletwin.twin.effects.library import EFFECTS
-from rippletwin.twin.effects.passive_piece import describe_piece
 from two_domains import both, corrected, misfit
 
 S = 2j * np.pi * np.linspace(50.0, 5000.0, 100)
@@ -87,8 +86,9 @@ def test_both_domains_have_the_same_piece(position):
 
 def test_it_is_told_in_words():
     """A hose and a chamber are told by what differs most from the line, with their numbers."""
-    assert describe_piece(HOSE) == (
+    assert PIECE[0].describe(HOSE) == (
         "like 0.30 m of a softer pipe: 1.2 times the diameter and 0.5 times the wave speed of the "
         "line"
     )
-    assert "wider pipe: 2 times the diameter" in describe_piece(CHAMBER)
+    chamber = {name: np.float64(value) for name, value in CHAMBER.items()}
+    assert "wider pipe: 2 times the diameter" in PIECE[0].describe(chamber)

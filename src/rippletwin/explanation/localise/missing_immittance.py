@@ -20,7 +20,6 @@ from rippletwin.calibration.posterior import Posterior
 from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.line.frequency_domain.pipe_immittance import shunt_admittance
 from rippletwin.twin.effects.base import LineState
-from rippletwin.twin.effects.passive_piece import piece_immittances
 from rippletwin.twin.forward_model import ForwardModel, reflection
 
 PROBE_SHARE = 1e-4  # of the change by an effect, for finite differences
@@ -275,8 +274,8 @@ def is_passive(fit: Fit, effect_index: int = -1) -> bool:
         for a, d in zip(v.wave_speeds, v.diameters)
     ]
     line = FrequencyDomainLine(s, v.lengths, series=np.ones((len(v.lengths), len(s))), shunt=shunt)
-    if effect.name == "passive_piece":
-        immittances = piece_immittances(line, state, values)
+    if effect.immittances is not None:
+        immittances = effect.immittances(line, state, values, place)
     else:
         effect.apply(line, state, values, place)
         immittances = [insert.immittance for insert in line.inserts]

@@ -9,9 +9,11 @@ from starts about their places. Several networks may stand in together.
 
 from __future__ import annotations
 
+import numpy as np
+
 from rippletwin.calibration.fit import Fit
-from rippletwin.explanation.fit_jobs import FitJob, Workers, rank_by_evidence
-from rippletwin.explanation.search.single_effects import refit_poor_fits
+from rippletwin.explanation.fit_jobs import Continuation, FitJob, Workers, rank_by_evidence
+from rippletwin.explanation.search.single_effects import refined_starts
 from rippletwin.explanation.search.stepwise_moves import LOST_MODEL_ERROR, extension_job
 from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.thresholds import GOOD_MODEL_ERROR, MIN_LOG_BAYES_FACTOR
@@ -20,6 +22,7 @@ from rippletwin.twin.effects import library
 BENT_MODEL_ERROR = 0.02
 """Relative model error above which the line beside named effects may be in a wrong local mode. It
 saves work only."""
+LOST_FITS = 3  # of the best fits, in wrong local modes, that are fitted again
 MAX_NETWORKS = 3  # in one line
 
 
@@ -36,11 +39,23 @@ def fit_passive_networks(workers: Workers, best: Fit) -> list[Fit]:
         usual = tuple(member for member in best.hypothesis if member[0].usual)
         fits += workers.fit([FitJob((*usual, network)) for network in networks])
     fits = rank_by_evidence(fits)
-    if fits and fits[0].model_error > LOST_MODEL_ERROR:
-        fits = refit_poor_fits(workers, fits)
+    fits = _refit_lost(workers, fits)
     if not fits or fits[0].evidence <= best.evidence + MIN_LOG_BAYES_FACTOR:
         return fits
     return [*_with_further_networks(workers, fits[0], networks), *fits]
+
+
+def _refit_lost(workers: Workers, fits: list[Fit]) -> list[Fit]:
+    """`fits` and, where the best may be in a wrong local mode, refits about their places.
+
+    A line in a wrong local mode leaves to the pump what it cannot fit: both errors count.
+    """
+    rig = workers.base.rig
+    lost = [f for f in fits[:LOST_FITS] if np.hypot(f.model_error, f.source_sd) > LOST_MODEL_ERROR]
+    if not lost or lost[0] is not fits[0]:
+        return fits
+    jobs = [FitJob(f.hypothesis, Continuation(tuple(refined_starts(rig, f)))) for f in lost]
+    return rank_by_evidence([*fits, *workers.fit(jobs)])
 
 
 def _with_further_networks(workers: Workers, leading: Fit, networks: list) -> list[Fit]:

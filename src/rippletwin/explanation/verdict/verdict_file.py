@@ -37,7 +37,6 @@ from rippletwin.explanation.verdict.places import (
 from rippletwin.explanation.verdict.summary_text import summary_text
 from rippletwin.twin import twin_file
 from rippletwin.twin.effects.library import generalisations
-from rippletwin.twin.effects.passive_piece import describe_piece
 from rippletwin.twin.unknown_load import load_curve
 
 WIDE_INTERVAL = 0.15  # of the line's length; a wider one asks for one more sensor
@@ -232,9 +231,9 @@ def _stand_in(e: Explanation, entries: list[dict], index: int) -> dict:
     """A passive network of the corrected twin, the effect `index` of the explanation."""
     entry = entries[index]
     accepted, form = e.decision.accepted, entry["place"].form
-    if form is None:
-        _, _, values = accepted.twin.effect_values(accepted.twin.theta)[index]
-        follows = describe_piece(values)
+    effect, _, values = accepted.twin.effect_values(accepted.twin.theta)[index]
+    if effect.describe is not None:
+        follows = effect.describe(values)
     else:
         missing = missing_immittance(accepted, e.observations, index)
         follows = None if missing is None else missing.law_in_words

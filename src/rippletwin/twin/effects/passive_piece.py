@@ -25,7 +25,7 @@ from rippletwin.twin.priors import lognormal
 MAX_SHARE = 0.5  # of the line's length
 
 
-def piece_immittances(network, state, values) -> tuple[np.ndarray, np.ndarray]:
+def _immittances(network, state, values, place) -> tuple[np.ndarray, np.ndarray]:
     """Z' (Pa s/m4) and Y' (m2/(Pa s)) of the piece, (..., F); both are positive real."""
     k, wide = segment_at(network.lengths, values["position"]), values["diameter_ratio"]
     series = series_impedance(
@@ -46,12 +46,11 @@ def piece_immittances(network, state, values) -> tuple[np.ndarray, np.ndarray]:
     return series, softer * (network.shunt[k] + creep * elastic)
 
 
-def describe_piece(values) -> str:
+def _describe(values) -> str:
     """The piece in words."""
     wide, fast = values["diameter_ratio"], values["wave_speed_ratio"]
-    kinds = {("wider", "narrower")[wide < 1.0]: abs(np.log(wide))}
-    kinds[("stiffer", "softer")[fast < 1.0]] = abs(np.log(fast))
-    kind = max(kinds, key=kinds.get)
+    bore, wall = "wider" if wide > 1.0 else "narrower", "stiffer" if fast > 1.0 else "softer"
+    kind = bore if abs(np.log(wide)) > abs(np.log(fast)) else wall
     return (
         f"like {values['length']:.2f} m of a {kind} pipe: {wide:.2g} times the diameter and "
         f"{fast:.2g} times the wave speed of the line"
@@ -98,7 +97,7 @@ def _apply(network, state, values, place):
     x, length = _extent(network.length, values)
     before = _stretch(network, x - 0.5 * length, x)
     after = _stretch(network, x, x + 0.5 * length)
-    piece = _chain(*piece_immittances(network, state, values), length)
+    piece = _chain(*_immittances(network, state, values, place), length)
     a, b, _, d = _product(_product(_without(before), piece), _without(after))
     network.inserts += [
         Insert(x, "shunt", (d - 1.0) / b),
@@ -146,5 +145,7 @@ EFFECT = Effect(
     places=position_place,
     apply=_apply,
     apply_in_time=_apply_in_time,
+    immittances=_immittances,
+    describe=_describe,
     named=False,
 )
