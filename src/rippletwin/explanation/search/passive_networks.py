@@ -9,8 +9,6 @@ from starts about their places. Several networks may stand in together.
 
 from __future__ import annotations
 
-import numpy as np
-
 from rippletwin.calibration.fit import Fit
 from rippletwin.explanation.fit_jobs import Continuation, FitJob, Workers, rank_by_evidence
 from rippletwin.explanation.search.single_effects import refined_starts
@@ -39,21 +37,27 @@ def fit_passive_networks(workers: Workers, best: Fit) -> list[Fit]:
         usual = tuple(member for member in best.hypothesis if member[0].usual)
         fits += workers.fit([FitJob((*usual, network)) for network in networks])
     fits = rank_by_evidence(fits)
-    fits = _refit_lost(workers, fits)
+    fits = _refit_lost(workers, best, fits)
     if not fits or fits[0].evidence <= best.evidence + MIN_LOG_BAYES_FACTOR:
         return fits
     return [*_with_further_networks(workers, fits[0], networks), *fits]
 
 
-def _refit_lost(workers: Workers, fits: list[Fit]) -> list[Fit]:
-    """`fits` and, where the best may be in a wrong local mode, refits about their places.
+def _refit_lost(workers: Workers, best: Fit, fits: list[Fit]) -> list[Fit]:
+    """`fits` and, where the first may be in a wrong local mode, refits about their places.
 
-    A line in a wrong local mode leaves to the pump what it cannot fit: both errors count.
+    A line in a wrong local mode leaves to the pump what it cannot fit: its model error is large, or
+    the error of the ripple is larger than without networks.
     """
-    rig = workers.base.rig
-    lost = [f for f in fits[:LOST_FITS] if np.hypot(f.model_error, f.source_sd) > LOST_MODEL_ERROR]
+
+    def is_lost(fit: Fit) -> bool:
+        ripple = fit.source_sd if fit.source_sd > best.source_sd else 0.0
+        return max(fit.model_error, ripple) > LOST_MODEL_ERROR
+
+    lost = [fit for fit in fits[:LOST_FITS] if is_lost(fit)]
     if not lost or lost[0] is not fits[0]:
         return fits
+    rig = workers.base.rig
     jobs = [FitJob(f.hypothesis, Continuation(tuple(refined_starts(rig, f)))) for f in lost]
     return rank_by_evidence([*fits, *workers.fit(jobs)])
 
