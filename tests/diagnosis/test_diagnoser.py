@@ -171,13 +171,14 @@ def test_the_file_has_the_contract_s_keys(diagnoses):
     (entry,) = diagnosis_dict([diagnoses["slipper"]])["recordings"]
     assert list(entry) == [
         "label", "state", "probabilities", "severity", "piston", "unlike", "networks", "sentence",
+        "doubts",
     ]  # fmt: skip
     assert list(entry["probabilities"]) == ["healthy", "slipper", "cylinder", "slipper+cylinder"]
     assert set(entry["severity"]["slipper"]) == {"value", "ci95", "unit"}
     assert entry["severity"]["slipper"]["unit"] == "m2"
     assert set(entry["unlike"]) == {"p_value", "where"}
     assert entry["unlike"]["where"] == {"orders": [], "element": None}
-    assert entry["networks"] == {}
+    assert entry["networks"] == {} and entry["doubts"] == []
     assert "slipper" in entry["sentence"] and entry["label"] in entry["sentence"]
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from rippletwin import store
 from rippletwin.diagnosis.diagnosis import Diagnosis
+from rippletwin.diagnosis.doubts import doubts
 from rippletwin.diagnosis.sentence import sentence
 
 
@@ -33,6 +34,7 @@ def entry_of(d: Diagnosis) -> dict:
         },
         "networks": {},
         "sentence": sentence(d),
+        "doubts": doubts(d),
     }
 
 

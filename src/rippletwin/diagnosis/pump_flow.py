@@ -91,12 +91,14 @@ class LeakFlow:
     mean     mean flow of the healthy pump, m3/s
     slopes   (B, P, K) derivatives of `change` by P uncertain numbers of the pump, in standard
              deviations, at areas[SLOPE_NODES]
+    periodic whether every simulation behind them came to repeat itself
     """
 
     areas: np.ndarray
     change: np.ndarray
     mean: float
     slopes: np.ndarray
+    periodic: bool = True
 
     @cached_property
     def _change(self) -> CubicSpline:
@@ -157,16 +159,19 @@ def _leak_flow(
     one_piston = mean / pump["pistons"] / leak_velocity(pump, fluid, pressure)
     areas = one_piston * np.geomspace(fault.smallest, fault.largest, NODES)
 
+    periodic: list[bool] = []
+
     def change(numbers: Mapping, at: np.ndarray) -> np.ndarray:
         point = numbers, fluid, speed_rpm, pressure
-        healthy = peak_amplitudes(healthy_flow(*point).flow)
-        leaking = [peak_amplitudes(leaking_flow(*point, fault, a).flow) for a in at]
+        runs = [healthy_flow(*point), *(leaking_flow(*point, fault, a) for a in at)]
+        periodic.extend(run.converged for run in runs)
+        healthy, *leaking = (peak_amplitudes(run.flow) for run in runs)
         return (np.array(leaking) - healthy)[:, : ORDERS + 1] / at[:, None]
 
     found = change(pump, areas)
     at = areas[SLOPE_NODES]
     slopes = [change(moved, at) - found[SLOPE_NODES] for moved in _moved_pumps(pump)]
-    return LeakFlow(areas, found, float(mean), np.stack(slopes, axis=1))
+    return LeakFlow(areas, found, float(mean), np.stack(slopes, axis=1), all(periodic))
 
 
 def _moved_pumps(pump: Mapping) -> list[dict]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from rippletwin.diagnosis.diagnosis import Diagnosis
+from rippletwin.diagnosis.doubts import doubts
 
 ORDINALS = {1: "first", 2: "second", 3: "third"}
 MARGIN = 0.01  # probability of another state that is worth mentioning
@@ -25,6 +26,8 @@ def sentence(diagnosis: Diagnosis) -> str:
     text += f"; compared with {d.anchor.label}"
     if d.anchor.distance:
         text += ", which is of another operating point, so that less can be told"
+    for doubt in doubts(d):
+        text += f"; {doubt}"
     return f"{d.label}: {text}."
 
 

@@ -247,6 +247,7 @@ def _diagnosis(entry: Mapping, results: Results) -> DiagnosisCard:
             f"Something else has changed{element}"
             + (f", most at orders {orders}" if orders else "")
         )
+    facts += [f"Doubtful: {doubt}" for doubt in entry.get("doubts") or ()]
     networks = [
         f"{name}: {name_state(said['state'])}, {write_share(said['share'])} of windows and seeds"
         for name, said in (entry.get("networks") or {}).items()

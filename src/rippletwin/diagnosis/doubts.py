@@ -1,0 +1,24 @@
+"""What speaks against trusting a diagnosis's numbers, in words: nothing of that passes silently."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rippletwin.diagnosis.diagnosis import Diagnosis
+
+NEGLIGIBLE = -2.0  # log density at an end, below the greatest, from which the end does not matter
+
+
+def doubts(d: Diagnosis) -> list[str]:
+    """Half sentences, each a reason for doubt; none where the diagnosis may be taken as it is."""
+    found = []
+    if not all(flow.periodic for flow in d.model.flows.values()):
+        found.append("the simulated pump did not settle into a periodic ripple")
+    for name in d.severities:
+        density = d.best.areas[name].log_density
+        low, high = (density[end] - np.max(density) > NEGLIGIBLE for end in (0, -1))
+        if low:
+            found.append(f"the {name} leak may be smaller than any that was tried")
+        if high:
+            found.append(f"the {name} leak may be larger than any that was tried")
+    return found

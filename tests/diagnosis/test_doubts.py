@@ -1,0 +1,62 @@
+"""Numbers that cannot be trusted are told: in diagnosis.json, and so on the page."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import leaking_pump
+from rippletwin.diagnosis import pump_flow
+from rippletwin.diagnosis.doubts import doubts
+from rippletwin.diagnosis.faults.library import FAULTS
+
+
+def diagnosis(log_density, periodic=True):
+    """Of one slipper, with the log density of its leak area on a grid."""
+    return SimpleNamespace(
+        model=SimpleNamespace(flows={"slipper": SimpleNamespace(periodic=periodic)}),
+        severities={"slipper": None},
+        best=SimpleNamespace(areas={"slipper": SimpleNamespace(log_density=log_density)}),
+    )
+
+
+GRID = np.linspace(-1.0, 1.0, 41)
+
+
+@pytest.mark.parametrize(
+    ("middle", "width", "words"),
+    [
+        (0.0, 0.2, []),
+        (0.95, 0.2, ["larger than any that was tried"]),
+        (-0.95, 0.2, ["smaller than any that was tried"]),
+        (0.0, 2.0, ["smaller than", "larger than"]),
+    ],
+    ids=["inside", "at the upper end", "at the lower end", "everywhere"],
+)
+def test_a_leak_at_the_end_of_what_was_tried(middle, width, words):
+    """A posterior that the grid cuts off says so; one that ends within it says nothing."""
+    found = doubts(diagnosis(-0.5 * ((GRID - middle) / width) ** 2))
+    assert len(found) == len(words)
+    assert all(word in text for word, text in zip(words, found))
+
+
+def test_a_pump_that_does_not_become_periodic(monkeypatch):
+    """One simulation of a leak that stops before it repeats itself marks the fault's flows, and
+    with them the diagnosis."""
+    for kept in (pump_flow._simulated, pump_flow._leak_flow):
+        kept.cache_clear()
+    simulate = pump_flow.simulate
+    done = []
+
+    def cut_short(*arguments, **options):
+        done.append(simulate(*arguments, **options))
+        return replace(done[-1], converged=len(done) != 3)
+
+    monkeypatch.setattr(pump_flow, "simulate", cut_short)
+    point = leaking_pump.SHEET, leaking_pump.OIL, leaking_pump.SPEED, leaking_pump.LOAD
+    flow = pump_flow.leak_flow(*point, FAULTS["slipper"])
+    for kept in (pump_flow._simulated, pump_flow._leak_flow):
+        kept.cache_clear()
+    assert len(done) > 3 and all(run.converged for run in done) and not flow.periodic
+    assert "periodic" in doubts(diagnosis(-8.0 * GRID**2, flow.periodic))[0]
