@@ -144,7 +144,11 @@ class DifferentiableForward(ForwardModel):
         if not np.array_equal(self._frozen_at, theta):
             self(theta)
 
-    def _balance(self, network, theta):
+    @property
+    def _orifice_is_exact(self):
+        return not (self._freeze or self.freeze_compliance) and super()._orifice_is_exact
+
+    def _balance(self, network, theta, whole):
         factor = self.twin.load_factor(theta)
         if self._freeze:
             self._set_frozen_outflows(network)
@@ -157,7 +161,7 @@ class DifferentiableForward(ForwardModel):
             self._set_frozen_outflows(network)
             self._balance_load(network, theta)
         else:
-            super()._balance(network, theta)
+            super()._balance(network, theta, whole)
         if network.outflows is not None:
             positions, outflow = network.outflows
             self._outflows = positions / network.length, outflow

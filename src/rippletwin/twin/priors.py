@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,6 +51,31 @@ class Prior:
         if self.kind == "bounded":
             return np.arctanh(np.clip(x, -MAX_BOUNDED, MAX_BOUNDED)) / self.scale
         return ndtri(np.clip((x - self.centre) / self.scale, 1e-3, 1 - 1e-3))
+
+
+class Priors:
+    """Several priors at once."""
+
+    def __init__(self, priors: Sequence[Prior]):
+        self._kinds = [
+            (kind, np.array([k for k, p in enumerate(priors) if p.kind == kind]))
+            for kind in dict.fromkeys(p.kind for p in priors)
+        ]
+        self._alike = [
+            Prior(kind, *(np.array([getattr(priors[k], name) for k in own]) for name in _NUMBERS))
+            for kind, own in self._kinds
+        ]
+        self._count = len(priors)
+
+    def value(self, u: np.ndarray) -> np.ndarray:
+        """Parameters (P,) at coordinates u (P,)."""
+        values = np.empty(self._count)
+        for (_, own), prior in zip(self._kinds, self._alike):
+            values[own] = prior.value(u[own])
+        return values
+
+
+_NUMBERS = "centre", "scale"
 
 
 def normal(mean: float, deviation: float) -> Prior:

@@ -9,25 +9,19 @@ from rippletwin.twin.effects.base import Effect, line_place
 
 
 def friction_excess(s, viscosity, diameter, density):
-    """Z'_unsteady - Z'_steady, Pa s/m4, broadcast over a batch of viscosities and diameters.
-
-    Bessel functions take the time: they are evaluated once for each distinct nu/R^2 of the batch.
-    """
+    """Z'_unsteady - Z'_steady, Pa s/m4; all arguments broadcast."""
     rate = 4.0 * viscosity / diameter**2
-    if np.ndim(rate):
-        distinct, inverse = np.unique(rate, return_inverse=True)
-        excess = np.stack([nu * (scaled_friction(s / nu) - 8.0) - s for nu in distinct])
-        excess = excess[np.ravel(inverse)]
-    else:
-        excess = rate * (scaled_friction(s / rate) - 8.0) - s
-    return excess * density / (0.25 * np.pi * diameter**2)
+    excess = rate * (scaled_friction(s / rate) - 8.0) - s
+    return excess * (density / (0.25 * np.pi)) / diameter**2
 
 
 def _apply(network, state, values, place):
-    for k, diameter in enumerate(state.diameters):
-        network.series[k] = network.series[k] + friction_excess(
-            network.s, state.viscosity, diameter, state.density
-        )
+    diameters = np.asarray(state.diameters)
+    if diameters.ndim == 1:
+        diameters = diameters[:, None]
+    network.series = network.series + friction_excess(
+        network.s, state.viscosity, diameters, state.density
+    )
 
 
 def _apply_in_time(line, state, values, place):
