@@ -12,10 +12,14 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.special import expit, log_expit, logit
 
+from concealed.summary import Rate, rate_of
+
 FALSE_ALARMS = 0.05
 SLOPE_SD = 10.0  # of the penalty: standard deviation of the slope a decade of severity
 FOUND = (0.5, 0.9)  # probabilities of detection at which a severity is called the smallest found
 RESAMPLED = 200
+LEAST_CHANGE = 1e-3  # smaller changes are shown here
+BINS = 6  # of equally many recordings each, in which shares are shown beside a curve
 
 
 class DetectionCurve(NamedTuple):
@@ -30,6 +34,43 @@ class DetectionCurve(NamedTuple):
     def severity(self, probability: float) -> float:
         """The severity that is detected with this probability."""
         return float(10 ** (self.middle + logit(probability) / self.slope))
+
+
+class Leaks(NamedTuple):
+    """Recordings of one fault: the ripple's relative change (N,), which raise the alarm (N,)."""
+
+    change: np.ndarray
+    hit: np.ndarray
+
+
+def detect_leaks(rows: Sequence[dict], state: str) -> Leaks:
+    """The recordings of a state among rows of one column, and which of them raise the alarm that
+    at most FALSE_ALARMS of the healthy ones raise; none does where no healthy one is there."""
+    healthy = [row["suspicion"] for row in rows if row["state"] == "healthy"]
+    threshold = alarm_threshold(healthy) if healthy else np.inf
+    chosen = [row for row in rows if row["state"] == state]
+    return Leaks(
+        np.array([max(row["change"], LEAST_CHANGE) for row in chosen]),
+        np.array([row["suspicion"] > threshold for row in chosen], bool),
+    )
+
+
+class BinShare(NamedTuple):
+    """Share detected of neighbouring severities, with its exact 95 % interval."""
+
+    severity: float
+    rate: Rate
+
+
+def shares_in_bins(severity: np.ndarray, hit: np.ndarray) -> list[BinShare]:
+    """Shares detected in bins of about equally many recordings, each at its geometric mean."""
+    if not len(severity):
+        return []
+    parts = np.array_split(np.argsort(severity), min(BINS, len(severity)))
+    return [
+        BinShare(float(np.exp(np.mean(np.log(severity[part])))), rate_of(hit[part]))
+        for part in parts
+    ]
 
 
 def alarm_threshold(healthy: Sequence[float], share: float = FALSE_ALARMS) -> float:

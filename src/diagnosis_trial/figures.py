@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from concealed.summary import rate_of
 from diagnosis_trial import detection
 from diagnosis_trial.summary import (
     ANSWERS,
@@ -21,8 +20,6 @@ from diagnosis_trial.summary import (
 from rippletwin.figures import style
 
 LOOK = {"slipper": (style.CALIBRATED, "o"), "cylinder": (style.ALARM, "s")}
-LEAST_CHANGE = 1e-3  # smaller changes are drawn here
-BINS = 6  # of equally many recordings each, in which shares are drawn beside a curve
 
 
 def draw_figures(rows: list[dict], folder: str | Path, suffix: str = ".png") -> list[Path]:
@@ -50,12 +47,7 @@ def draw_detection(columns: dict[str, list[dict]]) -> Figure:
     fig, axes = style.figure(1, len(SINGLE), height=2.8, sharey=True)
     for ax, state in zip(axes[0], SINGLE, strict=True):
         for k, (column, rows) in enumerate(columns.items()):
-            healthy = [row["suspicion"] for row in rows if row["state"] == "healthy"]
-            threshold = detection.alarm_threshold(healthy) if healthy else np.inf
-            chosen = [row for row in rows if row["state"] == state]
-            hit = np.array([row["suspicion"] > threshold for row in chosen])
-            change = np.array([max(row["change"], LEAST_CHANGE) for row in chosen])
-            _draw_curve(ax, change, hit, column, k)
+            _draw_curve(ax, *detection.detect_leaks(rows, state), column, k)
         ax.set_xlabel(f"relative change of the ripple by a {state}'s leak")
     axes[0, 0].set_ylabel("probability of detection")
     axes[0, 0].set_ylim(-0.12, 1.12)
@@ -74,11 +66,9 @@ def _draw_curve(ax, severity, hit, label: str, rank: int) -> None:
     if curve is not None:
         grid = np.geomspace(severity.min(), severity.max(), 200)
         ax.plot(grid, curve.probability(grid), dash, color=colour)
-    order = np.argsort(severity)
-    for k, part in enumerate(np.array_split(order, min(BINS, len(order)))):
-        rate = rate_of(hit[part])
+    for k, (middle, rate) in enumerate(detection.shares_in_bins(severity, hit)):
         low, high = rate.interval
-        x = np.exp(np.mean(np.log(severity[part])) + 0.03 * rank)  # intervals beside each other
+        x = middle * np.exp(0.03 * rank)  # intervals beside each other
         spread = [[rate.share - low], [high - rate.share]]
         ax.errorbar(x, rate.share, spread, fmt=marker, color=colour, ms=4, capsize=2, lw=0.8,
                     label=label if k == 0 else None)  # fmt: skip

@@ -1,4 +1,4 @@
-"""xarray datasets in zarr stores that are either whole or not there."""
+"""Files that are either whole or not there: xarray datasets in zarr stores, and text."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ import os
 import shutil
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import xarray as xr
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def save(dataset: xr.Dataset, path: str | Path, compressed: bool = True) -> None:
@@ -39,4 +41,20 @@ def load(path: str | Path) -> xr.Dataset:
     path = Path(path)
     if not path.is_dir():
         raise FileNotFoundError(f"no store at {path}")
+    import xarray as xr
+
     return xr.open_zarr(path, chunks=None, consolidated=False)
+
+
+def write_text(path: str | Path, text: str) -> Path:
+    """Write a text file (UTF-8), whole or not at all, replacing what is there; its folder is made
+    where needed. Returns its path."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{os.getpid()}.new")
+    try:
+        temporary.write_text(text, encoding="utf-8")
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return path

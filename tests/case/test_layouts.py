@@ -248,9 +248,10 @@ DUCT = MEASURED / "duct_six_microphones" / "empty.h5"
 
 
 @pytest.mark.skipif(not DUCT.exists(), reason="no measurements beside the repository")
-def test_the_measured_duct_is_read_by_rig_yaml_alone(tmp_path):
+def test_the_measured_duct_is_read_by_rig_yaml_alone(tmp_path, monkeypatch):
     """Six microphones of the recorder's own file, unconverted: the file's own samples."""
     shutil.copy(ROOT / "resources" / "duct" / "rig.yaml", tmp_path)
+    monkeypatch.setenv("RIPPLETWIN_DATA", str(DUCT.parent))
     (tmp_path / "empty.h5").symlink_to(DUCT)
     (recording,) = load_case(tmp_path).recordings
     with h5py.File(DUCT) as file:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import leaking_pump
+from rippletwin.diagnosis.diagnosed_numbers import gather
 from rippletwin.diagnosis.diagnoser import Diagnoser
 from rippletwin.diagnosis.diagnosis_file import diagnosis_dict
 from rippletwin.diagnosis.evidence import ErrorPrior
@@ -183,6 +184,7 @@ def test_the_file_has_the_contract_s_keys(diagnoses):
 def test_both_pictures_of_every_state_are_written(diagnoses, tmp_path):
     """Also of a recording that is unlike all states, and of the healthy one, which has no leak;
     and the numbers behind them."""
-    written = fault_posterior.draw(list(diagnoses.values()), tmp_path, [".svg"])
+    numbers = [gather(each) for each in diagnoses.values()]
+    written = fault_posterior.draw(numbers, tmp_path, [".svg"])
     assert len(written) == 2 * len(STATES) + 1
     assert all(path.stat().st_size > 1000 for path in written)

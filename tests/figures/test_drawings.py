@@ -7,7 +7,8 @@ import pytest
 from matplotlib.text import Text
 
 from made_results import AMPLITUDES, ORDERS, made_change, made_numbers
-from rippletwin.figures import diagnosed_numbers, explained_numbers
+from rippletwin.diagnosis import diagnosed_numbers
+from rippletwin.figures import explained_numbers
 from rippletwin.figures.explained_ripple import curve, plot_residuals, plot_ripple
 from rippletwin.figures.explained_search import plot_evidence, plot_immittance
 from rippletwin.figures.fault_posterior import plot_change, plot_severity

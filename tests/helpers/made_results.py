@@ -9,8 +9,9 @@ import numpy as np
 
 from case_folders import ripple, sheet, write_case, write_hdf5
 from rippletwin.case.load import load_case
-from rippletwin.figures import diagnosed_numbers, explained_numbers
-from rippletwin.figures.diagnosed_numbers import DiagnosedNumbers, Leak
+from rippletwin.diagnosis import diagnosed_numbers
+from rippletwin.diagnosis.diagnosed_numbers import DiagnosedNumbers, Leak
+from rippletwin.figures import explained_numbers
 from rippletwin.figures.explained_numbers import (
     Candidate,
     ExplainedNumbers,

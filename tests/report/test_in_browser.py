@@ -10,7 +10,10 @@ import shutil
 
 import pytest
 
+from diagnosed_rigs import made_rows
+from diagnosis_trial.population_charts import chart_population
 from made_results import HOSTILE, write_results
+from rippletwin.report.content import WorkflowPart
 from rippletwin.report.page import write_report
 from rippletwin.report.results import read_results
 
@@ -28,7 +31,8 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium t
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
     folder = write_results(tmp_path_factory.mktemp("case"))
-    return write_report(read_results(folder), folder / "report.html")
+    workflow = WorkflowPart(population=chart_population(made_rows()))
+    return write_report(read_results(folder), folder / "report.html", workflow)
 
 
 @pytest.fixture(scope="module")
@@ -64,8 +68,8 @@ def test_every_figure_is_visible_and_nothing_is_complained_of(browser, report, w
     of the page, and every chart as large as a reader needs."""
     page, heard = browser(report, width)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
-    boxes = [chart.bounding_box() for chart in page.query_selector_all("svg.chart")]
-    assert len(boxes) >= 8
+    boxes = [chart.bounding_box() for chart in page.query_selector_all("svg.chart, svg.matrix")]
+    assert len(boxes) >= 11
     assert all(b["width"] >= 250 and b["height"] >= 140 for b in boxes), boxes
     assert all(b["x"] >= 0 and b["x"] + b["width"] <= width for b in boxes)
     lines = [line for line in page.query_selector_all("svg.line-picture") if line.is_visible()]
@@ -78,7 +82,7 @@ def test_texts_of_the_line_and_of_charts_are_not_cut_off(browser, report, width)
     """Every text of a drawing lies within the drawing."""
     page, _ = browser(report, width)
     cut_off = page.evaluate(
-        """() => Array.from(document.querySelectorAll("svg.chart, svg.line-picture"))
+        """() => Array.from(document.querySelectorAll("svg.chart, svg.matrix, svg.line-picture"))
         .filter((svg) => svg.getBoundingClientRect().width > 0)
         .flatMap((svg) => {
           const box = svg.getBoundingClientRect();
@@ -108,6 +112,16 @@ def test_the_pointer_shows_values(browser, report):
     assert "shaft angle" in said and "measured" in said and "bar" in said
     page.hover("h1")
     assert page.inner_text("#ripples .readout >> nth=0") == ""
+
+
+def test_the_pointer_finds_its_place_on_a_logarithmic_axis(browser, report):
+    """Where 0.445 of the axis of changes from 0.316 to 56.2 % are passed, in the middle of the
+    picture, the change is 0.316 (56.2 / 0.316)^0.445 = 3.2 %."""
+    page, _ = browser(report)
+    page.locator("#population svg.chart").first.hover()
+    said = page.inner_text("#population .readout >> nth=0")
+    number = float(said.split("% ")[1].split(":")[0])
+    assert said.startswith("change of the ripple %") and 3.0 < number < 3.4
 
 
 def test_the_keyboard_shows_values(browser, report):

@@ -16,8 +16,11 @@ from rippletwin.twin.propagation import propagate
 from rippletwin.twin.time_domain_form import MAX_FIT_ERROR
 from two_domains import ORDERS, PRESSURE, SPEED_HZ, STEPS, corrected, misfit, rig, ripple
 
-BEYOND = ("entrained_air", "unsteady_friction", "load_dynamics-load (spool)", "leak")
-"""Nonlinear, a change of Z' along the line or of the mean flow: these need a form of their own."""
+BEYOND = (
+    "entrained_air", "unsteady_friction", "load_dynamics-load (spool)", "leak", "passive_piece",
+)  # fmt: skip
+"""Nonlinear, a change of Z' along the line, of the mean flow, or a two-port that takes a stretch of
+the line away: these need a form of their own."""
 S = 2j * np.pi * np.linspace(20.0, 5500.0, 400)
 
 

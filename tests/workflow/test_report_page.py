@@ -5,13 +5,14 @@ import json
 import pandas as pd
 from PIL import Image
 
+from diagnosed_rigs import made_rows
 from made_results import write_results
 from run_script import run_script
 
 
 def test_the_page_has_what_only_a_workflow_knows(tmp_path):
     """Mean and deviation over two seeds by hand, the paper's beside; seconds summed over jobs; the
-    picture inside the page."""
+    picture inside the page; of a trial of ten rigs, how many blocked ports were called what."""
     case = tmp_path / "made"
     case.mkdir()
     write_results(case)
@@ -26,6 +27,7 @@ def test_the_page_has_what_only_a_workflow_knows(tmp_path):
     for name, seconds in (("one", "20.5"), ("two", "10.5")):
         (benchmarks / f"{name}.tsv").write_text(f"s\tmax_rss\n{seconds}\t300.0\n")
     (benchmarks / "short.tsv").write_text("s\tmax_rss\n0.01\t-\n")
+    (tmp_path / "rows.json").write_text(json.dumps(made_rows()))
     Image.new("RGB", (4, 4)).save(tmp_path / "attention.png")
     said = {"run 7": {"cnn1d_3_1": {"state": "cylinder", "share": 0.875, "unlike": 0.0625}}}
     (tmp_path / "networks.json").write_text(json.dumps(said))
@@ -37,6 +39,7 @@ def test_the_page_has_what_only_a_workflow_knows(tmp_path):
         params={
             "recordings": "the virtual rig's",
             "benchmarks": str(tmp_path / "benchmarks"),
+            "population": [str(tmp_path / "rows.json"), "digest"],
             "configuration": {"seeds": 2, "case": "<virtualrig>"},
         },
         rig=str(case / "rig.yaml"),
@@ -57,5 +60,7 @@ def test_the_page_has_what_only_a_workflow_knows(tmp_path):
         "data:image/png;base64,",
         "case: &lt;virtualrig&gt;",
         "Missing physics found and named",
+        "60 recordings of 10 virtual rigs",
+        "blocked port: cylinder 5, unlike 5",
     ):
         assert words in page, words

@@ -44,6 +44,18 @@ def test_nothing_runs_after_a_finished_run(workflow):
     assert planned(workflow)[0] == set()
 
 
+def test_a_scored_trial_reruns_the_page_only(workflow):
+    """The page shows a trial that lies in the results folder, and again when its scores change; it
+    never starts one."""
+    rows = workflow / "out/diagnosis_trial/rows.json"
+    rows.parent.mkdir()
+    for content in ("[]", "[1]"):
+        rows.write_text(content)
+        assert planned(workflow)[0] == {"report_page"}
+        assert snakemake(workflow).returncode == 0
+        assert planned(workflow)[0] == set()
+
+
 def test_training_key_reruns_training_only(workflow):
     """learning_rate reaches no rule before `train`, but that needs its temporary inputs again."""
     edit(workflow / "config/config.yaml", "learning_rate: 0.003", "learning_rate: 0.002")

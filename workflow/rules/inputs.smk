@@ -1,4 +1,6 @@
 # What a rule's wildcards stand for: input files, parameters, and the files of a whole run.
+from hashlib import sha256
+
 from rippletwin.learning.architectures import LONGEST_TRAININGS
 
 # ---- what a whole run makes ----
@@ -176,6 +178,14 @@ def cylinder_class_of(wildcards):
 
 
 # ---- tables ----
+
+
+def scored_population():
+    """The scored recordings of a diagnosis trial in the results folder and a digest of them, none
+    where there is no trial. The page shows them and never starts a trial: they are no input.
+    """
+    rows = Path(f"{RESULTS}/diagnosis_trial/rows.json")
+    return [str(rows), sha256(rows.read_bytes()).hexdigest()] if rows.exists() else []
 
 
 def shown_attention():

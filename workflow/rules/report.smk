@@ -121,6 +121,7 @@ rule report_page:
         rig=rig_content(*RIG_SECTIONS, recordings="all"),
         recordings="the virtual rig's" if RECORDED_HERE else f"those of {CASE}",
         benchmarks=f"{RESULTS}/benchmarks",
+        population=scored_population(),
         configuration=config,
     script:
         "../scripts/report_page.py"

@@ -8,6 +8,7 @@ from rippletwin.case.diagnosed_point import unknown_recordings
 from rippletwin.case.load import load_case, unread_recordings
 from rippletwin.case.rig_yaml import read_sheet
 from rippletwin.diagnosis.network_answers import ask_networks, read_networks
+from rippletwin.learning.markdown import markdown_table
 
 report_progress = open_log(snakemake)
 rig = Path(snakemake.input.rig)
@@ -16,8 +17,7 @@ case = load_case(rig.parent, labels=labels)
 networks = read_networks(snakemake.input.networks, case.rig)
 answers = ask_networks(networks, case.recordings, case.rig)
 Path(snakemake.output.answers).write_text(json.dumps(answers, indent=1) + "\n")
-lines = [["Recording", "Network", "state", "share", "unlike"], ["---"] * 5]
-lines += [
+lines = [
     [label, name, said["state"], f"{100 * said['share']:.0f}", f"{100 * said['unlike']:.0f}"]
     for label, answer in answers.items()
     for name, said in answer.items()
@@ -29,6 +29,6 @@ The state that most windows and seeds of a network say, and their share, per cen
 unlike everything simulated. A recording is called unlike where most of its windows are.
 
 """
-    + "".join("| " + " | ".join(line) + " |\n" for line in lines)
+    + markdown_table(["Recording", "Network", "state", "share", "unlike"], lines)
 )
 report_progress(f"{len(answers)} recordings, {len(networks)} networks")

@@ -4,24 +4,30 @@ from pathlib import Path
 
 from job import open_log
 from rippletwin.case.load import load_case
-from rippletwin.diagnosis.diagnose import diagnose, select_recordings
+from rippletwin.case.plausibility import warn_of_pump
+from rippletwin.diagnosis.diagnose import select_recordings
 from rippletwin.diagnosis.diagnosis_file import write_diagnosis
 from rippletwin.diagnosis.faults.library import select_faults
+from rippletwin.diagnosis.kept_answers import diagnose_changed
 from rippletwin.figures.fault_posterior import draw
 from rippletwin.twin.twin_file import load_twin
 
 report_progress = open_log(snakemake)
 case = load_case(Path(snakemake.input.rig).parent)
 labels = [r.label for r in case.recordings if r.state != "healthy" and r.kind == "periodic"]
-diagnoses = diagnose(
+folder = Path(snakemake.output.diagnosis).parent
+twin = load_twin(snakemake.input.twin, snakemake.input.effects)
+answers = diagnose_changed(
     case,
-    load_twin(snakemake.input.twin, snakemake.input.effects),
+    twin,
     select_recordings(case, labels),
     select_faults(snakemake.params.faults),
+    folder,
     lambda what, done, total: report_progress(f"{what}: {done} of {total}"),
 )
-folder = Path(snakemake.output.diagnosis).parent
-result = write_diagnosis(diagnoses, folder)
-draw(diagnoses, folder)
+warnings = dict.fromkeys([*case.warnings, *warn_of_pump(twin.rig.pump)])
+result = write_diagnosis([each.entry for each in answers], folder, warnings=list(warnings))
+draw([each.numbers for each in answers], folder)
+report_progress(f"{sum(each.kept for each in answers)} of {len(answers)} answers were kept")
 for each in result["recordings"]:
     report_progress(each["sentence"])

@@ -7,6 +7,7 @@ from pathlib import Path
 import pandas as pd
 import yaml
 
+from diagnosis_trial.population_charts import chart_population
 from job import open_log
 from rippletwin.learning.accuracy import summarise
 from rippletwin.learning.architectures import ARCHITECTURES
@@ -33,11 +34,15 @@ tables = [
     *([accuracy_table(rows, theirs)] if rows else []),
     timing_table(params.benchmarks),
 ]
+population = None
+if params.population:
+    population = chart_population(json.loads(Path(params.population[0]).read_text()))
 workflow = WorkflowPart(
     tables=tables,
     pictures=pictures,
     notes=[f"The recordings are {params.recordings}."],
     configuration=yaml.safe_dump(params.configuration, sort_keys=False),
+    population=population,
 )
 results = read_results(
     Path(paths.rig).parent,

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -122,13 +122,13 @@ def implausible_values(path: Path, sheet: dict) -> list[InputError]:
 def unusual_values(path: Path, sheet: dict) -> list[str]:
     """A line of text for every value of a sheet that is possible, but unusual, or is missed."""
     values = [warning for _, found in _compared(path, sheet) for warning in found]
-    return values + _generic_pump(sheet)
-
-
-def _generic_pump(sheet: dict) -> list[str]:
-    """The warning of a sheet that gives no more of its pump than the number of pistons."""
     kinds = {entry.get("kind", "periodic") for entry in entries(sheet, "recordings")}
-    if "periodic" not in kinds or set(mapping(sheet, "pump")) - {"pistons"}:
+    return values + (warn_of_pump(mapping(sheet, "pump")) if "periodic" in kinds else [])
+
+
+def warn_of_pump(pump: Mapping) -> list[str]:
+    """The warning of a pump of which no more is given than the number of pistons."""
+    if {key for key, value in pump.items() if value is not None} - {"pistons"}:
         return []
     return [
         "pump: only pistons is given, so that faults are those of a generic pump of 42 cm3 per "

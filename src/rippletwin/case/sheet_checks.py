@@ -7,6 +7,7 @@ looks only at values of the right type.
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from rippletwin.errors import InputError, printable
 
 LONGEST_LABEL = 100
 FORBIDDEN_IN_LABELS = "/\\"  # labels name files of results
+DATA_FOLDERS = "RIPPLETWIN_DATA"  # environment variable: folders besides a case's to read from
 SAME_PLACE = 1e-3  # m; closer together two sensors are one
 
 
@@ -170,7 +172,8 @@ def _label_errors(path: Path, sheet: dict) -> Iterator[InputError]:
 
 
 def missing_files(path: Path, sheet: dict) -> list[InputError]:
-    """An error for every file that a sheet names and that is not there."""
+    """An error for every file that a sheet names and that is not there, or is not to be read: a
+    case comes from anybody, so its files lie in its folder, or in a folder of DATA_FOLDERS."""
     named = [("load.impedance", mapping(sheet, "load").get("impedance"))]
     for index, entry in enumerate(entries(sheet, "recordings")):
         field, repeats = f"recordings[{index}]", entry.get("repeats")
@@ -182,9 +185,21 @@ def missing_files(path: Path, sheet: dict) -> list[InputError]:
     ]
 
 
+def _folders_to_read(case: Path) -> list[Path]:
+    """The case's folder and those that the user allows, links followed."""
+    allowed = os.environ.get(DATA_FOLDERS, "").split(os.pathsep)
+    return [case.resolve(), *(Path(each).resolve() for each in allowed if each)]
+
+
 def _missing(path: Path, field: str, name: str) -> Iterator[InputError]:
     remedy = "Correct the name (relative to rig.yaml) or add the file"
     try:
+        real = (path.parent / name).resolve()
+        if not any(real.is_relative_to(folder) for folder in _folders_to_read(path.parent)):
+            problem = f"{printable(name, 80)} leads out of the folder of rig.yaml"
+            remedy = f"Copy the file into it, or allow its folder: {DATA_FOLDERS}=FOLDER"
+            yield InputError(path, field, problem, remedy)
+            return
         if (path.parent / name).is_file():
             return
         folder = (path.parent / name).is_dir()

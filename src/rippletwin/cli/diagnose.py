@@ -67,12 +67,18 @@ def command(
     no_figures: bool,
     fail_on: tuple[str, ...],
 ) -> int:
-    """Say what is wrong with the pump in recordings of the folder CASE; write diagnosis.json."""
+    """Say what is wrong with the pump in recordings of the folder CASE; write diagnosis.json.
+
+    Answers of an earlier call with the same --out are kept where nothing that they were made from
+    has changed.
+    """
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     from rippletwin.case.load import load_case
-    from rippletwin.diagnosis.diagnose import diagnose, select_recordings
+    from rippletwin.case.plausibility import warn_of_pump
+    from rippletwin.diagnosis.diagnose import select_recordings
     from rippletwin.diagnosis.diagnosis_file import write_diagnosis
     from rippletwin.diagnosis.faults.library import select_faults
+    from rippletwin.diagnosis.kept_answers import diagnose_changed
     from rippletwin.twin.effects.library import add_effects
 
     faults = select_faults(list(fault_names))
@@ -84,12 +90,14 @@ def command(
     networks = _networks_of(results, read)
     with progress_bars(as_json) as progress:
         twin = _twin_of(twin_file, out, processes, read, recordings, progress)
-        found = diagnose(read, twin, recordings, faults, progress)
-    result = write_diagnosis(found, out, _answers(networks, recordings, read))
+        found = diagnose_changed(read, twin, recordings, faults, out, progress)
+    warnings = dict.fromkeys([*read.warnings, *warn_of_pump(twin.rig.pump)])
+    entries = [each.entry for each in found]
+    result = write_diagnosis(entries, out, _answers(networks, recordings, read), list(warnings))
     if not no_figures:
         from rippletwin.figures.fault_posterior import draw
 
-        draw(found, out)
+        draw([each.numbers for each in found], out)
     if as_json:
         print(json.dumps(result))
     else:

@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 from rippletwin.calibration.likelihood import Likelihood
 from rippletwin.calibration.misfit import misfit
 from rippletwin.calibration.shaft_angles import fit_shaft_angles
-from rippletwin.case.model import Case, Recording
+from rippletwin.case.model import Case, Recording, Rig
 from rippletwin.diagnosis.anchor import distance
 from rippletwin.diagnosis.diagnoser import MOST_REPEATS, Diagnoser
 from rippletwin.diagnosis.diagnosis import Diagnosis
@@ -21,7 +21,7 @@ from rippletwin.diagnosis.pump_calibration import calibrate_pump, one_each_point
 from rippletwin.diagnosis.pump_flow import with_fitted_pump
 from rippletwin.errors import InputError
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
-from rippletwin.spectra.observation import observe, revolutions_of
+from rippletwin.spectra.observation import Observation, observe, revolutions_of
 from rippletwin.twin.twin import Twin
 
 HIGHEST_HZ = 4000.0
@@ -52,32 +52,60 @@ def diagnose(
     """
     recordings = select_recordings(case) if recordings is None else recordings
     faults = select_faults() if faults is None else faults
-    _check_twin(case, twin)
-    healthy = {r.label: _anchors(case, r)[: 1 + MOST_REPEATS] for r in recordings}
-    read, found = {}, []
+    check_twin(case, twin)
+    anchors = {r.label: find_anchors(case, r) for r in recordings}
+    read, found = ReadOnce(case.rig), []
     with threadpool_limits(1):
         if recalibrate:
-            beside = [r for r in case.healthy if r.kind == "periodic" and r not in recordings]
-            for each in beside:
-                read[each.label] = _read(each, case.rig)
-            healthy_ones = [read[each.label][0] for each in beside]
-            other = calibrate_line(twin, healthy_ones)
-            other = calibrate_pump(other, one_each_point(healthy_ones))
-            # A twin that is right already would only lose what its line owes to the ripple.
-            twin = min((twin, other), key=lambda each: healthy_misfit(each, healthy_ones))
+            twin = recalibrate_twin(twin, healthy_beside(case, recordings), read)
         diagnoser = Diagnoser(twin, faults, anchored)
         for k, recording in enumerate(recordings):
             if progress:
                 progress("diagnosing", k, len(recordings))
-            for each in (recording, *healthy[recording.label]):
-                if each.label not in read:
-                    read[each.label] = _read(each, case.rig)
-            observation, start = read[recording.label]
-            beside = [read[each.label][0] for each in healthy[recording.label]]
-            found.append(diagnoser(observation, beside, start))
+            found.append(diagnose_one(diagnoser, recording, anchors[recording.label], read))
     if progress:
         progress("diagnosing", len(recordings), len(recordings))
     return found
+
+
+class ReadOnce:
+    """Observations of recordings, each made once. Called with a recording it returns its
+    observation, and how far, in revolutions, the shaft turns from its first sample to where the
+    observation's shaft angle counts from."""
+
+    def __init__(self, rig: Rig):
+        self._rig = rig
+        self._read: dict[str, tuple[Observation, float]] = {}
+
+    def __call__(self, recording: Recording) -> tuple[Observation, float]:
+        if recording.label not in self._read:
+            revolutions = revolutions_of(recording, self._rig)
+            observation = observe(recording, self._rig, HIGHEST_HZ, revolutions=revolutions)
+            self._read[recording.label] = observation, revolutions.start
+        return self._read[recording.label]
+
+
+def healthy_beside(case: Case, recordings: Sequence[Recording]) -> list[Recording]:
+    """Healthy periodic recordings that are not among `recordings`."""
+    return [r for r in case.healthy if r.kind == "periodic" and r not in recordings]
+
+
+def recalibrate_twin(twin: Twin, healthy: Sequence[Recording], read: ReadOnce) -> Twin:
+    """The twin with line and pump fitted to healthy recordings as `calibrate_line` and
+    `calibrate_pump` do, or as it is: whichever leaves less of the healthy ripples."""
+    observations = [read(each)[0] for each in healthy]
+    other = calibrate_line(twin, observations)
+    other = calibrate_pump(other, one_each_point(observations))
+    # A twin that is right already would only lose what its line owes to the ripple.
+    return min((twin, other), key=lambda each: healthy_misfit(each, observations))
+
+
+def diagnose_one(
+    diagnoser: Diagnoser, recording: Recording, anchors: Sequence[Recording], read: ReadOnce
+) -> Diagnosis:
+    """The diagnosis of a recording, anchored to the first of `anchors`."""
+    observation, start = read(recording)
+    return diagnoser(observation, [read(each)[0] for each in anchors], start)
 
 
 def healthy_misfit(twin: Twin, observations: Sequence) -> float:
@@ -132,8 +160,9 @@ def select_recordings(case: Case, labels: Sequence[str] = ()) -> list[Recording]
     return chosen
 
 
-def _anchors(case: Case, recording: Recording) -> list[Recording]:
-    """The healthy recording whose operating point is nearest, and others of the same point."""
+def find_anchors(case: Case, recording: Recording) -> list[Recording]:
+    """The healthy recording whose operating point is nearest, and others of the same point: as many
+    as `Diagnoser` looks at. Raises InputError where there is none."""
 
     def apart(other: Recording) -> float:
         return distance(
@@ -149,17 +178,11 @@ def _anchors(case: Case, recording: Recording) -> list[Recording]:
             "Diagnosing needs one, best of the same operating point",
         )
     nearest = min(map(apart, healthy))
-    return [r for r in healthy if apart(r) == nearest]
+    return [r for r in healthy if apart(r) == nearest][: 1 + MOST_REPEATS]
 
 
-def _read(recording: Recording, rig) -> tuple:
-    """The observation of a recording, and how far, in revolutions, the shaft turns from its first
-    sample to where the observation's shaft angle counts from."""
-    revolutions = revolutions_of(recording, rig)
-    return observe(recording, rig, HIGHEST_HZ, revolutions=revolutions), revolutions.start
-
-
-def _check_twin(case: Case, twin: Twin) -> None:
+def check_twin(case: Case, twin: Twin) -> None:
+    """Raise InputError where the twin is that of another rig."""
     ours, its = ([s.name for s in rig.sensors] for rig in (case.rig, twin.rig))
     if set(ours) - set(its) or "pistons" not in twin.rig.pump:
         raise InputError(

@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from rippletwin import store
 from rippletwin.diagnosis.diagnosis import Diagnosis
 from rippletwin.diagnosis.sentence import sentence
 
 
-def diagnosis_dict(
-    diagnoses: Sequence[Diagnosis], networks: Mapping[str, dict] | None = None
-) -> dict:
-    """The diagnoses as plain data, with the keys of diagnosis.json; `networks` holds what networks
-    say, by the recording's label."""
-    answers = networks or {}
-    return {"recordings": [_recording(d, answers.get(d.label, {})) for d in diagnoses]}
+def diagnosis_dict(diagnoses: Sequence[Diagnosis]) -> dict:
+    """The diagnoses as plain data, with the keys of diagnosis.json; no networks were asked."""
+    return {"recordings": [entry_of(d) for d in diagnoses]}
 
 
-def _recording(d: Diagnosis, networks: dict) -> dict:
+def entry_of(d: Diagnosis) -> dict:
+    """One recording's entry in diagnosis.json."""
     return {
         "label": d.label,
         "state": d.state,
@@ -34,23 +31,28 @@ def _recording(d: Diagnosis, networks: dict) -> dict:
             "p_value": d.unlikeness.p_value,
             "where": {"orders": list(d.unlikeness.orders), "element": d.unlikeness.element},
         },
-        "networks": networks,
+        "networks": {},
         "sentence": sentence(d),
     }
 
 
 def write_diagnosis(
-    diagnoses: Sequence[Diagnosis], folder: str | Path, networks: Mapping[str, dict] | None = None
+    entries: Sequence[Mapping],
+    folder: str | Path,
+    networks: Mapping[str, dict] | None = None,
+    warnings: Sequence[str] = (),
 ) -> dict:
-    """Write diagnosis.json into `folder` (made if needed), whole or not at all; returns it."""
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    result = diagnosis_dict(diagnoses, networks)
-    path = folder / "diagnosis.json"
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        temporary.write_text(json.dumps(result, indent=1, allow_nan=False) + "\n")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    """Write diagnosis.json into `folder` (made if needed), whole or not at all; returns it.
+
+    entries    of `entry_of`
+    networks   what networks say, by the recording's label
+    warnings   what of the data sheet the diagnoses suffer from, in plain words
+    """
+    answers = networks or {}
+    result = {
+        "recordings": [{**e, "networks": answers.get(e["label"], {})} for e in entries],
+        "warnings": list(warnings),
+    }
+    text = json.dumps(result, indent=1, allow_nan=False) + "\n"
+    store.write_text(Path(folder) / "diagnosis.json", text)
     return result

@@ -34,8 +34,13 @@ def calibrate_line(twin: Twin, healthy: Sequence) -> Twin:
         replace(o, source="free", flow_ripple=o.flow_ripple or _ripple(fitted, o))
         for o in select_fitted_frequencies(healthy, fitted.rig)
     ]
-    known = {"friction": fitted.friction, "effects": fitted.effects}
-    line = Twin(fitted.rig, free, guessed_load=fitted.guessed_load, **known)
+    line = Twin(
+        fitted.rig,
+        free,
+        friction=fitted.friction,
+        effects=fitted.effects,
+        guessed_load=fitted.guessed_load,
+    )
     found = calibrate(line, free)
     before = misfit(Likelihood(line, free, evenness=EVENNESS), fitted.theta)
     if not found.after.relative < before.relative:

@@ -116,7 +116,7 @@ class ObservationModel:
         self._waves = _cosines(self.observation.frequency_hz, CHANGE_WAVES)
         self._expected = np.hypot(MIN_CHANGE_ERROR, anchor.misfit)
         self.usual_error = min(float(np.median(self._expected)), MAX_USUAL_ERROR)
-        self._base = None
+        self._base: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
         self._undrifted = line.response()[:, : len(self.orders)]
 
     # predictions
@@ -250,7 +250,7 @@ class ObservationModel:
         predicted = np.linalg.norm(change)
         if predicted == 0.0:
             return 1.0
-        return float(min(np.linalg.norm(self.values - healthy) / predicted, MAX_SHARE))
+        return min(float(np.linalg.norm(self.values - healthy) / predicted), MAX_SHARE)
 
     def scatter_power(self, healthy: np.ndarray) -> np.ndarray:
         """Power (F,) to which the scatter of repeated healthy recordings is in proportion."""

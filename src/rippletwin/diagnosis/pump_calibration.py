@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -83,7 +84,7 @@ def calibrate_pump(twin: Twin, healthy: Sequence) -> Twin:
 
 def one_each_point(observations: Sequence, digits: int = 2) -> list:
     """The first of the observations of each operating point, to some digits."""
-    first = {}
+    first: dict[tuple[str, ...], Any] = {}
     for o in observations:
         point = tuple(f"{x or 0.0:.{digits}g}" for x in (o.speed_hz, o.load_pressure))
         first.setdefault(point, o)

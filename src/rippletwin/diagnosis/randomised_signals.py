@@ -46,12 +46,12 @@ def severity_bins(
 ) -> dict[str, tuple[float, float]]:
     """Range of leak areas, m2, of each faulty class, from those of S and C; `limit` divides the
     cylinder's. Raises ValueError where a range is empty or the limit is not inside."""
-    (low, high), slipper = severity["C"], tuple(severity["S"])
+    (low, high), (least, most) = severity["C"], severity["S"]
     if not 0.0 < low < limit < high:
         raise ValueError(f"severity_limit {limit} must be between {low} and {high}")
-    if not 0.0 < slipper[0] < slipper[1]:
-        raise ValueError(f"severity.S {slipper} must ascend from a positive area")
-    return {"S": slipper, "C1": (low, limit), "C2": (limit, high)}
+    if not 0.0 < least < most:
+        raise ValueError(f"severity.S {(least, most)} must ascend from a positive area")
+    return {"S": (least, most), "C1": (low, limit), "C2": (limit, high)}
 
 
 class SignalSource:
@@ -116,7 +116,7 @@ class SignalSource:
         }
         areas = np.array(
             [
-                np.exp(rng.uniform(*np.log(bins[name]), count)) if name in bins else np.zeros(count)
+                _log_uniform(*bins[name], count, rng) if name in bins else np.zeros(count)
                 for name in classes
             ]
         )
@@ -197,3 +197,8 @@ def _observation(healthy, orders, speed_hz, load_pressure) -> Observation:
         flow_ripple=None,
         sensors=None,
     )
+
+
+def _log_uniform(low: float, high: float, count: int, rng: np.random.Generator) -> np.ndarray:
+    """`count` numbers whose logarithms are evenly distributed."""
+    return np.exp(rng.uniform(np.log(low), np.log(high), count))

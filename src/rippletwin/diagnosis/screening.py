@@ -74,7 +74,7 @@ class Screen:
         score = correlation(healthy, model.values, model.orders, even, self._count)
         first = int(np.argmax(score[:ANGLES]))
         self._start = first - ANGLES // 2
-        self._leaks = {}
+        self._leaks: dict[str, list[tuple[float, _Term]]] = {}
 
     def healthy(self) -> list[Candidate]:
         """The healthy state at each of the pistons' pitches, the best first."""
@@ -86,7 +86,7 @@ class Screen:
 
     def two(self, first: list[Candidate], second: list[Candidate]) -> list[Candidate]:
         """Two faults together: the other one added to the best candidates of either."""
-        found = {}
+        found: dict[tuple[tuple[int, ...], int], Candidate] = {}
         for base, other in ((first, second), (second, first)):
             for candidate in base[:KEPT]:
                 for new in self._added(other[0].state[0], candidate):
@@ -98,12 +98,14 @@ class Screen:
 
     def _added(self, fault: Fault, to: Candidate | None) -> list[Candidate]:
         """A fault at every piston and pitch, alone or beside the single fault of a candidate."""
-        base, state, areas, pistons = self._healthy, (), (), ()
+        base = self._healthy
+        state: tuple[Fault, ...] = () if to is None else to.state
+        areas: tuple[float, ...] = () if to is None else to.areas
+        pistons: tuple[int, ...] = () if to is None else to.pistons
         if to is not None:
-            state, areas, pistons = to.state, to.areas, to.pistons
             leak = self.model.leak_change(state[0], areas[0], pistons[0])
             base = self._term(base.reading + self._response * leak)
-        found = {}
+        found: dict[tuple[int, int], Candidate] = {}
         low, high = np.exp(self.model.area_ends(fault, areas))
         for area, term in self._leaks_of(fault):
             if not low <= area * (1.0 + 1e-9) <= high * (1.0 + 2e-9):  # rounding of the ends

@@ -56,7 +56,7 @@ def simulate_fault(
     load given as a measured impedance, and where pump or line find no periodic state.
     """
     fault = find_fault(fault) if isinstance(fault, str) else fault
-    warnings = []
+    warnings: list[str] = []
     twin = _with_pump(twin, speed_rpm / 60.0, load_pressure, warnings)
     pump, fluid = twin.rig.pump, twin.rig.fluid
     point = pump, fluid, speed_rpm, load_pressure

@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from rippletwin.diagnosis.diagnosis import Diagnosis
-from rippletwin.figures import diagnosed_numbers, style
-from rippletwin.figures.diagnosed_numbers import DiagnosedNumbers
+from rippletwin.diagnosis import diagnosed_numbers
+from rippletwin.diagnosis.diagnosed_numbers import DiagnosedNumbers
+from rippletwin.figures import style
 from rippletwin.figures.quantities import unit_of, write_certainty, write_quantity
 from rippletwin.figures.words import name_state
 
@@ -20,13 +20,14 @@ LINES = ("-", "--", "-.")
 
 
 def draw(
-    diagnoses: Sequence[Diagnosis], folder: str | Path, suffixes: Sequence[str] = (".png", ".svg")
+    numbers: Sequence[DiagnosedNumbers],
+    folder: str | Path,
+    suffixes: Sequence[str] = (".png", ".svg"),
 ) -> list[Path]:
     """Write both pictures of each recording into `folder`/figures, and the numbers behind them;
     returns the paths."""
     folder = Path(folder)
     (folder / "figures").mkdir(parents=True, exist_ok=True)
-    numbers = [diagnosed_numbers.gather(d) for d in diagnoses]
     written = [diagnosed_numbers.save(numbers, folder)]
     for each in numbers:
         for name, figure in (("change", plot_change(each)), ("severity", plot_severity(each))):

@@ -27,6 +27,7 @@ AT_OTHER = {
     "piston_spread": "spread of the pistons",
     "speed_fluctuation": "fluctuation of the speed",
     "passive_network": "network without a name",
+    "passive_piece": "piece of another pipe",
 }
 IMPLIED_PLACES = ("line", "position", "load", "source")
 """Elements that an effect's name says already, or that say no place."""

@@ -63,7 +63,7 @@ def confusion(truth: np.ndarray, predicted: np.ndarray) -> np.ndarray:
     unknown = set(truth) - {*TRUE_STATES, *CLASSES}
     if unknown:
         raise ValueError(f"unknown states {sorted(unknown)}; known are H, S, C, C1, C2")
-    row = [TRUE_STATES.index(state[0]) for state in truth]
+    row = np.array([TRUE_STATES.index(state[0]) for state in truth], dtype=int)
     np.add.at(counts, (row, predicted), 1)
     return counts
 

@@ -26,10 +26,10 @@ def grad_cam(
     In logits; comparable between inputs of one network, not between networks.
     """
     network.eval()
-    target = torch.as_tensor(np.broadcast_to(target, len(x)).copy())
+    targets = torch.as_tensor(np.broadcast_to(target, len(x)).copy())
     heats = []
     for inputs, classes in zip(
-        torch.as_tensor(x, dtype=torch.float32).split(batch_size), target.split(batch_size)
+        torch.as_tensor(x, dtype=torch.float32).split(batch_size), targets.split(batch_size)
     ):
         maps = network.feature_maps(inputs)
         weight = network.head.weight[classes] / maps[0, 0].numel()
@@ -109,7 +109,7 @@ def feature_positions(network: Classifier, count: int, axis: int) -> np.ndarray:
     for name, layer in network.features.named_modules():
         if isinstance(layer, nn.Conv2d | nn.MaxPool2d) and "shortcut" not in name:
             kernel, stride, padding = (
-                value if isinstance(value, int) else value[axis]
+                int(value if isinstance(value, int) else value[axis])
                 for value in (layer.kernel_size, layer.stride, layer.padding)
             )
             start += jump * ((kernel - 1) / 2 - padding)

@@ -25,7 +25,8 @@ def build(name: str, channels: int, classes: int = len(CLASSES)) -> Classifier:
     Raises KeyError for an unknown name.
     """
     architecture = ARCHITECTURES[name]
-    return Classifier(architecture, channels, classes).to(memory_format=torch.channels_last)
+    network = Classifier(architecture, channels, classes)
+    return network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
 
 def restore_networks(name: str, channels: int, weights: Iterable[dict]) -> Iterator[Classifier]:
@@ -47,6 +48,8 @@ class Classifier(nn.Module):
     amplitude carries the diagnosis. Training sets it to the root mean square of its inputs less
     silence. Silence is subtracted first, so that zero padding is silence in images too.
     """
+
+    scale: torch.Tensor
 
     def __init__(self, architecture: Architecture, channels: int, classes: int):
         super().__init__()
@@ -127,7 +130,7 @@ class BasicBlock(nn.Module):
             _same(domain, width, width, bias=False),
             nn.BatchNorm2d(width),
         )
-        self.shortcut = nn.Identity()
+        self.shortcut: nn.Module = nn.Identity()
         if stride != 1 or width_in != width:
             strides = (1, stride) if domain == "time" else stride
             self.shortcut = nn.Sequential(
@@ -141,12 +144,15 @@ class BasicBlock(nn.Module):
 
 def _first(a: Architecture, channels: int, bias: bool = True) -> nn.Conv2d:
     if a.domain == "time":
-        shape = ((1, a.kernel), (1, a.stride), (0, a.padding))
-        return nn.Conv2d(channels, MAPS, *shape, bias=bias, padding_mode="circular")
+        kernel, stride, padding = (1, a.kernel), (1, a.stride), (0, a.padding)
+        return nn.Conv2d(
+            channels, MAPS, kernel, stride, padding, bias=bias, padding_mode="circular"
+        )
     return nn.Conv2d(channels, MAPS, a.kernel, a.stride, a.padding, bias=bias)
 
 
 def _same(domain: str, width_in: int, width: int, stride: int = 1, bias: bool = True) -> nn.Conv2d:
     """Three taps (3 x 3 in an image), padded so that stride 1 keeps the shape."""
-    shape = ((1, 3), (1, stride), (0, 1)) if domain == "time" else (3, stride, 1)
-    return nn.Conv2d(width_in, width, *shape, bias=bias)
+    if domain == "time":
+        return nn.Conv2d(width_in, width, (1, 3), (1, stride), (0, 1), bias=bias)
+    return nn.Conv2d(width_in, width, 3, stride, 1, bias=bias)

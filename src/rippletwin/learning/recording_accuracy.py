@@ -13,6 +13,7 @@ from scipy.stats import binomtest
 
 from rippletwin.learning.accuracy import UNKNOWN
 from rippletwin.learning.architectures import ARCHITECTURES, CLASSES
+from rippletwin.learning.markdown import markdown_table
 
 CELL = ["architecture", "dataset"]
 
@@ -76,7 +77,7 @@ def recording_table(rows: pd.DataFrame, datasets: Sequence[str]) -> str:
     named = [name for name in ARCHITECTURES if name in set(rows.architecture)]
     lines = [[ARCHITECTURES[name].title, *(cells.get((name, d), "–") for d in datasets)]
              for name in named]  # fmt: skip
-    return _markdown(["Architecture", *datasets], lines)
+    return markdown_table(["Architecture", *datasets], lines)
 
 
 def severity_table(rows: pd.DataFrame, datasets: Sequence[str], names: Sequence[str]) -> str:
@@ -95,9 +96,4 @@ def severity_table(rows: pd.DataFrame, datasets: Sequence[str], names: Sequence[
                 text += f" ({100 * seen.said_C2.mean():.0f})"
             line.append(text)
         lines.append(line)
-    return _markdown(["Recording", "state", *datasets], lines)
-
-
-def _markdown(head: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
-    rows = [head, ["---"] * len(head), *lines]
-    return "".join("| " + " | ".join(map(str, row)) + " |\n" for row in rows)
+    return markdown_table(["Recording", "state", *datasets], lines)

@@ -9,6 +9,7 @@ import pandas as pd
 
 from rippletwin.learning.accuracy import summarise
 from rippletwin.learning.architectures import ARCHITECTURES, CLASSES
+from rippletwin.learning.markdown import markdown_table
 
 DOMAIN_TITLES = {"time": "Time domain", "image": "Time-frequency domain"}
 
@@ -85,16 +86,13 @@ def answer_table(answers: pd.DataFrame) -> str:
     answers : columns recording, dataset, architecture and predicted (of ``CLASSES``), a row a
     window and seed.
     """
-    lines = [
-        "| Recording | Dataset | Architecture | windows | " + " | ".join(CLASSES) + " |",
-        "|---|---|---|---|" + "---|" * len(CLASSES),
-    ]
+    lines = []
     for keys, said in answers.groupby(["recording", "dataset", "architecture"], sort=False):
         recording, dataset, architecture = keys
         share = [f"{100 * (said['predicted'] == name).mean():.0f}" for name in CLASSES]
         cells = [str(recording), dataset, ARCHITECTURES[architecture].title, str(len(said))]
-        lines.append("| " + " | ".join([*cells, *share]) + " |")
-    return "\n".join(lines) + "\n"
+        lines.append([*cells, *share])
+    return markdown_table(["Recording", "Dataset", "Architecture", "windows", *CLASSES], lines)
 
 
 def _cells(table: pd.DataFrame) -> dict[tuple[str, str], str]:

@@ -19,6 +19,8 @@ import numpy as np
 import torch
 from torch import nn
 
+from rippletwin.learning.networks import Classifier
+
 
 @dataclass(frozen=True)
 class TrainingSettings:
@@ -50,13 +52,13 @@ class History:
 
 
 def train(
-    network: nn.Module,
+    network: Classifier,
     x: np.ndarray,
     y: np.ndarray,
     settings: TrainingSettings,
     seed: int,
     progress: Callable[[int, History], None] | None = None,
-) -> tuple[nn.Module, History]:
+) -> tuple[Classifier, History]:
     """Adam on the cross entropy of (x, y) until the rule above stops it; deterministic in ``seed``.
 
     x : (n, channels, M) or (n, channels, size, size); y : (n,) class indices.
@@ -143,12 +145,12 @@ def initialise(network: nn.Module, seed: int) -> None:
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         for layer in network.modules():
-            if hasattr(layer, "reset_parameters"):
-                layer.reset_parameters()
+            if (reset := getattr(layer, "reset_parameters", None)) is not None:
+                reset()
 
 
 def predict(
-    network: nn.Module, x: np.ndarray, batch_size: int = 64
+    network: Classifier, x: np.ndarray, batch_size: int = 64
 ) -> tuple[np.ndarray, np.ndarray]:
     """Class indices (n,) and probabilities (n, classes) of x, in its own unit."""
     logits = _logits(network, torch.as_tensor(x, dtype=torch.float32), batch_size)
@@ -156,7 +158,7 @@ def predict(
 
 
 @torch.no_grad()
-def activation_statistics(network: nn.Module, x: np.ndarray, batch_size: int = 64) -> np.ndarray:
+def activation_statistics(network: Classifier, x: np.ndarray, batch_size: int = 64) -> np.ndarray:
     """``Classifier.activation_statistics`` (n, D) of x."""
     network.eval()
     batches = torch.as_tensor(x, dtype=torch.float32).split(batch_size)
@@ -164,6 +166,6 @@ def activation_statistics(network: nn.Module, x: np.ndarray, batch_size: int = 6
 
 
 @torch.no_grad()
-def _logits(network: nn.Module, x: torch.Tensor, batch_size: int = 64) -> torch.Tensor:
+def _logits(network: Classifier, x: torch.Tensor, batch_size: int = 64) -> torch.Tensor:
     network.eval()
     return torch.cat([network(batch) for batch in x.split(batch_size)])

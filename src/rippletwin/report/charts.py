@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rippletwin.case.model import Recording, Rig
-from rippletwin.figures.diagnosed_numbers import DiagnosedNumbers
+from rippletwin.diagnosis.diagnosed_numbers import DiagnosedNumbers
 from rippletwin.figures.explained_numbers import ExplainedNumbers, Point
 from rippletwin.figures.explained_ripple import curve, curves_of, title_of
 from rippletwin.figures.quantities import write_share

@@ -65,9 +65,20 @@ class DiagnosisCard:
 
 
 @dataclass(frozen=True)
+class Population:
+    """How often the diagnosis is right on a population of rigs: what they are, probabilities of
+    detection against severity, and what was told of each state."""
+
+    sentence: str
+    detection: Sequence[Figure]
+    confusion: Sequence[Figure]
+
+
+@dataclass(frozen=True)
 class WorkflowPart:
     """What only a whole run of the workflow has.
 
+    population  a scored diagnosis trial, or None
     tables    such as accuracy beside the paper's, and timings
     pictures  (description, file as a data: URL)
     notes     sentences under the tables
@@ -78,6 +89,7 @@ class WorkflowPart:
     pictures: Sequence[tuple[str, str]] = ()
     notes: Sequence[str] = ()
     configuration: str = ""
+    population: Population | None = None
 
 
 @dataclass(frozen=True)
@@ -131,8 +143,8 @@ def make_page(results: Results, workflow: WorkflowPart | None = None) -> Page:
         place=_free_place(places, marked),
         certainty=[] if verdict is None else verdict_words.mismatch_sentences(verdict),
         effects=effect_table(verdict["effects"]) if verdict and verdict.get("effects") else None,
-        ripples=[] if numbers is None else _draw(charts.chart_ripples(numbers)),
-        residuals=[] if numbers is None else _draw(charts.chart_residuals(numbers)),
+        ripples=[] if numbers is None else draw_figures(charts.chart_ripples(numbers)),
+        residuals=[] if numbers is None else draw_figures(charts.chart_residuals(numbers)),
         remaining=[] if verdict is None else verdict_words.remaining_sentences(verdict),
         following=[] if verdict is None else verdict_words.next_sentences(verdict),
         diagnoses=[_diagnosis(each, results) for each in results.diagnosis],
@@ -140,14 +152,15 @@ def make_page(results: Results, workflow: WorkflowPart | None = None) -> Page:
         if results.twin is None
         else parameter_table(results.twin, results.covariance),
         recordings=recording_table(case),
-        orders=_draw(orders),
+        orders=draw_figures(orders),
         full_sentence="" if verdict is None else verdict.get("sentence", ""),
         versions=_versions(),
         workflow=workflow,
     )
 
 
-def _draw(drawn: Sequence[Chart]) -> list[Figure]:
+def draw_figures(drawn: Sequence[Chart]) -> list[Figure]:
+    """Charts with what stands above them."""
     return [
         Figure(
             chart.heading,
@@ -249,7 +262,7 @@ def _diagnosis(entry: Mapping, results: Results) -> DiagnosisCard:
             for state, p in entry["probabilities"].items()
         ],
         networks,
-        [] if numbers is None else _draw(charts.chart_change(numbers)),
+        [] if numbers is None else draw_figures(charts.chart_change(numbers)),
     )
 
 

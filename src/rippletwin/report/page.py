@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import os
 from importlib.resources import files
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from rippletwin import store
 from rippletwin.report.content import Page, WorkflowPart, make_page
 from rippletwin.report.results import Results, read_results
 
@@ -48,12 +48,4 @@ def report_case(
 
 def write_report(results: Results, path: str | Path, workflow: WorkflowPart | None = None) -> Path:
     """Write the report of results to a file, whole or not at all; returns its path."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        temporary.write_text(render(make_page(results, workflow)), encoding="utf-8")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
-    return path
+    return store.write_text(path, render(make_page(results, workflow)))

@@ -11,9 +11,10 @@ import numpy as np
 
 from rippletwin.case.load import load_case
 from rippletwin.case.model import Case
+from rippletwin.diagnosis import diagnosed_numbers
+from rippletwin.diagnosis.diagnosed_numbers import DiagnosedNumbers
 from rippletwin.errors import InputError
-from rippletwin.figures import diagnosed_numbers, explained_numbers
-from rippletwin.figures.diagnosed_numbers import DiagnosedNumbers
+from rippletwin.figures import explained_numbers
 from rippletwin.figures.explained_numbers import ExplainedNumbers
 from rippletwin.twin.twin import Twin
 from rippletwin.twin.twin_file import from_dict

@@ -16,6 +16,7 @@ from markupsafe import Markup
 WIDTH, HEIGHT = 400, 236
 LEFT, RIGHT, TOP, BOTTOM = 54, 18, 8, 42
 TICKS = 5
+FEW_DECADES = 2.2  # of a logarithmic x: below it 2 and 5 have ticks too
 DIGITS = 4
 MAX_DECADES = 4.5  # of a logarithmic axis: less than that of the largest value is at the bottom
 
@@ -23,12 +24,13 @@ MAX_DECADES = 4.5  # of a logarithmic axis: less than that of the largest value 
 @dataclass(frozen=True)
 class Series:
     """One curve: name, y (N,), `role` for its colour (measured, calibrated, corrected, allowed) and
-    `form`: line, dots or stems. NaN is left out."""
+    `form`: line, dots or stems. NaN is left out. `ends` (2, N) of intervals about dots."""
 
     name: str
     y: np.ndarray
     role: str
     form: str = "line"
+    ends: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,7 @@ class Chart:
     y_label: str
     note: str = ""
     logarithmic: bool = False
+    x_logarithmic: bool = False
     x_ticks: Sequence[float] = ()
     mark: float | None = None
 
@@ -64,6 +67,14 @@ def round_ticks(low: float, high: float, count: int = TICKS) -> list[float]:
     return [float(k * step) + 0.0 for k in np.arange(first, last + 1)]
 
 
+def logarithmic_ticks(low: float, high: float) -> list[float]:
+    """Powers of ten from low to high, with their double and fivefold where there are few."""
+    factors = (1, 2, 5) if np.log10(high / low) < FEW_DECADES else (1,)
+    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    ticks = [float(f"{factor}e{k}") for k in decades for factor in factors]
+    return [tick for tick in ticks if low * (1 - 1e-9) <= tick <= high * (1 + 1e-9)]
+
+
 def draw_chart(chart: Chart) -> Markup:
     """The chart as an <svg> element that fills its container."""
     scale = _Scale.of(chart)
@@ -77,6 +88,7 @@ def draw_chart(chart: Chart) -> Markup:
         "x": _rounded(chart.x),
         "plot": [LEFT, WIDTH - LEFT - RIGHT],
         "range": [scale.x_low, scale.x_high],
+        "xLogarithmic": scale.x_logarithmic,
         "xLabel": chart.x_label,
         "yLabel": chart.y_label,
         "series": [{"name": s.name, "role": s.role, "y": _rounded(s.y)} for s in chart.series],
@@ -90,29 +102,39 @@ def draw_chart(chart: Chart) -> Markup:
 
 @dataclass(frozen=True)
 class _Scale:
-    """From data to places in the picture."""
+    """From data to places in the picture; the ends of a logarithmic axis are exponents of ten."""
 
     x_low: float
     x_high: float
+    x_logarithmic: bool
     y_low: float
     y_high: float
     logarithmic: bool
 
     @classmethod
     def of(cls, chart: Chart) -> _Scale:
-        every = np.concatenate([np.asarray(s.y, float) for s in chart.series])
+        x = _ends(np.log10(chart.x) if chart.x_logarithmic else chart.x)
+        every = np.concatenate(
+            [
+                np.ravel(v).astype(float)
+                for s in chart.series
+                for v in (s.y, s.ends)
+                if v is not None
+            ]
+        )
         every = every[np.isfinite(every)]
         if chart.logarithmic:
             every = np.log10(every[every > 0])
             high = float(np.max(every, initial=-3.0))
             low = float(max(np.min(every, initial=high - 1), high - MAX_DECADES))
-            return cls(*_ends(chart.x), np.floor(low), np.ceil(high), True)
+            return cls(*x, chart.x_logarithmic, np.floor(low), np.ceil(high), True)
         low, high = float(np.min(every, initial=0.0)), float(np.max(every, initial=0.0))
         margin = 0.06 * ((high - low) or 1.0)
-        return cls(*_ends(chart.x), low - margin, high + margin, False)
+        return cls(*x, chart.x_logarithmic, low - margin, high + margin, False)
 
     def x(self, x):
-        share = (np.asarray(x, float) - self.x_low) / (self.x_high - self.x_low)
+        x = np.log10(x) if self.x_logarithmic else np.asarray(x, float)
+        share = (x - self.x_low) / (self.x_high - self.x_low)
         return LEFT + share * (WIDTH - LEFT - RIGHT)
 
     def y(self, y):
@@ -145,7 +167,7 @@ def _axes(chart: Chart, scale: _Scale) -> list[Markup]:
                 '<text class="tick" x="{}" y="{}" dy="0.32em" text-anchor="end">{}</text>'
             ).format(LEFT, right, y, y, LEFT - 6, y, _tick(tick))
         )
-    for tick in chart.x_ticks or round_ticks(scale.x_low, scale.x_high):
+    for tick in chart.x_ticks or _x_ticks(scale):
         x = f"{float(scale.x(tick)):.1f}"
         parts.append(
             Markup(
@@ -178,6 +200,12 @@ def _axes(chart: Chart, scale: _Scale) -> list[Markup]:
     return parts
 
 
+def _x_ticks(scale: _Scale) -> list[float]:
+    if scale.x_logarithmic:
+        return logarithmic_ticks(10.0**scale.x_low, 10.0**scale.x_high)
+    return round_ticks(scale.x_low, scale.x_high)
+
+
 def _line(x: np.ndarray, series: Series, scale: _Scale) -> Markup:
     known = np.isfinite(series.y)
     points = " ".join(
@@ -201,7 +229,12 @@ def _dots(x: np.ndarray, series: Series, scale: _Scale) -> Markup:
         Markup('<circle cx="{}" cy="{}" r="2.4"/>').format(f"{a:.1f}", f"{b:.1f}")
         for a, b in zip(scale.x(x)[known], scale.y(series.y)[known])
     )
-    return Markup('<g class="dots {}">{}</g>').format(series.role, Markup("").join(dots))
+    drawn = Markup('<g class="dots {}">{}</g>').format(series.role, Markup("").join(dots))
+    if series.ends is None:
+        return drawn
+    low, high = (scale.y(ends)[known] for ends in np.asarray(series.ends))
+    whiskers = "".join(f"M{a:.1f} {b:.1f}V{c:.1f}" for a, b, c in zip(scale.x(x)[known], low, high))
+    return Markup('<path class="stems {}" d="{}"/>{}').format(series.role, whiskers, drawn)
 
 
 _DRAWN = {"line": _line, "stems": _stems, "dots": _dots}

@@ -18,6 +18,7 @@ import numpy as np
 from rippletwin.calibration.fit import Fit, posterior_at_fit
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
+from rippletwin.line.frequency_domain.pipe_immittance import shunt_admittance
 from rippletwin.twin.effects.base import LineState
 from rippletwin.twin.forward_model import ForwardModel, reflection
 
@@ -147,7 +148,10 @@ def _networks(
 
 
 def _changed_quantity(without: FrequencyDomainLine, changed: FrequencyDomainLine):
-    """(quantity, where, unit, change (F,)) of the first quantity in which two networks differ."""
+    """(quantity, where, unit, change (F,)) of the first quantity in which two networks differ.
+
+    None for a two-port, which changes several at once.
+    """
 
     def over(x):
         return np.broadcast_to(np.asarray(x, complex), without.s.shape)
@@ -171,6 +175,8 @@ def _changed_quantity(without: FrequencyDomainLine, changed: FrequencyDomainLine
         if len(moved):
             return quantity, f"segment {moved[0] + 1}", unit, change[moved[0]]
     new = [i for i in changed.inserts if not any(i is old for old in without.inserts)]
+    if len({kind for _, kind, _ in new}) > 1:
+        return None  # a two-port
     if new:
         x, kind, value = new[0]
         unit, name = ("m3/(Pa s)", "admittance") if kind == "shunt" else ("Pa s/m3", "impedance")
@@ -249,10 +255,11 @@ def _power_left(immittance: np.ndarray, shape: np.ndarray, weight: np.ndarray) -
 
 
 def is_passive(fit: Fit, effect_index: int = -1) -> bool:
-    """Whether the fitted immittance of a passive network is positive real.
+    """Whether the fitted immittances of a passive network are positive real.
 
     Re Y(s) >= 0 for Re s >= 0 (Brune 1931, J. Math. Phys. 10:191), checked along the imaginary
-    axis and on a grid of the right half-plane up to 100 kHz. Raises ValueError for a named effect.
+    axis and on a grid of the right half-plane up to 100 kHz; of a piece of another pipe Z' and Y'.
+    Raises ValueError for a named effect.
     """
     twin = fit.twin
     effect, place, values = twin.effect_values(twin.theta)[effect_index]
@@ -262,7 +269,14 @@ def is_passive(fit: Fit, effect_index: int = -1) -> bool:
     s = np.concatenate([1j * w, *(w * (np.tan(a) + 1j) * np.cos(a) for a in (0.3, 0.9, 1.5))])
     v, fluid = twin.arrays(twin.theta), twin.rig.fluid
     state = LineState(fluid.density, v.viscosity, v.diameters, v.wave_speeds, v.lengths)
-    line = FrequencyDomainLine(s, v.lengths, series=np.ones((len(v.lengths), len(s))), shunt=None)
-    effect.apply(line, state, values, place)
-    (immittance,) = (insert.immittance for insert in line.inserts)
-    return bool(np.all(immittance.real >= -1e-9 * np.abs(immittance)))
+    shunt = [
+        shunt_admittance(s, density=fluid.density, wave_speed=a, diameter=d)
+        for a, d in zip(v.wave_speeds, v.diameters)
+    ]
+    line = FrequencyDomainLine(s, v.lengths, series=np.ones((len(v.lengths), len(s))), shunt=shunt)
+    if effect.immittances is not None:
+        immittances = effect.immittances(line, state, values, place)
+    else:
+        effect.apply(line, state, values, place)
+        immittances = [insert.immittance for insert in line.inserts]
+    return all(bool(np.all(z.real >= -1e-9 * np.abs(z))) for z in immittances)

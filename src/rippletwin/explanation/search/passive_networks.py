@@ -1,16 +1,18 @@
 """Passive networks without a name, which stand in for physics that the library does not have.
 
-A network is a shunt or a series element at a free place. It is added to the best explanation. Where
-that leaves the line badly fitted, the named effects may have bent it: the network is then begun
-anew as well, along the whole line and beside the usual effects only. Several networks, each at a
-place of its own, are a short two-port with series and shunt elements.
+A network is a shunt, a series element or a short piece of another pipe, at a free place. It is
+added to the best explanation. Where that leaves the line badly fitted, the named effects may have
+bent it: the network is then begun anew as well, along the whole line and beside the usual effects
+only. Where no network fits the line, it may be in a wrong local mode: the best are fitted again
+from starts about their places. Several networks may stand in together.
 """
 
 from __future__ import annotations
 
 from rippletwin.calibration.fit import Fit
-from rippletwin.explanation.fit_jobs import FitJob, Workers, rank_by_evidence
-from rippletwin.explanation.search.stepwise_moves import extension_job
+from rippletwin.explanation.fit_jobs import Continuation, FitJob, Workers, rank_by_evidence
+from rippletwin.explanation.search.single_effects import refined_starts
+from rippletwin.explanation.search.stepwise_moves import LOST_MODEL_ERROR, extension_job
 from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.thresholds import GOOD_MODEL_ERROR, MIN_LOG_BAYES_FACTOR
 from rippletwin.twin.effects import library
@@ -18,6 +20,7 @@ from rippletwin.twin.effects import library
 BENT_MODEL_ERROR = 0.02
 """Relative model error above which the line beside named effects may be in a wrong local mode. It
 saves work only."""
+LOST_FITS = 3  # of the best fits, in wrong local modes, that are fitted again
 MAX_NETWORKS = 3  # in one line
 
 
@@ -34,9 +37,29 @@ def fit_passive_networks(workers: Workers, best: Fit) -> list[Fit]:
         usual = tuple(member for member in best.hypothesis if member[0].usual)
         fits += workers.fit([FitJob((*usual, network)) for network in networks])
     fits = rank_by_evidence(fits)
-    if fits[0].evidence <= best.evidence + MIN_LOG_BAYES_FACTOR:
+    fits = _refit_lost(workers, best, fits)
+    if not fits or fits[0].evidence <= best.evidence + MIN_LOG_BAYES_FACTOR:
         return fits
     return [*_with_further_networks(workers, fits[0], networks), *fits]
+
+
+def _refit_lost(workers: Workers, best: Fit, fits: list[Fit]) -> list[Fit]:
+    """`fits` and, where the first may be in a wrong local mode, refits about their places.
+
+    A line in a wrong local mode leaves to the pump what it cannot fit: its model error is large, or
+    the error of the ripple is larger than without networks.
+    """
+
+    def is_lost(fit: Fit) -> bool:
+        ripple = fit.source_sd if fit.source_sd > best.source_sd else 0.0
+        return max(fit.model_error, ripple) > LOST_MODEL_ERROR
+
+    lost = [fit for fit in fits[:LOST_FITS] if is_lost(fit)]
+    if not lost or lost[0] is not fits[0]:
+        return fits
+    rig = workers.base.rig
+    jobs = [FitJob(f.hypothesis, Continuation(tuple(refined_starts(rig, f)))) for f in lost]
+    return rank_by_evidence([*fits, *workers.fit(jobs)])
 
 
 def _with_further_networks(workers: Workers, leading: Fit, networks: list) -> list[Fit]:

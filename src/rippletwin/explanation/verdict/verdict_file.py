@@ -230,14 +230,20 @@ def _remainder(e: Explanation, entries: list[dict]) -> dict | None:
 def _stand_in(e: Explanation, entries: list[dict], index: int) -> dict:
     """A passive network of the corrected twin, the effect `index` of the explanation."""
     entry = entries[index]
-    missing = missing_immittance(e.decision.accepted, e.observations, index)
+    accepted, form = e.decision.accepted, entry["place"].form
+    effect, _, values = accepted.twin.effect_values(accepted.twin.theta)[index]
+    if effect.describe is not None:
+        follows = effect.describe(values)
+    else:
+        missing = missing_immittance(accepted, e.observations, index)
+        follows = None if missing is None else missing.law_in_words
     element, _ = element_and_extent(e.rig, entry["effect"], entry["place"], entry["parameters"])
     return {
-        "form": f"{entry['place'].form} one-port",
+        "form": "short two-port" if form is None else f"{form} one-port",
         "element": element,
-        "passive": is_passive(e.decision.accepted, index),
+        "passive": is_passive(accepted, index),
         "parameters": entry["parameters"],
-        "follows": None if missing is None else missing.law_in_words,
+        "follows": follows,
     }
 
 

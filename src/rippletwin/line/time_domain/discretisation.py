@@ -72,7 +72,7 @@ def discretise(line: TimeDomainLine, dt: float) -> tuple[list[Pipe], list[float]
             parent = line.pipes[int(np.searchsorted(edges, before, side="right")) - 1]
             whole = abs((x - before) - parent.length) < 1e-12 * parent.length
             piece = parent if whole else replace(parent, length=float(x - before))
-            if whole or cells_of(piece, dt) >= MIN_CELLS:
+            if cells_of(piece, dt) >= MIN_CELLS:
                 pipes.append(piece)
                 starts.append(float(before))
                 joints.append([])

@@ -68,7 +68,7 @@ def simulate(line: TimeDomainLine, periods: int = 60, tolerance: float = 1e-6) -
     Starts from the steady flow of the mean and stops when `tolerance` or `periods` is reached.
 
     Raises ValueError for an unknown friction or end, a position outside the line, a mean flow
-    into a closed end, or a segment shorter than three steps (take more steps a period).
+    into a closed end, or a line or branch shorter than three steps (take more steps a period).
     """
     if line.friction not in FRICTION_LAWS:
         raise ValueError(f"friction must be one of {FRICTION_LAWS}, not {line.friction!r}")

@@ -11,7 +11,8 @@
     const readout = svg.parentElement.querySelector(".readout");
     const cursor = svg.querySelector(".cursor");
     const [left, width] = chart.plot;
-    const [low, high] = chart.range;
+    const [low, high] = chart.range;  // exponents of ten where x is logarithmic
+    const places = chart.x.map(function (x) { return chart.xLogarithmic ? Math.log10(x) : x; });
 
     let nearest = 0;
 
@@ -19,8 +20,8 @@
       const box = svg.getBoundingClientRect();
       const place = ((event.clientX - box.left) / box.width) * svg.viewBox.baseVal.width;
       const wanted = low + ((place - left) / width) * (high - low);
-      chart.x.forEach(function (x, k) {
-        if (Math.abs(x - wanted) < Math.abs(chart.x[nearest] - wanted)) nearest = k;
+      places.forEach(function (x, k) {
+        if (Math.abs(x - wanted) < Math.abs(places[nearest] - wanted)) nearest = k;
       });
       show();
     }
@@ -39,7 +40,7 @@
     }
 
     function show() {
-      const at = left + ((chart.x[nearest] - low) / (high - low)) * width;
+      const at = left + ((places[nearest] - low) / (high - low)) * width;
       cursor.setAttribute("x1", at);
       cursor.setAttribute("x2", at);
       cursor.style.visibility = "visible";

@@ -11,7 +11,7 @@ there is elementwise, so that the same statements change a line with a leading b
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -118,6 +118,9 @@ class Effect:
     friction    law by which it replaces the line's, as in `series_impedance`
     limits      (name, form) of effects that this one becomes at a limit of its parameters or at an
                 end of the line; what those are limits of, it is too
+    immittances (network, state, values, place) -> immittances per metre of what it puts in place of
+                a stretch of the line; None for one-ports, whose inserts say whether it is passive
+    describe    values -> what it is like, in words; None where a law against frequency says it
     file        the user's file that defines it; None in the library
     """
 
@@ -135,6 +138,8 @@ class Effect:
     named: bool = True
     friction: str | None = None
     limits: tuple[tuple[str, str | None], ...] = ()
+    immittances: Callable[[object, LineState, Mapping[str, object], Place], Sequence] | None = None
+    describe: Callable[[Mapping[str, object]], str] | None = None
     file: str | None = None
 
     def suits(self, rig) -> bool:

@@ -89,12 +89,13 @@ def load(folder: str | Path) -> dict[str, DiagnosedNumbers]:
     if not path.exists():
         return {}
     entries = json.loads(path.read_text())
-    return {
-        each["label"]: DiagnosedNumbers(
-            **each | {"leaks": {name: Leak(**leak) for name, leak in each["leaks"].items()}}
-        )
-        for each in entries
-    }
+    return {each["label"]: from_plain(each) for each in entries}
+
+
+def from_plain(data: Mapping) -> DiagnosedNumbers:
+    """The numbers of which `asdict` made plain data."""
+    leaks = {name: Leak(**leak) for name, leak in data["leaks"].items()}
+    return DiagnosedNumbers(**{**data, "leaks": leaks})
 
 
 def _rounded(values) -> Any:
