@@ -63,6 +63,8 @@ class FrequencyDomainLine:
     nonlinear_compliances   list of `NonlinearCompliance`, for the ripple at full amplitude
     outflows           (positions (N,), flows (N, F)) that leave the line whatever the pressure, for
                        lines that the ripple passes: with them no scale can be taken out
+    load_outflow       (F,) flow that passes the load whatever the pressure, besides what its ratio
+                       says; `respond` alone heeds it
     """
 
     s: np.ndarray
@@ -78,6 +80,7 @@ class FrequencyDomainLine:
     opening: np.ndarray | None = None
     nonlinear_compliances: list = field(default_factory=list)
     outflows: tuple | None = None
+    load_outflow: np.ndarray | None = None
 
     @property
     def length(self) -> float:
@@ -104,6 +107,7 @@ class FrequencyDomainLine:
             sensor_factor=at(self.sensor_factor),
             opening=at(self.opening),
             outflows=self.outflows and (self.outflows[0], at(self.outflows[1])),
+            load_outflow=at(self.load_outflow),
         )
 
     def readings(self) -> np.ndarray:
@@ -181,13 +185,18 @@ class FrequencyDomainLine:
 
     def respond(self, positions: np.ndarray | Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
         """Pressure and flow (S, F) at `positions` with the network's own source and load."""
-        pressure, flow, entry, decay = self.sweep([self.load_state()], positions)
+        states = [self.load_state()]
+        if self.load_outflow is not None:
+            states.append((0.0, self.load_outflow))
+        pressure, flow, entry, decay = self.sweep(states, positions)
         own, *forced = entry[:, 1] + self.source_admittance * entry[:, 0]
         if not forced:
             scale = self.source_flow / own
             return pressure[:, 0] * scale, flow[:, 0] * scale
-        scale = (self.source_flow * decay - forced[0]) / own
-        return tuple((x[:, 0] * scale + x[:, 1]) / decay for x in (pressure, flow))
+        scale = (self.source_flow * decay - sum(forced)) / own
+        return tuple(
+            (x[:, 0] * scale + np.sum(x[:, 1:], axis=1)) / decay for x in (pressure, flow)
+        )
 
     def sweep(
         self, states: list, positions: np.ndarray | Sequence[float] = ()

@@ -18,7 +18,7 @@ def order_steps(lengths, at, what, index):
     starts = np.cumsum(lengths) - lengths
     here = np.sum(lengths)
     order = np.argsort(-at, kind="mergesort")  # stable: steps at one place keep their order
-    plan = np.zeros((3 * len(at) + 2 * len(lengths) + 2, 3))
+    plan = np.zeros((2 * len(at) + 2 * len(lengths) + 2, 3))
     if len(at) and (at[order[0]] > here * (1 + 1e-12) or at[order[-1]] < 0.0):
         return plan[:0]
     k = len(lengths) - 1
@@ -37,9 +37,6 @@ def order_steps(lengths, at, what, index):
             step = what[order[m]]
             plan[n, 0], plan[n, 1] = step, index[order[m]]
             n += 1
-            if step == SHUNT or step == SERIES:
-                plan[n, 0], plan[n, 1] = ENTER, k
-                n += 1
     return plan[:n]
 
 
@@ -56,22 +53,27 @@ def sweep_line(series, shunt, plan, values, load, outflow, stops):
     factors = np.empty(len(plan), np.complex128)
     for i in range(count):
         p[:], q[:] = load[:, 0, i], load[:, 1, i]
-        gamma = zc = 0j
+        gamma = zc = yc = 0j
         behind = 1.0 + 0j  # the factors taken out so far
         for n in range(len(plan)):
             what, index = int(plan[n, 0]), int(plan[n, 1])
             if what == ENTER:
                 gamma = np.sqrt(series[index, i] * shunt[index, i])
                 zc = gamma / shunt[index, i]  # on gamma's branch of the root
+                yc = 1.0 / zc
                 for m in range(states):
                     zq = zc * q[m]
                     f[m], b[m] = 0.5 * (p[m] + zq), 0.5 * (p[m] - zq)
             elif what == WALK:
+                if plan[n, 2] == 0.0:
+                    factors[n] = 1.0
+                    continue
                 factors[n] = np.exp(-gamma * plan[n, 2])
                 behind *= factors[n]
+                square = factors[n] * factors[n]
                 for m in range(states):
-                    b[m] *= factors[n] * factors[n]
-                    p[m], q[m] = f[m] + b[m], (f[m] - b[m]) / zc
+                    b[m] *= square
+                    p[m], q[m] = f[m] + b[m], (f[m] - b[m]) * yc
             elif what == OUTFLOW:
                 flow_out = outflow[index, i] * behind
                 q[-1] += flow_out
@@ -79,10 +81,16 @@ def sweep_line(series, shunt, plan, values, load, outflow, stops):
                 b[-1] -= 0.5 * zc * flow_out
             elif what == SHUNT:
                 for m in range(states):
-                    q[m] += values[index, i] * p[m]
+                    flow_out = values[index, i] * p[m]
+                    q[m] += flow_out
+                    f[m] += 0.5 * zc * flow_out
+                    b[m] -= 0.5 * zc * flow_out
             elif what == SERIES:
                 for m in range(states):
-                    p[m] += values[index, i] * q[m]
+                    drop = 0.5 * values[index, i] * q[m]
+                    p[m] += 2.0 * drop
+                    f[m] += drop
+                    b[m] += drop
             else:
                 pressure[index, :, i], flow[index, :, i] = p, q
         entry[:, 0, i], entry[:, 1, i] = p, q

@@ -9,16 +9,24 @@ from rippletwin.twin.effects.base import Effect, line_place
 
 
 def friction_excess(s, viscosity, diameter, density):
-    """Z'_unsteady - Z'_steady, Pa s/m4; all arguments broadcast."""
+    """Z'_unsteady - Z'_steady (..., F), Pa s/m4, at s (F,); `viscosity` and `diameter` broadcast to
+    (..., 1) or are scalars."""
     rate = 4.0 * viscosity / diameter**2
-    excess = rate * (scaled_friction(s / rate) - 8.0) - s
+    if np.size(rate) > 1:
+        # A batch has few distinct nu/R^2, and friction takes long.
+        distinct, inverse = np.unique(rate, return_inverse=True)
+        distinct = distinct[:, None]
+        excess = distinct * (scaled_friction(s / distinct) - 8.0) - s
+        excess = excess[inverse.ravel()].reshape(*np.shape(rate)[:-1], -1)
+    else:
+        excess = rate * (scaled_friction(s / rate) - 8.0) - s
     return excess * (density / (0.25 * np.pi)) / diameter**2
 
 
 def _apply(network, state, values, place):
     diameters = np.asarray(state.diameters)
-    if diameters.ndim == 1:
-        diameters = diameters[:, None]
+    batch = (1,) * (np.ndim(network.series) - diameters.ndim)
+    diameters = diameters.reshape(diameters.shape + batch)
     network.series = network.series + friction_excess(
         network.s, state.viscosity, diameters, state.density
     )
