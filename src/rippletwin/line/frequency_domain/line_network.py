@@ -194,9 +194,7 @@ class FrequencyDomainLine:
             scale = self.source_flow / own
             return pressure[:, 0] * scale, flow[:, 0] * scale
         scale = (self.source_flow * decay - sum(forced)) / own
-        return tuple(
-            (x[:, 0] * scale + np.sum(x[:, 1:], axis=1)) / decay for x in (pressure, flow)
-        )
+        return tuple((x[:, 0] * scale + np.sum(x[:, 1:], axis=1)) / decay for x in (pressure, flow))
 
     def sweep(
         self, states: list, positions: np.ndarray | Sequence[float] = ()
