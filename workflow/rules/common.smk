@@ -1,6 +1,7 @@
 # What several stages share: the case, the datasets, and what a script depends on besides its inputs.
 import os
 import re
+import shlex
 import sys
 from pathlib import Path
 
@@ -30,7 +31,7 @@ RESULTS = config["results"]
 PAPER = os.path.relpath(ROOT / "resources/paper_accuracy.csv")
 
 # The virtual rig's command is found even where the environment is not activated.
-shell.prefix(f"PATH={os.path.dirname(sys.executable)}:$PATH; ")
+shell.prefix(f"PATH={shlex.quote(os.path.dirname(sys.executable))}:$PATH; ")
 # numba does not follow `threads:`.
 for name, value in {"NUMBA_NUM_THREADS": "1", **MALLOC_ENVIRONMENT}.items():
     os.environ.setdefault(name, value)

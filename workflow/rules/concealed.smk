@@ -24,8 +24,8 @@ rule concealed_numerics:
         number=config["concealed"]["number"],
         cases=config["concealed"]["cases"],
     shell:
-        "virtualrig check --commit {params.commit} --number {params.number}"
-        " --cases {params.cases} --out {output} > {log} 2>&1"
+        "virtualrig check --commit {params.commit:q} --number {params.number:q}"
+        " --cases {params.cases:q} --out {output:q} > {log:q} 2>&1"
 
 
 rule conceal:
@@ -47,9 +47,9 @@ rule conceal:
         case=lambda wildcards: int(wildcards.hidden),
         bench=config["concealed"]["bench"],
     shell:
-        "virtualrig conceal --commit {params.commit} --number {params.number}"
-        " --bench {params.bench} --cases {params.cases} --case {params.case} --out {output.case}"
-        " --seal {output.seal} --key {output.key} > {log} 2>&1"
+        "virtualrig conceal --commit {params.commit:q} --number {params.number:q}"
+        " --bench {params.bench:q} --cases {params.cases:q} --case {params.case:q} --out {output.case:q}"
+        " --seal {output.seal:q} --key {output.key:q} > {log:q} 2>&1"
 
 
 # The tool may open its own source, the case and where it writes: neither seals nor keys.
@@ -71,10 +71,10 @@ rule explain_concealed:
         out=subpath(output.verdict, parent=True),
         cache=f"{CONCEALED}/cache",
     shell:
-        "(mkdir -p {params.out} {params.cache};"
-        " NUMBA_CACHE_DIR=$(realpath {params.cache}) TMPDIR={params.out}"
-        " python -m concealed.jail --read {input.case} --write {params.out} --write {params.cache}"
-        " -- python -m concealed.tool {input.case} {params.out}) > {log} 2>&1"
+        "(mkdir -p {params.out:q} {params.cache:q};"
+        ' NUMBA_CACHE_DIR="$(realpath {params.cache:q})" TMPDIR={params.out:q}'
+        " python -m concealed.jail --read {input.case:q} --write {params.out:q} --write {params.cache:q}"
+        " -- python -m concealed.tool {input.case:q} {params.out:q}) > {log:q} 2>&1"
 
 
 rule commit_verdicts:

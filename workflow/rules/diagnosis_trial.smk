@@ -26,9 +26,9 @@ rule record_population:
         number=config["diagnosis_trial"]["number"],
         rig=lambda wildcards: int(wildcards.drawn),
     shell:
-        "virtualrig population --commit {params.commit} --number {params.number}"
-        " --rig {params.rig} --out {output.case} --seal {output.seal} --key {output.key}"
-        " > {log} 2>&1"
+        "virtualrig population --commit {params.commit:q} --number {params.number:q}"
+        " --rig {params.rig:q} --out {output.case:q} --seal {output.seal:q} --key {output.key:q}"
+        " > {log:q} 2>&1"
 
 
 # The tool may open its own source, the case and where it writes: neither seals nor keys.
@@ -51,11 +51,11 @@ rule diagnose_population:
         cache=f"{TRIAL}/cache",
         columns=config["diagnosis_trial"]["methods"],
     shell:
-        "(mkdir -p {params.out} {params.cache};"
-        " NUMBA_CACHE_DIR=$(realpath {params.cache}) TMPDIR={params.out}"
-        " python -m concealed.jail --read {input.case} --read $(dirname {input.tool[0]})"
-        " --write {params.out} --write {params.cache}"
-        " -- python -m diagnosis_trial.tool {input.case} {params.out} {params.columns}) > {log} 2>&1"
+        "(mkdir -p {params.out:q} {params.cache:q};"
+        ' NUMBA_CACHE_DIR="$(realpath {params.cache:q})" TMPDIR={params.out:q}'
+        ' python -m concealed.jail --read {input.case:q} --read "$(dirname {input.tool[0]:q})"'
+        " --write {params.out:q} --write {params.cache:q}"
+        " -- python -m diagnosis_trial.tool {input.case:q} {params.out:q} {params.columns:q}) > {log:q} 2>&1"
 
 
 rule commit_diagnoses:

@@ -19,8 +19,8 @@ if RECORDED_HERE:
             points=config["virtualrig"]["points"],
             seed=config["virtualrig"]["seed"],
         shell:
-            "virtualrig record --out {params.case} --points {params.points} --seed {params.seed}"
-            " --processes {threads} > {log} 2>&1"
+            "virtualrig record --out {params.case:q} --points {params.points:q} --seed {params.seed:q}"
+            " --processes {threads} > {log:q} 2>&1"
 
 
 rule cut_windows:

@@ -23,7 +23,8 @@ regions = np.array([fault_region(x["H"], x[fault]) for fault in faults])
 first_turn = np.stack([x[name][0] for name in CLASSES])
 spread = spread_windows(recorded.state.values, WINDOWS)
 windows = [recorded.signal.values[at] for at in spread.values()]
-name, trained = snakemake.wildcards.architecture, torch.load(snakemake.input.weights)
+name = snakemake.wildcards.architecture
+trained = torch.load(snakemake.input.weights, weights_only=True)
 first, *others = restore_networks(name, first_turn.shape[1], trained)
 shares = [fault_attention(net, x, dict(zip(faults, regions))) for net in (first, *others)]
 attended, blind = (np.array(share) for share in zip(*shares))

@@ -18,7 +18,7 @@ _, kept = split_by_time(np.bincount(recorded.recording), snakemake.params.learnt
 x, truth = recorded.signal.values[kept], recorded.state.values[kept]
 
 tables = []
-trained = torch.load(snakemake.input.weights)
+trained = torch.load(snakemake.input.weights, weights_only=True)
 for seed, network in enumerate(
     restore_networks(snakemake.wildcards.architecture, x.shape[1], trained)
 ):

@@ -16,7 +16,7 @@ samples = store.load(snakemake.input.samples)
 x, faults = samples.signal.values, np.array(samples.label.attrs["classes"])[samples.label.values]
 
 tables = []
-trained = torch.load(snakemake.input.weights)
+trained = torch.load(snakemake.input.weights, weights_only=True)
 for seed, network in enumerate(
     restore_networks(snakemake.wildcards.architecture, x.shape[1], trained)
 ):

@@ -45,9 +45,11 @@ class ErrorModel(Protocol):
     forward: Any
     prior: np.ndarray
     source_free: bool
-    needs_full_jacobian: bool
     model_error: float
     max_model_error: float
+
+    @property
+    def needs_full_jacobian(self) -> bool: ...
 
     def below(self, max_frequency_hz: float) -> Self:
         """The same error model of the data at and below a frequency."""

@@ -17,6 +17,7 @@ Calibration and explaining run the same continuation, each over its own error mo
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -66,14 +67,17 @@ def continuation_limits(
     return [*(x for x in limits_hz if low <= x < LAST_LIMIT_SHARE * top), top]
 
 
+Model = TypeVar("Model", bound=ErrorModel)
+
+
 def fit_by_continuation(
-    model: ErrorModel,
+    model: Model,
     starts: Sequence[Mapping[str, float]] = ({},),
     draws: int = 0,
     exact: bool = False,
     limits_hz: Sequence[float] = LIMITS_HZ,
     progress: Callable[[float, int, ErrorModel, np.ndarray], None] | None = None,
-) -> tuple[ErrorModel, np.ndarray]:
+) -> tuple[Model, np.ndarray]:
     """The mode theta (P,) of a posterior, and the error model with its errors there.
 
     starts    coordinates of parameters by name; the others are those of the data sheet
@@ -154,6 +158,7 @@ def refine(
     thetas = [np.asarray(theta, dtype=float) for theta in thetas]
     rounds = JACOBIAN_ROUNDS if exact and len(thetas) == 1 else 0
     if len(thetas) > 1:
+        assert isinstance(model, Posterior)
         thetas = _follow_best(model, ScoreTest(base, model, thetas).starts)
     else:
         model.predict(thetas[0])
@@ -189,7 +194,7 @@ def _kept(modes: Sequence[State], stage: int, last: bool, many: bool) -> list[St
     return distinct_modes(modes)[: 1 if last else kept[min(stage, len(kept) - 1)]]
 
 
-def _with_frozen_compliance(model: ErrorModel, limit: float) -> ErrorModel:
+def _with_frozen_compliance(model: Model, limit: float) -> Model:
     """The error model below a limit (Hz), without the nonlinear compliance of the line."""
     part = model.below(limit)
     part.forward.freeze_compliance = True

@@ -21,7 +21,7 @@ def descend(
     model: ErrorModel,
     theta: np.ndarray,
     max_steps: int,
-    fixed: Sequence[int] = (),
+    fixed: Sequence[int] | np.ndarray = (),
     errors: bool = True,
     converged: float = CONVERGED,
     damping: float = FIRST_DAMPING,

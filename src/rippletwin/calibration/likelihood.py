@@ -22,6 +22,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -73,7 +74,7 @@ class Likelihood:
         evenness: float = 0.0,
     ):
         self.twin = twin
-        self._settings = {"piston_orders": piston_orders, "evenness": evenness}
+        self._settings: dict[str, Any] = {"piston_orders": piston_orders, "evenness": evenness}
         pistons = twin.rig.pump.get("pistons", 1) if piston_orders else 1
         self.observations = [select_below(o, max_frequency_hz, pistons) for o in observations]
         self.forward = DifferentiableForward(twin, self.observations)
@@ -100,7 +101,7 @@ class Likelihood:
 
     def by_observation(self, prediction: Sequence[np.ndarray]) -> list[ObservedRipple]:
         """Measurement and prediction, one observation at a time."""
-        parts = [None] * len(self.observations)
+        parts: list[ObservedRipple | None] = [None] * len(self.observations)
         for members, group, h in zip(self._members, self._groups, prediction):
             for k, part in zip(members, group.slices):
                 parts[k] = ObservedRipple(group.values[:, part], h[:, part], group.power[part])
@@ -164,14 +165,17 @@ class Likelihood:
         scale = self.count / (self.count - taken)
         model_errors, sigmas = MODEL_ERRORS, self.twin.source_sd * SOURCE_SHARES
         for _ in range(3):
-            cost = sum(
-                group.cost(h, model_errors, sigmas, scale)
-                for group, h in zip(self._groups, prediction)
+            cost: np.ndarray = sum(
+                (
+                    group.cost(h, model_errors, sigmas, scale)
+                    for group, h in zip(self._groups, prediction)
+                ),
+                np.zeros(()),
             )
             best, source = np.unravel_index(np.argmin(cost), cost.shape)
             self.model_error, self.source_sd = float(model_errors[best]), float(sigmas[source])
-            ends = [max(best - 1, 0), min(best + 1, len(model_errors) - 1)]
-            model_errors = np.geomspace(*model_errors[ends], FINER_MODEL_ERRORS)
+            low, high = max(int(best) - 1, 0), min(int(best) + 1, len(model_errors) - 1)
+            model_errors = np.geomspace(model_errors[low], model_errors[high], FINER_MODEL_ERRORS)
             sigmas = sigmas[source : source + 1]
         self.model_error = min(self.model_error, self.max_model_error)
 

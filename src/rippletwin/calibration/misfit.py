@@ -51,7 +51,7 @@ def misfit(model: ErrorModel, theta: np.ndarray) -> Misfit:
     A free source gets its most likely amplitude at each frequency, so the misfit then is that of
     the ratios between sensors.
     """
-    pairs = {}
+    pairs: dict[str, list] = {}
     for o, (measured, h, _) in zip(model.observations, model.by_observation(model.predict(theta))):
         if o.source == "free":
             h = h * (np.sum(np.conj(h) * measured, 0) / np.sum(np.abs(h) ** 2, 0))

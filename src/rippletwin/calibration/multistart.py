@@ -89,7 +89,7 @@ def distinct_modes(modes: Sequence[State], distance: float = 0.05) -> list[State
 
     distance   largest difference of a coordinate, in prior standard deviations
     """
-    kept = []
+    kept: list = []
     for mode in sorted(modes, key=lambda m: m[0]):
         if all(np.max(np.abs(mode[1] - k[1])) > distance for k in kept):
             kept.append(mode)

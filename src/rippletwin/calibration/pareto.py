@@ -106,7 +106,7 @@ def calibrate_pareto(
 
 def sensor_misfits(likelihood: Likelihood, theta: np.ndarray) -> np.ndarray:
     """Squared relative misfit (S,) of each sensor at theta (P,), all observations together."""
-    left, total = 0.0, 0.0
+    left = total = np.zeros(1)
     for measured, h, _ in likelihood.by_observation(likelihood.predict(theta)):
         left = left + np.sum(np.abs(measured - h) ** 2, axis=1)
         total = total + np.sum(np.abs(measured) ** 2, axis=1)

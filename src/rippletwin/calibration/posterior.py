@@ -94,7 +94,8 @@ class Posterior:
         self.source_free = source_free
         self.model_error, self.source_sd, self.smooth_sd = 0.1, float(SOURCE_SDS[1]), 0.0
         self.max_model_error, self._products = np.inf, 0.0
-        self._known_for, self._known_determinant = None, 0.0
+        self._known_for: tuple | None = None
+        self._known_determinant = 0.0
         self.prior = np.array([not p.flat for p in twin.parameters])
         data = [to_predicted_quantity(o, twin.rig) for o in self.observations]
         self._noise = NoiseBasis(np.concatenate([o.covariance for o in data]))
@@ -247,8 +248,8 @@ class Posterior:
             smooth, source, best = np.unravel_index(np.argmin(cost), cost.shape)
             self.model_error = float(model_errors[best])
             self.source_sd, self.smooth_sd = float(sds[source]), float(taus[smooth])
-            ends = [max(best - 1, 0), min(best + 1, len(model_errors) - 1)]
-            model_errors = np.geomspace(*model_errors[ends], 7)
+            low, high = max(int(best) - 1, 0), min(int(best) + 1, len(model_errors) - 1)
+            model_errors = np.geomspace(model_errors[low], model_errors[high], 7)
             sds, taus = sds[source : source + 1], taus[smooth : smooth + 1]
         self.model_error = min(self.model_error, self.max_model_error)
 

@@ -40,10 +40,11 @@ def command(
     Nothing is calculated again: what is not there, the page says, with the command that makes it.
     """
     from rippletwin.report.page import write_report
-    from rippletwin.report.results import read_results
+    from rippletwin.report.results import read_results, refuse_foreign
 
-    results = read_results(case, explained, diagnosed)
+    with refuse_foreign(case):
+        results = read_results(case, explained, diagnosed)
+        path = write_report(results, out)
     warn([*results.case.warnings, *results.missing])
-    path = write_report(results, out)
     print(json.dumps({"report": str(path), "missing": list(results.missing)}) if as_json else path)
     return found_code(["missing"] if results.missing else [], fail_on)

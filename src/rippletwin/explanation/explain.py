@@ -42,10 +42,14 @@ from rippletwin.explanation.checks.alarms import fit_each_observation, read_alar
 from rippletwin.explanation.checks.bootstrap import bootstrap_null
 from rippletwin.explanation.checks.cross_validation import cross_validate
 from rippletwin.explanation.checks.data_contradictions import find_contradictions
-from rippletwin.explanation.checks.prior_sensitivity import compare_without_each_effect
+from rippletwin.explanation.checks.prior_sensitivity import (
+    PriorSensitivity,
+    WithoutEffect,
+    compare_without_each_effect,
+)
 from rippletwin.explanation.checks.profile_intervals import add_profile_intervals
 from rippletwin.explanation.checks.sensor_wiring import find_swapped_sensors
-from rippletwin.explanation.checks.support import judge_effects
+from rippletwin.explanation.checks.support import Support, judge_effects
 from rippletwin.explanation.fit_jobs import FitJob, PlainCalibration, open_workers
 from rippletwin.explanation.localise.free_corrections import locate_mismatch
 from rippletwin.explanation.localise.phase_modulation import (
@@ -130,7 +134,8 @@ def explain_observations(
     early = _select_fitted(early, rig, state.modulation)
     late = _select_fitted(late, rig, state.modulation)
     held_out = late if len(data) == 1 and late else None
-    supports, without = (), ()
+    supports: tuple[Support, ...] = ()
+    without: tuple[WithoutEffect, ...] = ()
     with open_workers(base, data, processes) as workers:
         if not contradiction:
             # Steps 7 to 10: the best explanation and its competitors
@@ -153,7 +158,7 @@ def explain_observations(
             null_distribution = bootstrap_null(search.base, data, draws, processes, progress)
         # Steps 15 and 16: decision
         decision = decide(search, alarms, supports, contradiction, null_distribution)
-        sensitivity = ()
+        sensitivity: tuple[PriorSensitivity, ...] = ()
         if decision.supports:
             sensitivity = compare_without_each_effect(workers, search.best, without)
     # Steps 17 and 18: where the mismatch is

@@ -155,6 +155,7 @@ def score_extension(base: Twin, observations: Sequence, job: FitJob) -> tuple[fl
     """What the newest effect of a job that starts near a fit promises, and the job with the
     starts that promise most (`ScoreTest`); for `Workers.map`."""
     posterior = Posterior(base.with_(effects=job.hypothesis), observations, None, job.source_free)
+    assert isinstance(job.start, NearFit)
     thetas = job.start.all_thetas(base, job.hypothesis, observations)
     test = ScoreTest(base, posterior, thetas)
     return test.gain(), replace(job, start=replace(job.start, thetas=tuple(test.starts)))

@@ -23,6 +23,9 @@ class Trunk(nn.Module):
     is trained for, rad/s; `residual` what training attained, the root of its loss.
     """
 
+    omega: torch.Tensor
+    residual: torch.Tensor
+
     def __init__(self, pieces: int, omega: tuple[float, float], width: int, seed: int):
         super().__init__()
         self.pieces = pieces
@@ -36,12 +39,12 @@ class Trunk(nn.Module):
                 nn.Tanh(),
                 nn.Linear(width, width),
                 nn.Tanh(),
-                nn.Linear(width, 8),
+                last := nn.Linear(width, 8),
             ).double()
-        nn.init.zeros_(self.envelope[-1].weight)
-        nn.init.zeros_(self.envelope[-1].bias)
+        nn.init.zeros_(last.weight)
+        nn.init.zeros_(last.bias)
 
-    def forward(self, piece: np.ndarray, place: np.ndarray, omega, phase):
+    def forward(self, piece, place, omega, phase):
         """Shape functions at P points and F frequencies.
 
         piece (P,) index, place (P,) in 0..1 along it, omega (F,) rad/s, phase (F, D) rad that a

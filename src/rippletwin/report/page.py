@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from rippletwin import store
 from rippletwin.report.content import Page, WorkflowPart, make_page
-from rippletwin.report.results import Results, read_results
+from rippletwin.report.results import Results, read_results, refuse_foreign
 
 TEMPLATES = "templates"
 
@@ -43,7 +43,8 @@ def report_case(
     diagnosed: str | Path | None = None,
 ) -> Path:
     """Write the report of the case and the results in its folders, as `read_results` finds them."""
-    return write_report(read_results(case_folder, explained, diagnosed), path)
+    with refuse_foreign(case_folder):
+        return write_report(read_results(case_folder, explained, diagnosed), path)
 
 
 def write_report(results: Results, path: str | Path, workflow: WorkflowPart | None = None) -> Path:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -85,6 +86,23 @@ def read_results(
         diagnosed=diagnosed_numbers.load(diagnosis_folder),
         missing=tuple(missing),
     )
+
+
+@contextmanager
+def refuse_foreign(case_folder: str | Path) -> Iterator[None]:
+    """Turn what results raise that no command has written so into an InputError: they are JSON
+    that may have been edited, or come from another version."""
+    try:
+        yield
+    except InputError:
+        raise
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise InputError(
+            case_folder,
+            "results",
+            f"are not as the commands write them ({error!r})",
+            "Run explain and diagnose again",
+        ) from error
 
 
 def _folder(named: str | Path | None, default: Path, file: str, option: str) -> Path:

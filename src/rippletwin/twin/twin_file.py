@@ -114,6 +114,6 @@ def load_twin(path: str | Path, effects: Iterable[str | Path] = ()) -> Twin:
         raise InputError(path, error.field, error.problem, error.remedy) from None
     except OSError as error:
         problem = f"cannot be read ({error.strerror})"
-    except (ValueError, KeyError, TypeError) as error:
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         problem = f"holds no twin ({error!r})"
     raise InputError(path, "twin", problem, "Give a twin.json as calibrate or explain writes it")

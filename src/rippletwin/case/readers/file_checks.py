@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -43,6 +44,23 @@ def check_size(path: Path, field: str, count: int, limit_gib: float = MAX_GIB) -
             f"{limit_gib:.3g} GiB",
             "Cut the recording to a shorter stretch; a hundred revolutions and more are enough",
         )
+
+
+class BoundedFile(io.BufferedReader):
+    """A file of which no more is read at once than it has left: a library that believes a damaged
+    header would have Python allocate what it asks for first."""
+
+    def __init__(self, path: Path):
+        super().__init__(io.FileIO(path))
+        self._size = path.stat().st_size
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        left = max(self._size - self.tell(), 0)
+        return super().read(left if size is None or size < 0 else min(size, left))
+
+    def fileno(self) -> int:
+        """None: with a number of the operating system, numpy would read past `read`."""
+        raise io.UnsupportedOperation("fileno")
 
 
 @contextmanager

@@ -20,8 +20,7 @@ from rippletwin.case.readers.signals import Signals
 
 def read(path: Path, layout: Layout) -> Signals:
     """Read an HDF5 recording; raises InputError."""
-    damaged = refuse_damaged(path, "is cut short or not HDF5", errors=OSError)
-    with damaged, h5py.File(path, "r") as file:
+    with refuse_damaged(path, "is cut short or not HDF5"), h5py.File(path, "r") as file:
         return read_arrays(
             ArrayFile(
                 path,

@@ -12,12 +12,14 @@ from pathlib import Path
 import h5py
 import numpy as np
 import scipy.io
+from scipy.io.matlab import matfile_version
 
 from rippletwin.case.readers.arrays import ArrayFile, read_arrays
 from rippletwin.case.readers.file_checks import check_size, refuse_damaged
 from rippletwin.case.readers.hdf5_items import datasets_in, find_dataset
 from rippletwin.case.readers.layout import Layout
 from rippletwin.case.readers.signals import Signals, numbers
+from rippletwin.errors import InputError
 
 STRUCTS = ("struct", "object")
 
@@ -26,11 +28,16 @@ def read(path: Path, layout: Layout) -> Signals:
     """Read a MATLAB recording; raises InputError."""
     again = "Save it again from MATLAB: save(file, 'pressure', 'sampling_rate_hz')"
     with refuse_damaged(path, "is cut short or not a MATLAB file", again):
-        return _read_v73(path, layout) if h5py.is_hdf5(path) else _read_v5(path, layout)
+        if h5py.is_hdf5(path):
+            return _read_v73(path, layout)
+        if matfile_version(path)[0] == 0:
+            # its headers are four numbers that nothing checks: what they claim would be allocated
+            raise InputError(path, "file", "of MATLAB's version 4, or damaged", again)
+        return _read_v5(path, layout)
 
 
 def _read_v5(path: Path, layout: Layout) -> Signals:
-    """A file of v5 or older."""
+    """A file of v5 to v7."""
     variables = {name: (shape, kind) for name, shape, kind in scipy.io.whosmat(path)}
     loaded: dict[str, object] = {}
 

@@ -11,7 +11,12 @@ from pathlib import Path
 import numpy as np
 from nptdms import TdmsFile
 
-from rippletwin.case.readers.file_checks import check_readable, check_size, refuse_damaged
+from rippletwin.case.readers.file_checks import (
+    BoundedFile,
+    check_readable,
+    check_size,
+    refuse_damaged,
+)
 from rippletwin.case.readers.layout import Layout, choose, find_time, missing_name
 from rippletwin.case.readers.signals import Signals, numbers, one_number
 from rippletwin.errors import InputError
@@ -28,7 +33,8 @@ def read(path: Path, layout: Layout) -> Signals:
             "cannot be read: it does not begin as TDMS files do",
             "Copy it again from where it was recorded, or correct the suffix of its name",
         )
-    with refuse_damaged(path, "is cut short or not TDMS"), TdmsFile.open(path) as file:
+    damaged = refuse_damaged(path, "is cut short or not TDMS")
+    with damaged, BoundedFile(path) as bytes_of_file, TdmsFile.open(bytes_of_file) as file:
         channels = _channels(path, file, layout)
         names = [channel.name for channel in channels]
         chosen = [channels[k] for k in choose(path, layout, names)]

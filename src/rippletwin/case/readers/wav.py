@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy.io import wavfile
 
-from rippletwin.case.readers.file_checks import check_size, refuse_damaged
+from rippletwin.case.readers.file_checks import BoundedFile, check_size, refuse_damaged
 from rippletwin.case.readers.layout import SAMPLES_BY_SENSORS, Layout, rows_of
 from rippletwin.case.readers.signals import Signals, numbers
 from rippletwin.errors import InputError
@@ -25,7 +25,8 @@ def read(path: Path, layout: Layout) -> Signals:
     check_size(path, "file", path.stat().st_size // BYTES_OF_24_BITS)
     with refuse_damaged(path, "is cut short or not WAV"), warnings.catch_warnings():
         warnings.simplefilter("ignore", wavfile.WavFileWarning)  # chunks of other programs
-        rate, values = wavfile.read(path)
+        with BoundedFile(path) as file:
+            rate, values = wavfile.read(file)
     if not values.size:
         raise InputError(path, "file", "no samples", "Copy it again from where it was recorded")
     if values.dtype == np.int32 and not np.any(values % LOW_BYTE):

@@ -163,7 +163,7 @@ def find_incompatible_recordings(observations: Sequence, delay: float) -> str:
     not known which one is wrong.
     """
     periodic = [o for o in observations if o.orders is not None and o.speed_hz]
-    differs = {}
+    differs: dict[int, list[bool]] = {}
     for a, b in combinations(range(len(periodic)), 2):
         x, y = periodic[a], periodic[b]
         if not _same_operating_point(x, y):
@@ -198,7 +198,7 @@ def find_clipping_plateau(recording, sensor: str, row: np.ndarray) -> str:
         return ""
     for side, x in (("top", high - row), ("bottom", row - low)):
         outer, next_ = np.count_nonzero(x < step), np.count_nonzero((x >= step) & (x < 2 * step))
-        if outer > PLATEAU_SHARE * row.size and outer > PLATEAU_CROWDING * max(next_, 1):
+        if outer > PLATEAU_SHARE * row.size and outer > PLATEAU_CROWDING * max(int(next_), 1):
             return f"sensor {sensor} is clipped at the {side} in {recording.label}"
     return ""
 

@@ -84,7 +84,7 @@ def _judge_each(
     rig, values = best.twin.rig, best.twin.effect_values(best.twin.theta)
     owns = [own_element(effect, place, value, rig) for effect, place, value in values]
     elements = elements_of(rig, workers.observations, owns)
-    jobs = [(best, None, elements)]
+    jobs: list[tuple] = [(best, None, elements)]
     for each in without:
         start = transfer_theta(best, each.stated.hypothesis, workers.base)
         jobs += [(each.stated, None, elements), (each.stated, start, elements)]

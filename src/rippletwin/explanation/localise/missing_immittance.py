@@ -76,7 +76,9 @@ def observable_of(
     return reflection(impedance / scale)[None]
 
 
-def whitened_columns(posterior: Posterior, prediction: np.ndarray, moved: Sequence) -> np.ndarray:
+def whitened_columns(
+    posterior: Posterior, prediction: np.ndarray, moved: np.ndarray | Sequence
+) -> np.ndarray:
     """Whitened differences (..., S, F) of predictions `moved` (..., S, F) from `prediction`.
 
     A free source keeps its most likely amplitude at `prediction`.
@@ -223,7 +225,7 @@ def describe_law(
     w = 2 * np.pi * np.asarray(frequency_hz)
     weight = 1.0 / np.sqrt(w) if weight is None else np.asarray(weight)
     time_constant_law = "proportional to jw/(1 + jw tau), like a relaxing compliance"
-    shapes_by_law = {
+    shapes_by_law: dict[str, list[np.ndarray]] = {
         "flat and real, like a leak or a resistance": [np.ones_like(w) + 0j],
         "proportional to jw, like a compliance or an inertance": [1j * w],
         "proportional to 1/jw, like a series inertance or compliance": [1 / (1j * w)],
@@ -269,10 +271,12 @@ def is_passive(fit: Fit, effect_index: int = -1) -> bool:
     s = np.concatenate([1j * w, *(w * (np.tan(a) + 1j) * np.cos(a) for a in (0.3, 0.9, 1.5))])
     v, fluid = twin.arrays(twin.theta), twin.rig.fluid
     state = LineState(fluid.density, v.viscosity, v.diameters, v.wave_speeds, v.lengths)
-    shunt = [
-        shunt_admittance(s, density=fluid.density, wave_speed=a, diameter=d)
-        for a, d in zip(v.wave_speeds, v.diameters)
-    ]
+    shunt = np.array(
+        [
+            shunt_admittance(s, density=fluid.density, wave_speed=a, diameter=d)
+            for a, d in zip(v.wave_speeds, v.diameters)
+        ]
+    )
     line = FrequencyDomainLine(s, v.lengths, series=np.ones((len(v.lengths), len(s))), shunt=shunt)
     if effect.immittances is not None:
         immittances = effect.immittances(line, state, values, place)

@@ -58,12 +58,12 @@ def modulation_differs(
     one: ShaftOrders | None, other: ShaftOrders | None, observations: Sequence
 ) -> bool:
     """Whether two estimates of the modulation differ enough to change the fitted ripple."""
-    one, other = _modulation_of(one), _modulation_of(other)
+    first, second = _modulation_of(one), _modulation_of(other)
     highest_order = {o.label: np.max(o.orders) for o in observations if o.orders is not None}
     return any(
-        highest_order.get(label, 0.0) * abs(one.get(label, 0.0) - other.get(label, 0.0))
+        highest_order.get(label, 0.0) * abs(first.get(label, 0.0) - second.get(label, 0.0))
         > MIN_PHASE_CHANGE
-        for label in {*one, *other}
+        for label in {*first, *second}
     )
 
 

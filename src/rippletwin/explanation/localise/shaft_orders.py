@@ -195,8 +195,8 @@ def fit_modulation(
 
     if start is None:
         unmodulated, step = residual((0, 0)), 1e-6
-        slope = [(residual(d) - unmodulated) / step for d in ((step, 0), (0, step))]
-        slope, starts = np.stack(slope, axis=1), []
+        slopes = [(residual(d) - unmodulated) / step for d in ((step, 0), (0, step))]
+        slope, starts = np.stack(slopes, axis=1), []
         for limit in PISTON_ORDER_LIMITS:
             low = np.tile(orders[is_shaft_order] < limit * pistons, 2)
             starts.append(np.linalg.lstsq(-slope[low], unmodulated[low], rcond=None)[0])

@@ -239,7 +239,7 @@ def elements_of(rig, observations: Sequence, own: Sequence[tuple] = ()) -> list[
     or indices); ("shunt" or "series", position in m). `own` are further ones.
     """
     positions = (np.arange(MAX_POSITIONS) + 0.5) / MAX_POSITIONS * rig.length
-    elements = [(NONE, None)]
+    elements: list[tuple] = [(NONE, None)]
     if not all(o.kind == "input_impedance" for o in observations):
         elements += [("source", None), *(("sensor", k) for k in range(len(rig.sensors)))]
     elements += [

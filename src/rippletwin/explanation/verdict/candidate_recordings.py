@@ -78,7 +78,7 @@ def _operating_points(twin: Twin, periodic: Sequence[Observation]) -> list:
         SPEED_STEP_RPM * round(60 * speed * factor / SPEED_STEP_RPM)
         for factor in (*SPEED_FACTORS, 1.0)
     }
-    loads = [None]
+    loads: list[float | None] = [None]
     if pressures:
         loads = [float(f"{np.median(pressures) * factor:.2g}") for factor in PRESSURE_FACTORS]
     candidates = []

@@ -99,7 +99,8 @@ class _Rival:
 
     def __init__(self, rig: Rig, observations, effect=None, base=None):
         effects = () if effect is None else (effect,)
-        self.name, self.place = ("", "") if effect is None else (effect[0].name, str(effect[1]))
+        self.name: str = "" if effect is None else effect[0].name
+        self.place: str = "" if effect is None else str(effect[1])
         self.observations = list(observations)
         self.twin = Twin(rig, observations, effects=effects)
         flat = [parameter.flat for parameter in self.twin.parameters]

@@ -6,6 +6,7 @@ import json
 import os
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -108,7 +109,7 @@ def _shaft_effects(e: Explanation) -> list[dict]:
 
 def _shaft_effect(shaft_orders: ShaftOrders, support: str) -> dict:
     """It has no `probability`: no evidence was calculated for it."""
-    amplitude = {"value": shaft_orders.value}
+    amplitude: dict[str, Any] = {"value": shaft_orders.value}
     if shaft_orders.interval is not None:
         amplitude["ci95"] = list(shaft_orders.interval)
     amplitude["unit"] = "rad" if shaft_orders.name == "speed_fluctuation" else "1"
@@ -159,7 +160,7 @@ def _where(e: Explanation, entries: list[dict]) -> dict:
         element, position = location.element, list(location.position)
         if element == "position":
             element = stretch_between_sensors(e.rig, *position)
-    where = {
+    where: dict[str, Any] = {
         "element": element,
         "position_m": position,
         "bands_hz": residual_bands.residual_frequency_bands(base, e.observations),

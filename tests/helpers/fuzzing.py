@@ -1,0 +1,163 @@
+"""Inputs that nobody would write: good ones, damaged at random, within a limit of memory.
+
+The environment variable RIPPLETWIN_FUZZ states how many inputs each test tries; without it there
+are few, and always the same.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from hypothesis import HealthCheck, Phase, settings
+from hypothesis import strategies as st
+
+ASKED = os.environ.get("RIPPLETWIN_FUZZ")
+FEW = 424
+MORE_MEMORY = 1 << 30  # bytes that reading any input may take
+
+
+def tried(share: float = 1.0) -> settings:
+    """Settings of a test that tries `share` of the usual number of inputs."""
+    return settings(
+        max_examples=max(int(share * int(ASKED or FEW)), 1),
+        derandomize=ASKED is None,
+        database=None,
+        deadline=None,
+        phases=[Phase.explicit, Phase.generate],  # to shrink an input takes longer than to find it
+        suppress_health_check=list(HealthCheck),
+    )
+
+
+@contextmanager
+def little_memory():
+    """Allocations fail once the process has MORE_MEMORY more than now; address space that a library
+    reserves and does not use does not count."""
+    before = resource.getrlimit(resource.RLIMIT_DATA)
+    pages = int(Path("/proc/self/statm").read_text().split()[5])
+    limit = pages * resource.getpagesize() + MORE_MEMORY
+    resource.setrlimit(resource.RLIMIT_DATA, (limit, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_DATA, before)
+
+
+def refused(error: BaseException) -> bool:
+    """Whether an InputError is told in words, and no allocation failed on the way to it."""
+    words = str(error)
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, MemoryError):
+            return False
+        cause = cause.__cause__ or cause.__context__
+    return bool(words)
+
+
+# ---- bytes ----
+
+TOKENS = (
+    b"\x00" * 8, b"\xff" * 8, b"\x7f\xff\xff\xff", b"\xff\xff\xff\x7f", b"\x00\x00\x00\x80",
+    b"\x01\x00\x00\x00", b"nan", b"1e999", b"-1", b"0", b",", b";", b"\t", b"\n", b"\r\n", b'"',
+    b"{", b"}", b"[", b"]", b": ", b"- ", b"&a ", b"*a", b"!!python/none", b"\xef\xbb\xbf",
+    "é".encode(), b"#", b"%", b"'", b"~", b"null", b"1_0", b"0x10", b"1:30", b"<<: ",
+)  # fmt: skip
+"""What readers of text and of binary headers stumble over."""
+
+_WHERE = st.floats(0.0, 1.0, exclude_max=True)
+_BYTES = st.one_of(st.sampled_from(TOKENS), st.binary(min_size=1, max_size=8))
+_EDIT = st.one_of(
+    st.tuples(st.just("write"), _WHERE, _BYTES),
+    st.tuples(st.just("insert"), _WHERE, _BYTES),
+    st.tuples(st.just("remove"), _WHERE, st.integers(1, 64)),
+    st.tuples(st.just("repeat"), _WHERE, st.integers(1, 64)),
+    st.tuples(st.just("flip"), _WHERE, st.integers(0, 7)),
+    st.tuples(st.just("cut"), _WHERE, st.just(0)),
+)
+EDITS = st.lists(_EDIT, min_size=1, max_size=4)
+"""Edits of a file, for `edited`."""
+
+
+def edited(good: bytes, edits: list[tuple[str, float, Any]], head: int | None = None) -> bytes:
+    """`good` after edits; places are in its first `head` bytes where that is given."""
+    data = bytearray(good)
+    for kind, where, what in edits:
+        at = int(where * min(len(data), head or len(data)))
+        if kind == "write":
+            data[at : at + len(what)] = what
+        elif kind == "insert":
+            data[at:at] = what
+        elif kind == "remove":
+            del data[at : at + what]
+        elif kind == "repeat":
+            data[at:at] = data[at : at + what]
+        elif kind == "flip" and data:
+            data[min(at, len(data) - 1)] ^= 1 << what
+        elif kind == "cut":
+            del data[at:]
+    return bytes(data)
+
+
+# ---- trees of plain data ----
+
+_NUMBERS = st.one_of(
+    st.integers(-10, 10),
+    st.floats(),
+    st.sampled_from([0, -1, 1e-300, 1e300, -1e300, 2**63, 10**308, 1e-6, 1e6, 0.5, 1.0]),
+)
+_WORDS = st.one_of(
+    st.text(max_size=12),
+    st.sampled_from(["", "healthy", "unknown", "../x", "/etc/passwd", "\x00", "a" * 300, "p1"]),
+)
+VALUES = st.recursive(
+    st.one_of(st.none(), st.booleans(), _NUMBERS, _WORDS),
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=3), st.dictionaries(st.text(max_size=6), inner, max_size=3)
+    ),
+    max_leaves=6,
+)
+TREE_EDITS = st.lists(
+    st.tuples(
+        st.sampled_from(["set", "drop", "add", "twice"]), _WHERE, VALUES, st.text(max_size=6)
+    ),
+    min_size=1,
+    max_size=3,
+)
+"""Edits of a tree of dictionaries, lists and values, for `edited_tree`."""
+
+
+def edited_tree(good: Any, edits: list[tuple[str, float, Any, str]]) -> Any:
+    """A copy of plain data after edits, each at one of its nodes."""
+    tree = [json.loads(json.dumps(good))]
+    for kind, where, value, key in edits:
+        places = _places(tree)
+        holder, name = places[int(where * len(places))]
+        inner = holder[name]
+        if kind == "set":
+            holder[name] = value
+        elif kind == "add" and isinstance(inner, dict):
+            inner[key] = value
+        elif kind == "add" and isinstance(inner, list):
+            inner.append(value)
+        elif kind == "twice" and isinstance(inner, list):
+            inner.extend(inner[:20])
+        elif kind == "drop" and holder is not tree:
+            del holder[name]
+    return tree[0]
+
+
+def _places(tree: Any) -> list[tuple[Any, Any]]:
+    """(holder, key or index) of every node below `tree`."""
+    found, pending = [], [tree]
+    while pending:
+        holder = pending.pop()
+        names = holder.keys() if isinstance(holder, dict) else range(len(holder))
+        for name in names:
+            found.append((holder, name))
+            if isinstance(holder[name], (dict, list)):
+                pending.append(holder[name])
+    return found
