@@ -248,6 +248,7 @@ class ForwardModel:
         if whole is None:
             wide, seen = self._extended_for_compliance
             whole = wide._linear(theta)
+            whole.source_flow = np.array(whole.source_flow)
             whole.source_flow[seen] = network.source_flow
             solver = wide.compliance_solver
             tolerance = min(COUPLED_ORIFICE_TOLERANCE, solver.tolerance)

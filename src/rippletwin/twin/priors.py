@@ -24,8 +24,8 @@ class Prior:
     """
 
     kind: str
-    centre: float
-    scale: float
+    centre: float | np.ndarray  # arrays: one kind of prior for many parameters (`Priors`)
+    scale: float | np.ndarray
 
     def value(self, u):
         """Parameter at coordinate u, any shape."""
@@ -57,25 +57,20 @@ class Priors:
     """Several priors at once."""
 
     def __init__(self, priors: Sequence[Prior]):
-        self._kinds = [
-            (kind, np.array([k for k, p in enumerate(priors) if p.kind == kind]))
-            for kind in dict.fromkeys(p.kind for p in priors)
-        ]
-        self._alike = [
-            Prior(kind, *(np.array([getattr(priors[k], name) for k in own]) for name in _NUMBERS))
-            for kind, own in self._kinds
-        ]
         self._count = len(priors)
+        self._kinds = []
+        for kind in dict.fromkeys(p.kind for p in priors):
+            own = np.array([k for k, p in enumerate(priors) if p.kind == kind])
+            centres = np.array([priors[k].centre for k in own])
+            scales = np.array([priors[k].scale for k in own])
+            self._kinds.append((own, Prior(kind, centres, scales)))
 
     def value(self, u: np.ndarray) -> np.ndarray:
         """Parameters (P,) at coordinates u (P,)."""
         values = np.empty(self._count)
-        for (_, own), prior in zip(self._kinds, self._alike):
+        for own, prior in self._kinds:
             values[own] = prior.value(u[own])
         return values
-
-
-_NUMBERS = "centre", "scale"
 
 
 def normal(mean: float, deviation: float) -> Prior:

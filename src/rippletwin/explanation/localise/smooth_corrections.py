@@ -112,7 +112,7 @@ class SmoothCorrections:
             linear.append((r, columns @ columns.T, columns @ r))
             scales = np.array([self._scale(a, len(columns)) for a in amplitudes])
             values[k] = _log_likelihoods(*linear[k], scales) - log_determinant
-        solved = []
+        solved: list[tuple] = []
         for m in np.argsort(-np.max(values, axis=0)):
             k = int(np.argmax(values[:, m]))
             if solved and values[k, m] < max(each[0] for each in solved) - NEGLIGIBLE:
@@ -121,7 +121,8 @@ class SmoothCorrections:
             values[:, m] += gain
             solved.append((values[k, m], float(self._errors[k]), correction))
         evidence = logsumexp(values) - np.log(len(amplitudes) * len(MODEL_ERRORS))
-        return _Solved(float(evidence), *max(solved, key=lambda each: each[0])[1:], change)
+        _, model_error, correction = max(solved, key=lambda each: each[0])
+        return _Solved(float(evidence), model_error, correction, change)
 
     def _scale(self, amplitude: float, count: int) -> np.ndarray:
         """Prior standard deviations of the parameters and of the correction's amplitudes."""

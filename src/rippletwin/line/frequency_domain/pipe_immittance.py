@@ -45,7 +45,11 @@ def series_impedance(
 
 
 def shunt_admittance(
-    s: np.ndarray, *, density: float, wave_speed: float, diameter: float
+    s: np.ndarray,
+    *,
+    density: float,
+    wave_speed: float | np.ndarray,
+    diameter: float | np.ndarray,
 ) -> np.ndarray:
     """Shunt admittance Y'(s) = A s/(rho a^2) in m2/(Pa s); all arguments broadcast."""
     area = 0.25 * np.pi * diameter**2
