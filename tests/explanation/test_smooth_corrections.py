@@ -14,7 +14,7 @@ from rippletwin.explanation.localise.smooth_corrections import (
     CORRELATION_HZ,
     NONE,
     SmoothCorrections,
-    _log_likelihood,
+    _log_likelihoods,
     elements_of,
     own_element,
     smooth_basis,
@@ -28,14 +28,15 @@ from synthetic_observations import POINTS, make, rig
 
 
 def test_likelihood_is_that_of_the_dense_covariance():
-    """Woodbury's identity against scipy's multivariate normal density."""
+    """Woodbury's identity against scipy's multivariate normal density, for two scales at once."""
     rng = np.random.default_rng(0)
     columns, r = rng.normal(size=(5, 30)), rng.normal(size=30)
-    scale = np.array([1.0, 1.0, 0.3, 0.3, 2.0])
-    scaled = columns * scale[:, None]
-    dense = multivariate_normal(np.zeros(30), np.eye(30) + scaled.T @ scaled).logpdf(r)
-    value = _log_likelihood(r, columns @ columns.T, columns @ r, scale)
-    assert value - 15.0 * np.log(2.0 * np.pi) == pytest.approx(dense)
+    scales = np.array([[1.0, 1.0, 0.3, 0.3, 2.0], [1.0, 0.5, 0.1, 3.0, 2.0]])
+    values = _log_likelihoods(r, columns @ columns.T, columns @ r, scales)
+    for scale, value in zip(scales, values):
+        scaled = columns * scale[:, None]
+        dense = multivariate_normal(np.zeros(30), np.eye(30) + scaled.T @ scaled).logpdf(r)
+        assert value - 15.0 * np.log(2.0 * np.pi) == pytest.approx(dense)
 
 
 def test_basis_has_the_kernel_of_unit_complex_variance():
