@@ -216,7 +216,7 @@ class SmoothCorrections:
         """Log likelihood with the correction of an element at the fit's own model error and the
         most likely amplitude, to first order."""
         at = int(np.argmin(np.abs(np.log(self._errors / self.fit.model_error))))
-        r, jacobian, log_determinant = self._expanded[at]
+        r, _, log_determinant = self._expanded[at]
         _, gram, along = self._columns(at, self._free_changes(self.change(element)))
         scales = np.array([self._scale(a, len(gram)) for a in AMPLITUDES])
         return float(np.max(_log_likelihoods(r, gram, along, scales)) - log_determinant)
