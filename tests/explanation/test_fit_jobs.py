@@ -43,7 +43,7 @@ def calls(monkeypatch):
         recorded.append(("continuation", base, observations, list(starts), source_free, draws))
         return made_fit(0.0, *hypothesis)
 
-    def refine(base, hypothesis, observations, thetas, source_free, exact):
+    def refine(base, hypothesis, observations, thetas, source_free, exact, **options):
         recorded.append(("refine", base, observations, thetas, source_free, exact))
         return made_fit(0.0, *hypothesis)
 

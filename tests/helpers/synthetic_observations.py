@@ -6,6 +6,7 @@ import numpy as np
 
 from paper_rig import paper_rig
 from rippletwin.case.model import FlowRipple
+from rippletwin.harmonics import one_period, peak_amplitudes
 from rippletwin.spectra.observation import Observation
 from rippletwin.twin.forward_model import ForwardModel
 from rippletwin.twin.twin import Twin
@@ -29,6 +30,16 @@ def ripple(speed_hz, pressure, depth=1.0):
         flow -= 0.5 * np.exp(-0.5 * ((own - 0.12) / 0.04) ** 2) * pressure / 1e7
     flow = 1.0 + depth * (flow / flow.mean() - 1.0)
     return FlowRipple(np.rad2deg(angle), flow * 40e-6 * speed_hz, pressure)
+
+
+def _with_error(flow_ripple, speed_hz, size, rng):
+    """The ripple with a relative error of its harmonics that is smooth in frequency."""
+    c = rng.normal(size=(4, 2)) @ np.array([1, 1j])
+    flow = peak_amplitudes(flow_ripple.flow)
+    frequency_hz = speed_hz * np.arange(len(flow))
+    waves = np.cos(np.pi * np.outer(np.arange(4), frequency_hz) / 4000)
+    flow[1:] *= 1 + 0.5 * size * (c @ waves)[1:]
+    return replace(flow_ripple, flow=one_period(flow, len(flow_ripple.flow)))
 
 
 def make(rng, effects=(), values=None, sensors=3, points=POINTS, source=0.03, noise=2e3, depth=1.0):
@@ -62,11 +73,11 @@ def make(rng, effects=(), values=None, sensors=3, points=POINTS, source=0.03, no
             theta[k] = rng.uniform(-np.pi / 9, np.pi / 9) / 0.01
         if p.name in values:
             theta[k] = p.prior.coordinate(values[p.name])
-    forward = ForwardModel(twin, observations)
-    for part, o in zip(forward.slices, observations):
-        c = rng.normal(size=(4, 2)) @ np.array([1, 1j])
-        waves = np.cos(np.pi * np.outer(np.arange(4), o.frequency_hz) / 4000)
-        forward.source.flow[part] *= 1 + 0.5 * source * (c @ waves)
+    true = [
+        replace(o, flow_ripple=_with_error(o.flow_ripple, o.speed_hz, source, rng))
+        for o in observations
+    ]
+    forward = ForwardModel(twin, true)
     recorded = []
     for o, h in zip(observations, forward(theta)):
         error = rng.normal(size=(*h.shape, 2)) @ np.array([1, 1j]) / np.sqrt(2)

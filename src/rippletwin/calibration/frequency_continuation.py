@@ -145,12 +145,14 @@ def refine(
     source_free: bool = False,
     exact: bool = True,
     plain: bool = False,
+    rough: bool = False,
 ) -> Fit:
     """Fit with all frequencies from good starts `thetas`, each (P,).
 
     Of several starts, which differ in their newest effect, the most promising are followed. One
-    alone ends exactly at the mode if `exact`, even where that takes slow derivatives. `source_free`
-    and `plain` are as in `fit_hypothesis`; several starts need the error model of explaining.
+    alone ends exactly at the mode if `exact`, even where that takes slow derivatives, and after a
+    few steps if `rough`. `source_free` and `plain` are as in `fit_hypothesis`; several starts need
+    the error model of explaining.
     """
     model = _error_model(base, hypothesis, observations, source_free, plain)
     thetas = [np.asarray(theta, dtype=float) for theta in thetas]
@@ -161,7 +163,8 @@ def refine(
     else:
         model.predict(thetas[0])
         model.forward.freeze_compliance = True
-    modes = [descend(model, theta, MAX_LAST_STEPS) for theta in thetas]
+    steps, converged = (MAX_STEPS[-1], ROUGHLY_CONVERGED) if rough else (MAX_LAST_STEPS, CONVERGED)
+    modes = [descend(model, theta, steps, converged=converged) for theta in thetas]
     best = min(modes, key=lambda mode: mode[1])[0]
     return laplace_fit(model, hypothesis, _unfreeze_and_refit(model, best, rounds))
 

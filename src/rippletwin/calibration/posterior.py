@@ -48,6 +48,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rippletwin.calibration.error_costs import error_costs
 from rippletwin.calibration.error_model import ObservedRipple
 from rippletwin.calibration.likelihood import to_predicted_quantity
 from rippletwin.calibration.smooth_source import SmoothSourceError, source_scale
@@ -223,8 +224,6 @@ class Posterior:
         if linear is not None:
             self._products = PRODUCT_ERROR**2 * np.mean(np.abs(prediction - linear) ** 2, axis=0)
         h = self._rotate(prediction)
-        squares, inner = np.abs(self._rotated - h) ** 2, np.conj(h) * (self._rotated - h)
-        sizes = np.abs(h) ** 2
         model_errors = MODEL_ERRORS
         any_nominal = len(self._smooth.frequencies) > 0
         sds = SOURCE_SDS if any_nominal else SOURCE_SDS[:1]
@@ -233,21 +232,19 @@ class Posterior:
             model_errors = _neighbours(model_errors, self.model_error)
             sds, taus = _neighbours(sds, self.source_sd), _neighbours(taus, self.smooth_sd)
         for _ in range(2):
-            weight = 1.0 / self._variance(model_errors[:, None, None])
-            square = np.sum(squares * weight, axis=1)  # (D, F)
-            cross = np.sum(inner * weight, axis=1)
-            size = np.maximum(np.sum(sizes * weight, axis=1), 1e-300)
-            stretch = (
-                1.0 + np.where(self._known, 0.0, (self._scale * sds[:, None, None]) ** 2) * size
+            cost = error_costs(
+                self._rotated - h,
+                h,
+                self._noise.variances + self._products,
+                self.power,
+                np.where(self._known, 0.0, np.where(self._free, np.inf, self._scale)),
+                self._smooth.frequencies,
+                self._smooth.basis,
+                model_errors,
+                sds,
+                self._smooth.sds(taus),
+                scale,
             )
-            along = np.where(self._free, 1.0, 1.0 - 1.0 / stretch) * np.abs(cross) ** 2 / size
-            logs = np.log(np.where(self._free, size, stretch))
-            cost = np.sum(scale * (square - along) + logs, axis=2)
-            cost = cost - np.sum(np.log(weight), axis=(1, 2)) + np.zeros((len(taus), 1, 1))
-            if any_nominal:
-                explained, logs = self._smooth.explained(cross, size, stretch, taus)
-                cost -= scale * explained
-                cost += 2 * logs
             smooth, source, best = np.unravel_index(np.argmin(cost), cost.shape)
             self.model_error = float(model_errors[best])
             self.source_sd, self.smooth_sd = float(sds[source]), float(taus[smooth])

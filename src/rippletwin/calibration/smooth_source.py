@@ -29,8 +29,6 @@ class SmoothSourceError:
         size = np.ones((1, smooth.shape[1]))
         self.basis = np.concatenate([scale[nominal] * smooth, size])
         self._size_sd = size_sd
-        pairs = self.basis[:, None] * self.basis
-        self._pairs = pairs.reshape(len(self.basis) ** 2, len(self.frequencies)).T
 
     def sds(self, tau) -> np.ndarray:
         """Standard deviations (..., J) of the amplitudes for tau (...)."""
@@ -42,29 +40,6 @@ class SmoothSourceError:
         """Most likely error (N,) given the derivative `pull` (F,) of the log likelihood by it."""
         amplitudes = self.sds(tau) ** 2 * (self.basis @ pull[self.frequencies])
         return self.basis.T @ amplitudes
-
-    def explained(self, cross, size, stretch, taus) -> tuple[np.ndarray, np.ndarray]:
-        """What the smooth error takes from the sum of squares, and half of what it adds to the
-        log determinant; both (T, G, D).
-
-        cross     (D, F) product of prediction and residual, weighted by the inverse variance
-        size      (D, F) square of the prediction, weighted likewise
-        stretch   (G, D, F) variance along the prediction that the independent errors leave
-        taus      (T,)
-        """
-        gain = 1.0 / stretch[..., self.frequencies]
-        gram = ((size[:, self.frequencies] * gain) @ self._pairs).reshape(
-            *gain.shape[:2], len(self.basis), -1
-        )
-        share = (cross[:, self.frequencies] * gain) @ self.basis.T  # (G, D, J)
-        sds = self.sds(taus)[:, None, None]  # (T, 1, 1, J)
-        root = np.linalg.cholesky(
-            np.eye(len(self.basis)) + sds[..., None] * gram * sds[..., None, :]
-        )
-        both = np.stack([share.real, share.imag], axis=-1)
-        solved = np.linalg.solve(root, sds[..., None] * both)
-        logs = np.sum(np.log(np.diagonal(root, axis1=-2, axis2=-1)), axis=-1)
-        return np.sum(solved**2, axis=(-2, -1)), logs
 
 
 def smooth_basis(frequency_hz: np.ndarray, recording: np.ndarray) -> np.ndarray:

@@ -50,10 +50,12 @@ class Continuation:
 
 @dataclass(frozen=True, eq=False)
 class FromTheta:
-    """Start on all frequencies at `theta` (P,); with `exact` end at the exact mode (`refine`)."""
+    """Start on all frequencies at `theta` (P,); with `exact` end at the exact mode, with `rough`
+    after a few steps (`refine`)."""
 
     theta: np.ndarray
     exact: bool = True
+    rough: bool = False
 
     def count_starts(self, rig, hypothesis: Hypothesis) -> int:
         """Number of starts: one."""
@@ -61,7 +63,9 @@ class FromTheta:
 
     def fit(self, base: Twin, hypothesis: Hypothesis, observations, source_free: bool) -> Fit:
         """Fit `hypothesis` from `theta`."""
-        return refine(base, hypothesis, observations, [self.theta], source_free, self.exact)
+        return refine(
+            base, hypothesis, observations, [self.theta], source_free, self.exact, rough=self.rough
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,10 +161,11 @@ def score_extension(base: Twin, observations: Sequence, job: FitJob) -> tuple[fl
     return test.gain(), replace(job, start=replace(job.start, thetas=tuple(test.starts)))
 
 
-def job_from(fit: Fit, **options) -> FitJob:
+def job_from(fit: Fit, exact: bool = True, **options) -> FitJob:
     """The job that repeats a fit from its mode; `options` are fields of `FitJob`."""
-    start = PlainCalibration if fit.plain else FromTheta
-    return FitJob(fit.hypothesis, start(fit.twin.theta), **options)
+    theta = fit.twin.theta
+    start = PlainCalibration(theta) if fit.plain else FromTheta(theta, exact)
+    return FitJob(fit.hypothesis, start, **options)
 
 
 def job_without_effect(fit: Fit, k: int, base: Twin) -> FitJob:

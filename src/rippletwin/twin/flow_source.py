@@ -52,14 +52,19 @@ class FlowSource:
                 if np.any(self.admittance[part]):  # a ripple given is an ideal source
                     added[part] = own
         self.changes = [(k, *each) for k, each in changes.items()]
+        self._changing = np.array([k for k, *_ in self.changes], int)
+        self._slopes, self._curvatures = (
+            np.array([flow[m] for _, flow, _ in self.changes]) for m in (0, 1)
+        )
+        self._admittances = np.array([own for *_, own in self.changes])
 
     def at(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Flow and admittance (F,) at `theta`, with shaft angles of 0."""
-        flow, admittance = self.flow.copy(), self.admittance.copy()
-        for k, (slope, curvature), own in self.changes:
-            flow += theta[k] * (slope + theta[k] * curvature)
-            admittance += theta[k] * own
-        return flow, admittance
+        if not self.changes:
+            return self.flow.copy(), self.admittance.copy()
+        u = theta[self._changing]
+        flow = self.flow + u @ self._slopes + u**2 @ self._curvatures
+        return flow, self.admittance + u @ self._admittances
 
     def turn(self, theta: np.ndarray) -> np.ndarray:
         """Phase factor (F,) of the shaft angles at the first samples: exp(j k angle) at order k."""

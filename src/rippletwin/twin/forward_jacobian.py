@@ -144,12 +144,16 @@ class DifferentiableForward(ForwardModel):
         if not np.array_equal(self._frozen_at, theta):
             self(theta)
 
-    def _balance(self, network, theta):
+    @property
+    def _orifice_is_exact(self):
+        return not (self._freeze or self.freeze_compliance) and super()._orifice_is_exact
+
+    def _balance(self, network, theta, whole):
         factor = self.twin.load_factor(theta)
         if self._freeze:
             self._set_frozen_outflows(network)
             if self._orifice is not None:
-                self._balance_frozen(network, factor, self._remainder)
+                network.load_outflow = factor * self._remainder
             return
         linear = network.load_state()
         if self.freeze_compliance:
@@ -157,7 +161,7 @@ class DifferentiableForward(ForwardModel):
             self._set_frozen_outflows(network)
             self._balance_load(network, theta)
         else:
-            super()._balance(network, theta)
+            super()._balance(network, theta, whole)
         if network.outflows is not None:
             positions, outflow = network.outflows
             self._outflows = positions / network.length, outflow
@@ -181,15 +185,6 @@ class DifferentiableForward(ForwardModel):
         if self._outflows is not None:
             shares, outflow = self._outflows
             network.outflows = shares * network.length, outflow
-
-    @staticmethod
-    def _balance_frozen(network, factor, remainder):
-        """Set the state at the load of `network` with the orifice's `remainder` given."""
-        p, q = network.load_state()
-        value, remainder = q / p, factor * remainder
-        a, b, c = network.load_relation()
-        p = (c - b * remainder) / (a + b * value)
-        network.load = "state", (p, value * p + remainder)
 
     def _rate(self, k: int, theta: np.ndarray) -> float:
         """d value/d coordinate of parameter k."""
@@ -264,7 +259,7 @@ class DifferentiableForward(ForwardModel):
             at, outflow = base.outflows
             side_by_side.outflows = at, np.tile(outflow, count)
         if self._orifice is not None:
-            self._balance_frozen(side_by_side, flat(v.load), flat(self._remainder))
+            side_by_side.load_outflow = flat(v.load * self._remainder)
         readings = side_by_side.readings().reshape(-1, *shape)
         return readings * np.broadcast_to(network.sensor_factor, readings.shape)
 

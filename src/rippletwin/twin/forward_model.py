@@ -68,6 +68,7 @@ class ForwardModel:
         self.coefficient = column([p.coefficient for p in points])
         self.source = FlowSource(twin, self.observations, points, self.slices)
         self.back_pressure = rig.load.back_pressure
+        self._mean_pressure = np.nan_to_num(self.load_pressure)
         self.load_impedance = None
         if rig.load.kind == "impedance":
             self.load_impedance = _interpolate(
@@ -121,10 +122,21 @@ class ForwardModel:
     def network(self, theta: np.ndarray) -> FrequencyDomainLine:
         """The line with source, effects and load at `theta`; nonlinear load and compliance are
         solved at full amplitude."""
-        network = self._linear(theta)
+        whole = None
+        if self._orifice is not None and self._orifice_is_exact:
+            wide, seen = self._extended_for_orifice
+            whole = wide._linear(theta)
+            network = whole.at_frequencies(seen)
+        else:
+            network = self._linear(theta)
         if self._orifice is not None or (network.nonlinear_compliances and self._periodic):
-            self._balance(network, theta)
+            self._balance(network, theta, whole)
         return network
+
+    @property
+    def _orifice_is_exact(self) -> bool:
+        """Whether the orifice alone is solved with harmonics above those observed."""
+        return not self.has_nonlinear_compliance
 
     def _linear(self, theta: np.ndarray) -> FrequencyDomainLine:
         """The same line for a small ripple."""
@@ -133,13 +145,12 @@ class ForwardModel:
         series = np.array(
             [self._series(k, d, v.viscosity) for k, d in enumerate(v.diameters)], dtype=complex
         )
-        shunt = np.array(
-            [
-                shunt_admittance(self.s, density=rig.fluid.density, wave_speed=a, diameter=d)
-                for a, d in zip(v.wave_speeds, v.diameters)
-            ]
+        shunt = self._state_factor(theta) * shunt_admittance(
+            self.s,
+            density=rig.fluid.density,
+            wave_speed=v.wave_speeds[:, None],
+            diameter=v.diameters[:, None],
         )
-        shunt = shunt * self._state_factor(theta)
         source, source_admittance = self.source.at(theta)
         network = FrequencyDomainLine(
             s=self.s,
@@ -183,7 +194,7 @@ class ForwardModel:
             diameters=v.diameters,
             wave_speeds=v.wave_speeds,
             lengths=v.lengths,
-            mean_pressure=np.nan_to_num(self.load_pressure),
+            mean_pressure=self._mean_pressure,
             load_resistance=resistance,
             heat_capacity_ratio=fluid.heat_capacity_ratio,
             prandtl=fluid.prandtl,
@@ -194,9 +205,14 @@ class ForwardModel:
             friction=self.twin.friction_law,
         )
 
+    @cached_property
+    def _unit_orifice(self) -> np.ndarray:
+        """`_orifice_admittance` of the nominal coefficient."""
+        return self.coefficient / (2 * np.sqrt(self.load_pressure - self.back_pressure))
+
     def _orifice_admittance(self, factor: float) -> np.ndarray:
         """dq/dp of the orifice at the mean pressures, (F,) m3/(Pa s)."""
-        return factor * self.coefficient / (2 * np.sqrt(self.load_pressure - self.back_pressure))
+        return factor * self._unit_orifice
 
     def _series(self, segment: int, diameter: float, viscosity: float) -> np.ndarray:
         last, value = self._series_cache.get(segment, (None, None))
@@ -221,13 +237,19 @@ class ForwardModel:
             return "impedance", unknown_impedance(self.s, v, self.twin.rig.fluid.density)
         return kind, None
 
-    def _balance(self, network: FrequencyDomainLine, theta: np.ndarray) -> None:
+    def _balance(
+        self, network: FrequencyDomainLine, theta: np.ndarray, whole: FrequencyDomainLine | None
+    ) -> None:
         """Set the full-amplitude state at the load of `network`, and its outflows.
 
-        Both are solved in a model with harmonics above those observed.
+        Both are solved in a model with harmonics above those observed; `whole` is its line where
+        only the orifice is nonlinear.
         """
-        if network.nonlinear_compliances:
-            wide, seen, whole = self._extend_line(network, theta, self._extended_for_compliance)
+        if whole is None:
+            wide, seen = self._extended_for_compliance
+            whole = wide._linear(theta)
+            whole.source_flow = np.array(whole.source_flow)
+            whole.source_flow[seen] = network.source_flow
             solver = wide.compliance_solver
             tolerance = min(COUPLED_ORIFICE_TOLERANCE, solver.tolerance)
             solve_load = wide._load_solver(whole, theta, tolerance=tolerance)
@@ -237,8 +259,8 @@ class ForwardModel:
             network.outflows = positions, outflow[:, seen]
             if self._orifice is not None:
                 network.load = "state", tuple(state)
-        elif self._orifice is not None:
-            wide, seen, whole = self._extend_line(network, theta, self._extended_for_orifice)
+        else:
+            wide, seen = self._extended_for_orifice
             state = wide._load_solver(whole, theta)(*whole.load_relation())
             network.load = "state", tuple(x[seen] for x in state)
 
@@ -263,14 +285,6 @@ class ForwardModel:
             return scale * p, scale * q
 
         return solve_load
-
-    @staticmethod
-    def _extend_line(network: FrequencyDomainLine, theta: np.ndarray, extended: tuple) -> tuple:
-        """The extended model, the columns of `network` in it, and its line at `theta`."""
-        wide, seen = extended
-        whole = wide._linear(theta)
-        whole.source_flow[seen] = network.source_flow
-        return wide, seen, whole
 
     @cached_property
     def _extended_for_compliance(self) -> tuple[ForwardModel, np.ndarray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,8 +24,8 @@ class Prior:
     """
 
     kind: str
-    centre: float
-    scale: float
+    centre: float | np.ndarray  # arrays: one kind of prior for many parameters (`Priors`)
+    scale: float | np.ndarray
 
     def value(self, u):
         """Parameter at coordinate u, any shape."""
@@ -50,6 +51,26 @@ class Prior:
         if self.kind == "bounded":
             return np.arctanh(np.clip(x, -MAX_BOUNDED, MAX_BOUNDED)) / self.scale
         return ndtri(np.clip((x - self.centre) / self.scale, 1e-3, 1 - 1e-3))
+
+
+class Priors:
+    """Several priors at once."""
+
+    def __init__(self, priors: Sequence[Prior]):
+        self._count = len(priors)
+        self._kinds = []
+        for kind in dict.fromkeys(p.kind for p in priors):
+            own = np.array([k for k, p in enumerate(priors) if p.kind == kind])
+            centres = np.array([priors[k].centre for k in own])
+            scales = np.array([priors[k].scale for k in own])
+            self._kinds.append((own, Prior(kind, centres, scales)))
+
+    def value(self, u: np.ndarray) -> np.ndarray:
+        """Parameters (P,) at coordinates u (P,)."""
+        values = np.empty(self._count)
+        for own, prior in self._kinds:
+            values[own] = prior.value(u[own])
+        return values
 
 
 def normal(mean: float, deviation: float) -> Prior:

@@ -46,6 +46,7 @@ from rippletwin.twin.parameters import (
     pump_parameters,
     state_parameter,
 )
+from rippletwin.twin.priors import Priors
 
 SOURCE_SD = 0.05
 """Largest relative standard deviation of a nominal flow ripple's harmonics."""
@@ -129,6 +130,7 @@ class Twin:
             *effect_parameters(self.effects, self._effect_parameters),
         )
         self.index = {p.name: k for k, p in enumerate(self.parameters)}
+        self._line_priors = Priors([p.prior for p in line_parameters(rig)])
         self._reflection = [
             k for k, p in enumerate(self.parameters) if p.name.startswith("reflection[")
         ]
@@ -149,7 +151,7 @@ class Twin:
         """The line's numbers at `theta` as arrays."""
         n = len(self.rig.line)
         k = 3 * n + len(self.rig.sensors)
-        u = np.array([p.value(x) for p, x in zip(self.parameters[: k + 1], theta)])
+        u = self._line_priors.value(theta[: k + 1])
         a, d, lengths = u[: 3 * n].reshape(3, n)
         # A sensor stays on the line however the fit stretches it.
         x = np.clip(u[3 * n : k], 0.0, np.sum(lengths))

@@ -24,7 +24,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
 from scipy.special import logsumexp
 
 from rippletwin.calibration.fit import Fit
@@ -43,6 +42,8 @@ MAX_POSITIONS = 12  # along the line, each a shunt and a series element
 STEP_SHARES = (1.0, 0.5, 0.25)
 """Of the way to the most likely correction, besides none of it. A linear step may overshoot: near a
 sharp resonance a small correction changes the prediction by much."""
+NEGLIGIBLE = 10.0  # log likelihood below the best at which an amplitude no longer counts
+KEPT_PROMISE = 0.5  # log likelihood: a step that falls short by less is not shortened
 FLAT_SD = 1e3  # of a coordinate without a prior
 
 NONE = "nothing"
@@ -109,17 +110,19 @@ class SmoothCorrections:
                 whitened = self._posterior.whiten_slopes(self._prediction, free)[1]
                 columns = np.concatenate([jacobian, whitened])
             linear.append((r, columns @ columns.T, columns @ r))
-            for m, a in enumerate(amplitudes):
-                scale = self._scale(a, len(columns))
-                values[k, m] = _log_likelihood(*linear[k], scale) - log_determinant
-        solved = []
-        for m, a in enumerate(amplitudes):
+            scales = np.array([self._scale(a, len(columns)) for a in amplitudes])
+            values[k] = _log_likelihoods(*linear[k], scales) - log_determinant
+        solved: list[tuple] = []
+        for m in np.argsort(-np.max(values, axis=0)):
             k = int(np.argmax(values[:, m]))
-            gain, correction = self._delinearise(element, k, a, *linear[k])
+            if solved and values[k, m] < max(each[0] for each in solved) - NEGLIGIBLE:
+                continue
+            gain, correction = self._delinearise(element, k, amplitudes[m], *linear[k])
             values[:, m] += gain
             solved.append((values[k, m], float(self._errors[k]), correction))
         evidence = logsumexp(values) - np.log(len(amplitudes) * len(MODEL_ERRORS))
-        return _Solved(float(evidence), *max(solved, key=lambda each: each[0])[1:], change)
+        _, model_error, correction = max(solved, key=lambda each: each[0])
+        return _Solved(float(evidence), model_error, correction, change)
 
     def _scale(self, amplitude: float, count: int) -> np.ndarray:
         """Prior standard deviations of the parameters and of the correction's amplitudes."""
@@ -143,16 +146,22 @@ class SmoothCorrections:
         half = len(amplitudes) // 2
         correction = (amplitudes[:half] + 1j * amplitudes[half:]) @ self._basis[:half]
         self._posterior.model_error = float(self._errors[error])
-        on_the_way = self._least_objective(element, theta, correction, unit)
+        on_the_way = self._least_objective(element, theta, correction, unit, linear)
         return linear - min(self._at_mode[error], on_the_way), correction
 
     def _least_objective(
-        self, element: tuple, theta: np.ndarray, correction: np.ndarray, unit: np.ndarray
+        self,
+        element: tuple,
+        theta: np.ndarray,
+        correction: np.ndarray,
+        unit: np.ndarray,
+        promised: float,
     ) -> float:
         """Least half square sum on the way to a most likely theta (P,) and `correction` (F,) of an
         element, without linearising.
 
-        unit   parameters and amplitudes there, in standard deviations
+        unit       parameters and amplitudes there, in standard deviations
+        promised   the half square sum there, linearised: where it is kept, no other step has less
         """
         posterior, count = self._posterior, len(theta)
         start = np.where(posterior.prior, self.theta, 0.0)
@@ -167,6 +176,8 @@ class SmoothCorrections:
             square += 0.5 * np.sum((start + share * (unit[:count] - start)) ** 2)
             square += 0.5 * np.sum((share * unit[count:]) ** 2)
             least = min(least, float(square))
+            if least < promised + KEPT_PROMISE:
+                break
         return least
 
     def unit(self, element: tuple) -> np.ndarray:
@@ -264,14 +275,15 @@ def smooth_basis(frequency_hz: np.ndarray) -> np.ndarray:
     return np.sqrt(0.5 * values[kept])[:, None] * vectors[:, kept].T
 
 
-def _log_likelihood(r: np.ndarray, gram: np.ndarray, along: np.ndarray, scale: np.ndarray) -> float:
-    """-1/2 r^T C^-1 r - 1/2 log det C with C = I + A^T diag(scale^2) A.
+def _log_likelihoods(
+    r: np.ndarray, gram: np.ndarray, along: np.ndarray, scales: np.ndarray
+) -> np.ndarray:
+    """-1/2 r^T C^-1 r - 1/2 log det C with C = I + A^T diag(scale^2) A, (M,) for `scales` (M, P).
 
     gram = A A^T, along = A r.
     """
-    precision = scale[:, None] * gram * scale
-    precision[np.diag_indices_from(precision)] += 1.0
-    factor = cholesky(precision, lower=True, check_finite=False)
-    shift = solve_triangular(factor, scale * along, lower=True, check_finite=False)
-    square = float(r @ r - shift @ shift)
-    return -0.5 * square - float(np.sum(np.log(np.diag(factor))))
+    precision = scales[:, :, None] * gram * scales[:, None, :] + np.eye(len(gram))
+    factor = np.linalg.cholesky(precision)
+    shift = np.linalg.solve(factor, (scales * along)[:, :, None])[:, :, 0]
+    square = float(r @ r) - np.sum(shift**2, axis=1)
+    return -0.5 * square - np.sum(np.log(np.diagonal(factor, axis1=1, axis2=2)), axis=1)

@@ -16,6 +16,7 @@ from rippletwin.explanation.fit_jobs import (
     FitJob,
     FromTheta,
     Workers,
+    job_from,
     rank_by_evidence,
     transfer_theta,
 )
@@ -24,6 +25,8 @@ from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR
 from rippletwin.twin.effects.base import Effect, Place
 
 STARTS_PER_WAVELENGTH = 2  # on the shortest wavelength, which has about as many local modes
+ROUGH_MARGIN = 20.0
+"""Log evidence below the best within which a start is followed to its mode after a few steps."""
 MIN_DISTANCE_IN_WAVELENGTHS = 0.25  # of the shortest wavelength, between two distinct positions
 
 
@@ -62,9 +65,10 @@ def fit_other_positions(workers: Workers, best: Fit) -> list[Fit]:
         for share in (np.arange(count) + 0.5) / count:
             theta = start.copy()
             theta[index] = prior.coordinate(prior.centre + prior.scale * share)
-            jobs.append(FitJob(hypothesis, FromTheta(theta, exact=False)))
+            jobs.append(FitJob(hypothesis, FromTheta(theta, exact=False, rough=True)))
+    rough = [f for f in workers.fit(jobs) if f.evidence > best.evidence - ROUGH_MARGIN]
     distinct, known = [], [_sorted_positions(best)]
-    for fit in rank_by_evidence(workers.fit(jobs)):
+    for fit in rank_by_evidence(workers.fit([job_from(f, exact=False) for f in rough])):
         positions = _sorted_positions(fit)
         if all(np.max(np.abs(positions - others)) > min_distance for others in known):
             known.append(positions)

@@ -37,7 +37,12 @@ MAX_MODEL_ERROR_FOR_EXACT_MODE = 10.0 * MIN_MODEL_ERROR
 LOST_MODEL_ERROR = 0.1
 """Relative model error above which a line is probably in a wrong local mode."""
 PROMISING = 8
-"""Candidates of a round that are fitted, those with the best score tests (`score_extension`)."""
+"""Candidates of a round that are fitted at most, those with the best score tests
+(`score_extension`)."""
+FITTED_TOGETHER = (
+    2  # of them: then those that promise less than the best of these adds are left out
+)
+MIN_PROMISE = 0.5 * MIN_LOG_BAYES_FACTOR  # of a candidate that is fitted
 RESTARTED = 3  # extensions of a fit that are also fitted from the data sheet
 MIN_IMPROVEMENT = 1.0  # log evidence by which an exchange or another position must be better
 
@@ -50,11 +55,12 @@ def fit_extensions(workers: Workers, best: Fit, candidates: Sequence, progress) 
     """
     rig = workers.base.rig
     jobs = [extension_job(best, c) for c in _additions(best.hypothesis, candidates)]
-    if len(jobs) > PROMISING and not all(effect.usual for effect, _ in best.hypothesis):
-        scored = workers.map(score_extension, jobs)
-        jobs = [job for _, job in sorted(scored, key=lambda pair: -pair[0])[:PROMISING]]
-    report = progress_callback(progress, f"{len(best.hypothesis) + 1} effects", len(jobs))
-    fits = rank_by_evidence(workers.fit(jobs, report))
+    few = len(jobs) <= PROMISING or all(effect.usual for effect, _ in best.hypothesis)
+    report = progress_callback(
+        progress, f"{len(best.hypothesis) + 1} effects", len(jobs) if few else PROMISING
+    )
+    fits = workers.fit(jobs, report) if few else _fit_promising(workers, best, jobs, report)
+    fits = rank_by_evidence(fits)
     if fits and fits[0].model_error > GOOD_MODEL_ERROR:
         # What is missing may have led the line into a wrong local mode: start again from the data
         # sheet with the effect in the model. A line that is lost says nothing of which effect.
@@ -64,6 +70,19 @@ def fit_extensions(workers: Workers, best: Fit, candidates: Sequence, progress) 
         better = [max(pair, key=lambda f: f.evidence) for pair in zip(again, restarted)]
         fits = rank_by_evidence([*better, *fits[len(again) :]])
     return rank_at_exact_modes(workers, best, fits)
+
+
+def _fit_promising(workers: Workers, best: Fit, jobs: Sequence[FitJob], report) -> list[Fit]:
+    """Fits of the jobs that promise most, in that order, until one of them has added as much as
+    the next promises."""
+    scored = sorted(workers.map(score_extension, jobs), key=lambda pair: -pair[0])[:PROMISING]
+    fits: list[Fit] = []
+    needed = MIN_PROMISE
+    while scored and scored[0][0] >= needed:
+        batch, scored = scored[:FITTED_TOGETHER], scored[FITTED_TOGETHER:]
+        fits += workers.fit([job for _, job in batch], report)
+        needed = max(MIN_PROMISE, *(f.evidence - best.evidence for f in fits))
+    return fits
 
 
 def _additions(hypothesis: Hypothesis, candidates: Sequence) -> list:

@@ -8,13 +8,12 @@ that is no better either.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from rippletwin.calibration.fit import Fit
 from rippletwin.explanation.fit_jobs import (
-    FitJob,
-    FromTheta,
     Workers,
+    job_from,
     progress_callback,
     rank_by_evidence,
 )
@@ -110,24 +109,29 @@ def resume_search(workers: Workers, past: Search, progress=None) -> Search:
     """Resume a search on observations that differ little from those of `past`.
 
     All its fits start from their modes. Effects of its best hypothesis that have become needless
-    are dropped before the search goes on.
+    are dropped before the search goes on. Where it ends at the same hypothesis, exchanges and other
+    positions of effects are those of `past`.
     """
     close = [f for f in past.rivals if past.best.evidence - f.evidence < RIVAL_MARGIN]
-    fits = [past.base, *past.single_effect_fits, past.best, *close]
+    groups = [[past.base, past.best], past.single_effect_fits, close, past.other_positions]
     exact = {id(f) for f in close if not set(past.best.hypothesis) < set(f.hypothesis)}
-    jobs = [FitJob(f.hypothesis, FromTheta(f.twin.theta, id(f) in exact)) for f in fits]
-    base, *refits = workers.fit(jobs, progress_callback(progress, "resumed search", len(jobs)))
-    count = len(past.single_effect_fits)
-    single_effect_fits = rank_by_evidence(refits[:count])
-    best, rivals = refits[count], rank_by_evidence(refits[count + 1 :])
+    jobs = [job_from(f, id(f) in exact) for group in groups for f in group]
+    refits = iter(workers.fit(jobs, progress_callback(progress, "resumed search", len(jobs))))
+    (base, best), *others = [[next(refits) for _ in group] for group in groups]
+    single_effect_fits, rivals, other_positions = map(rank_by_evidence, others)
     candidates = applicable_candidates(workers.base.rig, workers.observations)
     best = _revise(workers, best, candidates)
-    search = Search(base, single_effect_fits, best, rivals)
-    return _search_stepwise(workers, search, candidates, progress)
+    search = Search(base, single_effect_fits, best, rivals, other_positions=other_positions)
+    return _search_stepwise(workers, search, candidates, progress, past.best.label)
 
 
-def _search_stepwise(workers: Workers, start: Search, candidates: Sequence, progress) -> Search:
-    """Go on from `start.best` until no candidate and no other position adds enough evidence."""
+def _search_stepwise(
+    workers: Workers, start: Search, candidates: Sequence, progress, settled: str | None = None
+) -> Search:
+    """Go on from `start.best` until no candidate and no other position adds enough evidence.
+
+    settled   label of a hypothesis whose effects have been exchanged and moved before
+    """
     single_effect_fits, best, rivals = start.single_effect_fits, start.best, start.rivals
     extensions = single_effect_fits
     if not any(f.hypothesis[:-1] == best.hypothesis for f in extensions):
@@ -135,6 +139,8 @@ def _search_stepwise(workers: Workers, start: Search, candidates: Sequence, prog
     visited = {best.label}
     while True:
         extended = _accepted_extension(best, extensions)
+        if extended is None and best.label == settled:
+            return replace(start, best=best, rivals=[*rivals, *extensions])
         if extended is None:
             exchanged = exchange_effects(workers, best, single_effect_fits)
             moved, other_positions = move_to_best_position(workers, exchanged)

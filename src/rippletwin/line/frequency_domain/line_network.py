@@ -17,12 +17,21 @@ load: nothing overflows however large the loss, and only numbers of like size ar
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from rippletwin.line.frequency_domain.line_sweep import (
+    OUTFLOW,
+    RECORD,
+    SERIES,
+    SHUNT,
+    order_steps,
+    sweep_line,
+)
+
+INSERTS = {"shunt": SHUNT, "series": SERIES}
 LOADS = ("open", "closed", "anechoic", "impedance", "admittance", "state")
 
 
@@ -54,6 +63,8 @@ class FrequencyDomainLine:
     nonlinear_compliances   list of `NonlinearCompliance`, for the ripple at full amplitude
     outflows           (positions (N,), flows (N, F)) that leave the line whatever the pressure, for
                        lines that the ripple passes: with them no scale can be taken out
+    load_outflow       (F,) flow that passes the load whatever the pressure, besides what its ratio
+                       says; `respond` alone heeds it
     """
 
     s: np.ndarray
@@ -69,11 +80,35 @@ class FrequencyDomainLine:
     opening: np.ndarray | None = None
     nonlinear_compliances: list = field(default_factory=list)
     outflows: tuple | None = None
+    load_outflow: np.ndarray | None = None
 
     @property
     def length(self) -> float:
         """Length of the whole line, m."""
         return float(np.sum(self.lengths))
+
+    def at_frequencies(self, which: np.ndarray) -> FrequencyDomainLine:
+        """The same line, without nonlinear compliances, at some of its frequencies (their indices,
+        (G,))."""
+
+        def at(value):
+            return value[..., which] if np.shape(value)[-1:] == np.shape(self.s) else value
+
+        kind, load = self.load
+        return replace(
+            self,
+            s=self.s[which],
+            series=self.series[:, which],
+            shunt=self.shunt[:, which],
+            source_flow=at(self.source_flow),
+            source_admittance=at(self.source_admittance),
+            load=(kind, tuple(map(at, load)) if kind == "state" else at(load)),
+            inserts=[Insert(x, form, at(value)) for x, form, value in self.inserts],
+            sensor_factor=at(self.sensor_factor),
+            opening=at(self.opening),
+            outflows=self.outflows and (self.outflows[0], at(self.outflows[1])),
+            load_outflow=at(self.load_outflow),
+        )
 
     def readings(self) -> np.ndarray:
         """What the sensors read, (S, F) Pa: pressure at them times `sensor_factor`."""
@@ -150,13 +185,16 @@ class FrequencyDomainLine:
 
     def respond(self, positions: np.ndarray | Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
         """Pressure and flow (S, F) at `positions` with the network's own source and load."""
-        pressure, flow, entry, decay = self.sweep([self.load_state()], positions)
+        states = [self.load_state()]
+        if self.load_outflow is not None:
+            states.append((0.0, self.load_outflow))
+        pressure, flow, entry, decay = self.sweep(states, positions)
         own, *forced = entry[:, 1] + self.source_admittance * entry[:, 0]
         if not forced:
             scale = self.source_flow / own
             return pressure[:, 0] * scale, flow[:, 0] * scale
-        scale = (self.source_flow * decay - forced[0]) / own
-        return tuple((x[:, 0] * scale + x[:, 1]) / decay for x in (pressure, flow))
+        scale = (self.source_flow * decay - sum(forced)) / own
+        return tuple((x[:, 0] * scale + np.sum(x[:, 1:], axis=1)) / decay for x in (pressure, flow))
 
     def sweep(
         self, states: list, positions: np.ndarray | Sequence[float] = ()
@@ -175,106 +213,28 @@ class FrequencyDomainLine:
         values = np.empty((len(self.inserts), count), complex)
         for row, (_, _, value) in zip(values, self.inserts):
             row[:] = value
-        return _sweep(
+        return sweep_line(
             np.ascontiguousarray(self.series, complex),
             np.ascontiguousarray(self.shunt, complex),
-            np.array(self._plan(positions, at)),
+            self._plan(positions, at),
             values,
             load,
             np.ascontiguousarray(outflow, complex),
             len(positions),
         )
 
-    def _plan(self, positions, outflows) -> list[tuple[int, int, float]]:
-        """Steps (what, index, distance) from the load to x = 0, for `_sweep`."""
-        starts = np.cumsum(self.lengths) - self.lengths
-        starts, here = starts.tolist(), self.length
-        # At one place inserts come before positions, the last of the list first.
-        order = [(-float(x), 0, -k) for k, (x, _, _) in enumerate(self.inserts)]
-        order += [(-float(x), 1, k) for k, x in enumerate(positions)]
-        order += [(-float(x), 2, k) for k, x in enumerate(outflows)]
-        order.sort()
-        if order and (order[0][0] < -here * (1 + 1e-12) or order[-1][0] > 0.0):
-            raise ValueError(f"a position lies outside the line of {here} m")
-        k = len(starts) - 1
-        plan = [(_ENTER, k, 0.0)]
-        for x, what, index in [*order, (0.0, None, 0)]:
-            x = -x
-            while k > 0 and x < starts[k]:
-                plan.append((_WALK, k, here - starts[k]))
-                here = starts[k]
-                k -= 1
-                plan.append((_ENTER, k, 0.0))
-            plan.append((_WALK, k, max(here - x, 0.0)))
-            here = min(x, here)
-            if what == 1:
-                plan.append((_RECORD, index, 0.0))
-            elif what == 2:
-                plan.append((_OUTFLOW, index, 0.0))
-            elif what == 0:
-                kind = self.inserts[-index][1]
-                if kind not in ("shunt", "series"):
-                    raise ValueError(f"an insert is 'shunt' or 'series', not {kind!r}")
-                plan.append((_SHUNT if kind == "shunt" else _SERIES, -index, 0.0))
-                plan.append((_ENTER, k, 0.0))
+    def _plan(self, positions, outflows) -> np.ndarray:
+        """Steps (N, 3) from the load to x = 0, for `sweep_line`: what, index, distance."""
+        inserts = self.inserts[::-1]  # at one place the last comes first, before the positions
+        for _, kind, _ in inserts:
+            if kind not in INSERTS:
+                raise ValueError(f"an insert is 'shunt' or 'series', not {kind!r}")
+        what = [INSERTS[kind] for _, kind, _ in inserts]
+        at = np.array([*(x for x, _, _ in inserts), *positions, *outflows], float)
+        what += [RECORD] * len(positions) + [OUTFLOW] * len(outflows)
+        index = [*range(len(inserts))[::-1], *range(len(positions)), *range(len(outflows))]
+        lengths = np.asarray(self.lengths, float)
+        plan = order_steps(lengths, at, np.array(what, np.int64), np.array(index, np.int64))
+        if not len(plan):
+            raise ValueError(f"a position lies outside the line of {self.length} m")
         return plan
-
-
-_ENTER, _WALK, _RECORD, _SHUNT, _SERIES, _OUTFLOW = range(6)
-
-
-@njit(cache=True, error_model="numpy")
-def _sweep(series, shunt, plan, values, load, outflow, stops):
-    """Follow `plan` at every frequency for every load state; see `FrequencyDomainLine.sweep`."""
-    states, count = load.shape[0], load.shape[2]
-    pressure = np.empty((stops, states, count), np.complex128)
-    flow = np.empty((stops, states, count), np.complex128)
-    entry = np.empty((states, 2, count), np.complex128)
-    total = np.empty(count, np.complex128)
-    p, q = np.empty(states, np.complex128), np.empty(states, np.complex128)
-    f, b = np.empty(states, np.complex128), np.empty(states, np.complex128)
-    factors = np.empty(len(plan), np.complex128)
-    for i in range(count):
-        p[:], q[:] = load[:, 0, i], load[:, 1, i]
-        gamma = zc = 0j
-        behind = 1.0 + 0j  # the factors taken out so far
-        for n in range(len(plan)):
-            what, index = int(plan[n, 0]), int(plan[n, 1])
-            if what == _ENTER:
-                gamma = np.sqrt(series[index, i] * shunt[index, i])
-                zc = gamma / shunt[index, i]  # on gamma's branch of the root
-                for m in range(states):
-                    zq = zc * q[m]
-                    f[m], b[m] = 0.5 * (p[m] + zq), 0.5 * (p[m] - zq)
-            elif what == _WALK:
-                factors[n] = np.exp(-gamma * plan[n, 2])
-                behind *= factors[n]
-                for m in range(states):
-                    b[m] *= factors[n] * factors[n]
-                    p[m], q[m] = f[m] + b[m], (f[m] - b[m]) / zc
-            elif what == _OUTFLOW:
-                flow_out = outflow[index, i] * behind
-                q[-1] += flow_out
-                f[-1] += 0.5 * zc * flow_out
-                b[-1] -= 0.5 * zc * flow_out
-            elif what == _SHUNT:
-                for m in range(states):
-                    q[m] += values[index, i] * p[m]
-            elif what == _SERIES:
-                for m in range(states):
-                    p[m] += values[index, i] * q[m]
-            else:
-                pressure[index, :, i], flow[index, :, i] = p, q
-        entry[:, 0, i], entry[:, 1, i] = p, q
-        # Back down from the pump, each place gets the decay between it and the pump.
-        decay = 1.0 + 0j
-        for n in range(len(plan) - 1, -1, -1):
-            what, index = int(plan[n, 0]), int(plan[n, 1])
-            if what == _WALK:
-                decay *= factors[n]
-            elif what == _RECORD:
-                for m in range(states):
-                    pressure[index, m, i] *= decay
-                    flow[index, m, i] *= decay
-        total[i] = decay
-    return pressure, flow, entry, total

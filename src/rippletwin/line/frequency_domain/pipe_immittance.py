@@ -45,7 +45,11 @@ def series_impedance(
 
 
 def shunt_admittance(
-    s: np.ndarray, *, density: float, wave_speed: float, diameter: float
+    s: np.ndarray,
+    *,
+    density: float,
+    wave_speed: float | np.ndarray,
+    diameter: float | np.ndarray,
 ) -> np.ndarray:
     """Shunt admittance Y'(s) = A s/(rho a^2) in m2/(Pa s); all arguments broadcast."""
     area = 0.25 * np.pi * diameter**2
@@ -60,19 +64,24 @@ def scaled_friction(sigma: np.ndarray) -> np.ndarray:
     Bessel functions elsewhere, and the power series near zero, where I2 vanishes as r^2/8.
     """
     sigma = np.asarray(sigma, dtype=complex)
+    values, is_large = _at_large_radius(sigma.ravel())
+    if not is_large.all():
+        # The same values come again and again in a batch, and Bessel functions take long.
+        distinct, inverse = np.unique(sigma.ravel()[~is_large], return_inverse=True)
+        values[~is_large] = _by_bessel_functions(distinct)[inverse]
+    return values.reshape(sigma.shape)
+
+
+def _by_bessel_functions(sigma: np.ndarray) -> np.ndarray:
+    """`scaled_friction` without the asymptotic series, (N,)."""
     r = np.sqrt(sigma)
-    large = r.real > _LARGE_RADIUS
-    asymptotic = _horner(1.0 / np.where(large, r, _LARGE_RADIUS).ravel()).reshape(r.shape)
-    if large.all():
-        return sigma * asymptotic
     small = np.abs(r) < _SMALL_RADIUS
-    safe = np.where(small | large, 1.0, r)
-    bessel = ive(0, safe) / ive(2, safe)
+    safe = np.where(small, 1.0, r)
     # I0 = sum_k z^k/k!^2 and I2 = z sum_k z^k/(k! (k+2)!) with z = sigma/4
     z = np.where(small, 0.25 * sigma, 0.0)
     i0 = 1.0 + z * (1.0 + z * (1.0 / 4.0 + z / 36.0))
     i2 = 0.5 + z * (1.0 / 6.0 + z * (1.0 / 48.0 + z / 720.0))
-    return np.where(small, 4.0 * i0 / i2, sigma * np.where(large, asymptotic, bessel))
+    return np.where(small, 4.0 * i0 / i2, sigma * ive(0, safe) / ive(2, safe))
 
 
 def _asymptotic_ratio(terms: int) -> np.ndarray:
@@ -93,12 +102,14 @@ _ASYMPTOTIC = _asymptotic_ratio(18)
 
 
 @njit(cache=True)
-def _horner(x):
-    """sum_k c_k x^k of the asymptotic series, x (N,)."""
-    total = np.empty_like(x)
-    for i in range(len(x)):
-        value = 0j
-        for c in _ASYMPTOTIC[::-1]:
-            value = value * x[i] + c
-        total[i] = value
-    return total
+def _at_large_radius(sigma):
+    """sigma sum_k c_k r^-k, the asymptotic series (N,), and where it holds; 0 elsewhere."""
+    values, is_large = np.zeros_like(sigma), np.zeros(len(sigma), np.bool_)
+    for i in range(len(sigma)):
+        r = np.sqrt(sigma[i])
+        if r.real > _LARGE_RADIUS:
+            value, x = 0j, 1.0 / r
+            for c in _ASYMPTOTIC[::-1]:
+                value = value * x + c
+            values[i], is_large[i] = sigma[i] * value, True
+    return values, is_large

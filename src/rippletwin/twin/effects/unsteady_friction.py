@@ -9,25 +9,27 @@ from rippletwin.twin.effects.base import Effect, line_place
 
 
 def friction_excess(s, viscosity, diameter, density):
-    """Z'_unsteady - Z'_steady, Pa s/m4, broadcast over a batch of viscosities and diameters.
-
-    Bessel functions take the time: they are evaluated once for each distinct nu/R^2 of the batch.
-    """
+    """Z'_unsteady - Z'_steady (..., F), Pa s/m4, at s (F,); `viscosity` and `diameter` broadcast to
+    (..., 1) or are scalars."""
     rate = 4.0 * viscosity / diameter**2
-    if np.ndim(rate):
+    if np.size(rate) > 1:
+        # A batch has few distinct nu/R^2, and friction takes long.
         distinct, inverse = np.unique(rate, return_inverse=True)
-        excess = np.stack([nu * (scaled_friction(s / nu) - 8.0) - s for nu in distinct])
-        excess = excess[np.ravel(inverse)]
+        distinct = distinct[:, None]
+        excess = distinct * (scaled_friction(s / distinct) - 8.0) - s
+        excess = excess[inverse.ravel()].reshape(*np.shape(rate)[:-1], -1)
     else:
         excess = rate * (scaled_friction(s / rate) - 8.0) - s
-    return excess * density / (0.25 * np.pi * diameter**2)
+    return excess * (density / (0.25 * np.pi)) / diameter**2
 
 
 def _apply(network, state, values, place):
-    for k, diameter in enumerate(state.diameters):
-        network.series[k] = network.series[k] + friction_excess(
-            network.s, state.viscosity, diameter, state.density
-        )
+    diameters = np.asarray(state.diameters)
+    batch = (1,) * (np.ndim(network.series) - diameters.ndim)
+    diameters = diameters.reshape(diameters.shape + batch)
+    network.series = network.series + friction_excess(
+        network.s, state.viscosity, diameters, state.density
+    )
 
 
 def _apply_in_time(line, state, values, place):

@@ -1,0 +1,108 @@
+"""The sweep of `FrequencyDomainLine` from the load to the pump, compiled.
+
+A plan (N, 3) lists its steps: what is done, to which segment, insert, position or outflow, and over
+what distance.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+ENTER, WALK, RECORD, SHUNT, SERIES, OUTFLOW = range(6)
+
+
+@njit(cache=True)
+def order_steps(lengths, at, what, index):
+    """The plan of steps `what` at the positions `at`; empty if one lies outside the line."""
+    starts = np.cumsum(lengths) - lengths
+    here = np.sum(lengths)
+    order = np.argsort(-at, kind="mergesort")  # stable: steps at one place keep their order
+    plan = np.zeros((2 * len(at) + 2 * len(lengths) + 2, 3))
+    if len(at) and (at[order[0]] > here * (1 + 1e-12) or at[order[-1]] < 0.0):
+        return plan[:0]
+    k = len(lengths) - 1
+    plan[0, 0], plan[0, 1], n = ENTER, k, 1
+    for m in range(len(at) + 1):
+        x = at[order[m]] if m < len(at) else 0.0
+        while k > 0 and x < starts[k]:
+            plan[n, 0], plan[n, 1], plan[n, 2] = WALK, k, here - starts[k]
+            here = starts[k]
+            k -= 1
+            plan[n + 1, 0], plan[n + 1, 1] = ENTER, k
+            n += 2
+        plan[n, 0], plan[n, 1], plan[n, 2] = WALK, k, max(here - x, 0.0)
+        here, n = min(x, here), n + 1
+        if m < len(at):
+            step = what[order[m]]
+            plan[n, 0], plan[n, 1] = step, index[order[m]]
+            n += 1
+    return plan[:n]
+
+
+@njit(cache=True, error_model="numpy")
+def sweep_line(series, shunt, plan, values, load, outflow, stops):
+    """Follow `plan` at every frequency for every load state; see `FrequencyDomainLine.sweep`."""
+    states, count = load.shape[0], load.shape[2]
+    pressure = np.empty((stops, states, count), np.complex128)
+    flow = np.empty((stops, states, count), np.complex128)
+    entry = np.empty((states, 2, count), np.complex128)
+    total = np.empty(count, np.complex128)
+    p, q = np.empty(states, np.complex128), np.empty(states, np.complex128)
+    f, b = np.empty(states, np.complex128), np.empty(states, np.complex128)
+    factors = np.empty(len(plan), np.complex128)
+    for i in range(count):
+        p[:], q[:] = load[:, 0, i], load[:, 1, i]
+        gamma = zc = yc = 0j
+        behind = 1.0 + 0j  # the factors taken out so far
+        for n in range(len(plan)):
+            what, index = int(plan[n, 0]), int(plan[n, 1])
+            if what == ENTER:
+                gamma = np.sqrt(series[index, i] * shunt[index, i])
+                zc = gamma / shunt[index, i]  # on gamma's branch of the root
+                yc = 1.0 / zc
+                for m in range(states):
+                    zq = zc * q[m]
+                    f[m], b[m] = 0.5 * (p[m] + zq), 0.5 * (p[m] - zq)
+            elif what == WALK:
+                if plan[n, 2] == 0.0:
+                    factors[n] = 1.0
+                    continue
+                factors[n] = np.exp(-gamma * plan[n, 2])
+                behind *= factors[n]
+                square = factors[n] * factors[n]
+                for m in range(states):
+                    b[m] *= square
+                    p[m], q[m] = f[m] + b[m], (f[m] - b[m]) * yc
+            elif what == OUTFLOW:
+                flow_out = outflow[index, i] * behind
+                q[-1] += flow_out
+                f[-1] += 0.5 * zc * flow_out
+                b[-1] -= 0.5 * zc * flow_out
+            elif what == SHUNT:
+                for m in range(states):
+                    flow_out = values[index, i] * p[m]
+                    q[m] += flow_out
+                    f[m] += 0.5 * zc * flow_out
+                    b[m] -= 0.5 * zc * flow_out
+            elif what == SERIES:
+                for m in range(states):
+                    drop = 0.5 * values[index, i] * q[m]
+                    p[m] += 2.0 * drop
+                    f[m] += drop
+                    b[m] += drop
+            else:
+                pressure[index, :, i], flow[index, :, i] = p, q
+        entry[:, 0, i], entry[:, 1, i] = p, q
+        # Back down from the pump, each place gets the decay between it and the pump.
+        decay = 1.0 + 0j
+        for n in range(len(plan) - 1, -1, -1):
+            what, index = int(plan[n, 0]), int(plan[n, 1])
+            if what == WALK:
+                decay *= factors[n]
+            elif what == RECORD:
+                for m in range(states):
+                    pressure[index, m, i] *= decay
+                    flow[index, m, i] *= decay
+        total[i] = decay
+    return pressure, flow, entry, total
