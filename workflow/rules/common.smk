@@ -46,13 +46,11 @@ RIG, SHEET = (
 )
 CASE = os.path.dirname(RIG)
 
-
 # the virtual rig has a healthy pump and known faults at one operating point
 HAS_PERIODIC = RECORDED_HERE or case_parts.has_periodic(SHEET)
 DIAGNOSED_HERE = RECORDED_HERE or case_parts.is_diagnosed(SHEET)
 SCORED_HERE = RECORDED_HERE or case_parts.is_scored(SHEET)
 HAS_UNKNOWN = not RECORDED_HERE and bool(case_parts.recordings_for(SHEET, "unknown"))
-
 
 RIG_SECTIONS = ("fluid", "pump", "line", "sensors", "load", "uncertainty")
 

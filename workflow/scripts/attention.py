@@ -23,16 +23,15 @@ regions = np.array([fault_region(x["H"], x[fault]) for fault in faults])
 first_turn = np.stack([x[name][0] for name in CLASSES])
 spread = spread_windows(recorded.state.values, WINDOWS)
 windows = [recorded.signal.values[at] for at in spread.values()]
-name = snakemake.wildcards.architecture
 trained = torch.load(snakemake.input.weights, weights_only=True)
-first, *others = restore_networks(name, first_turn.shape[1], trained)
+network = snakemake.wildcards.architecture, first_turn.shape[1]
+first, *others = restore_networks(*network, trained)
 shares = [fault_attention(net, x, dict(zip(faults, regions))) for net in (first, *others)]
 attended, blind = (np.array(share) for share in zip(*shares))
 heat = attention_density(attention_map(first, first_turn, np.arange(len(CLASSES))))
 called, called_share, recorded_heat = zip(*(recording_attention(first, part) for part in windows))
 
-axes = probes.signal.dims[2:]  # (time,) or (frequency, column)
-sizes = regions.mean(axis=(1, 2))
+axes, sizes = probes.signal.dims[2:], regions.mean(axis=(1, 2))  # (time,) or (frequency, column)
 store.save(
     xr.Dataset(
         {
