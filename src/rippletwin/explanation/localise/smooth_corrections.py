@@ -227,7 +227,9 @@ class SmoothCorrections:
             return None
         return np.concatenate([self._basis, 1j * self._basis])[:, None] * change
 
-    def _columns(self, error: int, free: np.ndarray | None) -> tuple:
+    def _columns(
+        self, error: int, free: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Residual, Gram matrix of the columns and columns times residual at a model error (its
         index): those of the parameters, and of changes `free`."""
         r, columns, _ = self._expanded[error]
