@@ -175,3 +175,29 @@ def test_needless_effects_are_dropped_weakest_first(monkeypatch):
     losses[ALWAYS_PRESENT] = -4.0
     kept = drop_needless_effects(workers, made_fit(0.0, HOSE, ALWAYS_PRESENT))
     assert kept.hypothesis == (HOSE,)
+
+
+def test_candidates_are_fitted_until_one_adds_what_the_next_promises(monkeypatch):
+    """Two are fitted at a time, in the order of their promises. The third promises less than one of
+    the first two has added, so it is not fitted; nor is one that promises next to nothing."""
+    places = [(EFFECTS["sensor_delay"], Place(f"sensor p{k}", k)) for k in range(1, 12)]
+    promises = dict(zip(places, [30.0, 40.0, 25.0, 20.0, *[1.0] * 7]))
+    monkeypatch.setattr(stepwise_moves, "rank_at_exact_modes", lambda workers, best, fits: fits)
+
+    def asked_for(gain):
+        asked = []
+
+        def fit(jobs, report=None):
+            asked.extend(job.hypothesis[-1] for job in jobs)
+            return [made_fit(100.0 + gain, *job.hypothesis) for job in jobs]
+
+        def score(function, jobs):
+            return [(promises[job.hypothesis[-1]], job) for job in jobs]
+
+        workers = SimpleNamespace(fit=fit, map=score, base=SimpleNamespace(rig=rig()))
+        fit_extensions(workers, made_fit(100.0, HOSE), places, None)
+        return [places.index(candidate) for candidate in asked]
+
+    assert asked_for(gain=28.0) == [1, 0]
+    assert asked_for(gain=22.0) == [1, 0, 2, 3]
+    assert asked_for(gain=-5.0) == [1, 0, 2, 3]

@@ -214,3 +214,29 @@ def test_wrong_use_is_refused():
         FrequencyDomainLine(
             S, net.lengths, net.series, net.shunt, inserts=[(1.0, "x", S)]
         ).pressure_at([0.0])
+
+
+def test_flow_beyond_the_load_ratio_is_kirchhoffs():
+    """At the load q = Y p + n with the flow n that was asked for, and the source's flow arrives:
+    the state is that which `load_relation`, the line's own equation at the load, gives."""
+    admittance, beyond = 1e-10 + 2e-15 * S, (3.0 - 2.0j) * 1e-6 * np.ones(len(S))
+    line = network(S, inserts=with_inserts(S), load=("admittance", admittance))
+    line.source_flow, line.load_outflow = 1e-5 * np.ones(len(S)), beyond
+    line.inserts = line.inserts[:-1]  # the last stands at the load, behind the place of reading
+    p, q = (x[0] for x in line.respond([line.length]))
+    a, b, c = line.load_relation()
+    assert np.allclose(q, admittance * p + beyond)
+    assert np.allclose(a * p + b * q, c)
+
+
+def test_some_frequencies_are_columns_of_all():
+    """A line with everything in it, at two of its four frequencies."""
+    line = network(S, inserts=with_inserts(S), load=("state", (1.0, 1e-10 + 2e-15 * S)))
+    line.source_flow = 1e-5 * np.arange(1.0, 5.0)
+    line.source_admittance = 1e-13 * S
+    line.load_outflow = 1e-6 * np.arange(4.0)
+    line.outflows = np.array([1.0, 4.0]), 1e-6 * np.ones((2, 4), complex)
+    line.sensor_positions = SENSORS
+    line.sensor_factor = np.tile(1.0 + 1e-5 * S, (len(SENSORS), 1))
+    which = np.array([0, 3])
+    assert np.allclose(line.at_frequencies(which).readings(), line.readings()[:, which], rtol=1e-12)

@@ -9,7 +9,7 @@ from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, s
 from rippletwin.twin import twin_file
 from rippletwin.twin.effects.base import LineState, Place
 from rippletwin.twin.effects.library import EFFECTS, candidates
-from rippletwin.twin.priors import Prior
+from rippletwin.twin.priors import Prior, Priors
 from rippletwin.twin.twin import Twin
 
 FIXED = {
@@ -269,3 +269,16 @@ def test_half_sine_harmonics_and_equal_pistons():
     wave = np.pi * np.maximum(np.sin(angle), 0.0)
     exact = 2 * np.fft.rfft(wave)[1:20] / 4096
     np.testing.assert_allclose(half_sine(np.arange(1, 20)), exact, atol=1e-5)
+
+
+def test_priors_at_once_are_those_one_by_one():
+    """Values of parameters of every kind, mixed."""
+    priors = [
+        Prior("normal", 2.0, 0.5),
+        Prior("lognormal", 3.0, 0.2),
+        Prior("uniform", 1.0, 3.0),
+        Prior("lognormal", 0.1, 1.0),
+        Prior("bounded", 0.0, 0.4),
+    ]
+    u = np.random.default_rng(0).normal(size=5)
+    assert np.allclose(Priors(priors).value(u), [p.value(x) for p, x in zip(priors, u)])

@@ -78,9 +78,9 @@ def read_alarms(
 
     `delay` (s) is that of the line.
     """
-    table = SmoothCorrections(base, observations).by_element(
-        elements_of(base.twin.rig, observations)
-    )
+    corrections = SmoothCorrections(base, observations)
+    elements = elements_of(base.twin.rig, observations)
+    table = corrections.by_element([*elements, *corrections.promising_positions()])
     return Alarms(
         max(table.values()) - table[NONE, None],
         largest_pull(base),

@@ -35,17 +35,31 @@ class Robustness:
 
 
 def compare_beside_corrections(
-    present: Mapping[tuple, float], absent: Sequence[Mapping[tuple, float]], own: tuple
+    present: Mapping[tuple, float],
+    absent: Sequence[Mapping[tuple, float]],
+    own: tuple,
+    spacing: float,
 ) -> Robustness:
     """`Robustness` of an effect: its model against the best of several models without it.
 
     present, absent   log evidence by element, of `SmoothCorrections.by_element`; an element that a
                       model without the effect lacks is not compared with it
     own               the effect's own element
+    spacing           m within which two elements of one kind are at one position
     """
     factors = {
-        e: value - max(each[e] for each in absent if e in each) for e, value in present.items()
+        e: value - max(each[e] for each in absent if e in each)
+        for e, value in present.items()
+        if any(e in each for each in absent)
     }
-    others = {e: factor for e, factor in factors.items() if e != own}
+    others = {e: factor for e, factor in factors.items() if not _are_one(e, own, spacing)}
     element = min(others, key=others.get)
     return Robustness(factors[(NONE, None)], others[element], element, factors[own])
+
+
+def _are_one(element: tuple, own: tuple, spacing: float) -> bool:
+    """Whether an element cannot be told from an effect's own."""
+    (kind, where), (own_kind, own_where) = element, own
+    if kind != own_kind or kind not in ("shunt", "series"):
+        return element == own
+    return abs(where - own_where) < spacing

@@ -24,9 +24,11 @@ from rippletwin.explanation.checks.prior_sensitivity import WithoutEffect, fit_w
 from rippletwin.explanation.checks.robustness import Robustness, compare_beside_corrections
 from rippletwin.explanation.fit_jobs import FitJob, FromTheta, Workers, transfer_theta
 from rippletwin.explanation.localise.smooth_corrections import (
+    NONE,
     SmoothCorrections,
     elements_of,
     own_element,
+    position_spacing,
 )
 from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR, PULL_ALARM
 
@@ -84,16 +86,19 @@ def _judge_each(
     rig, values = best.twin.rig, best.twin.effect_values(best.twin.theta)
     owns = [own_element(effect, place, value, rig) for effect, place, value in values]
     elements = elements_of(rig, workers.observations, owns)
-    jobs: list[tuple] = [(best, None, elements)]
+    jobs = []
     for each in without:
         start = transfer_theta(best, each.stated.hypothesis, workers.base)
-        jobs += [(each.stated, None, elements), (each.stated, start, elements)]
-        jobs += [(each.wide, None, elements[:1])]  # without a correction
-    tables = workers.map(evaluate_corrections, jobs)
-    present, absent = tables[0], tables[1:]
+        jobs.append((((each.stated, None), (each.stated, start)), each.wide, elements))
+    absent = workers.map(evaluate_without, jobs)
+    tried = list(dict.fromkeys(e for tables in absent for table in tables for e in table))
+    halves = workers.map(evaluate_corrections, [(best, tried[k::2]) for k in range(2)])
+    present = halves[0] | halves[1]
+    frequency_hz = np.concatenate([o.frequency_hz for o in workers.observations])
+    spacing = position_spacing(rig, frequency_hz)
     supports = []
     for k, (effect, place) in enumerate(best.hypothesis):
-        robustness = compare_beside_corrections(present, absent[3 * k : 3 * k + 3], owns[k])
+        robustness = compare_beside_corrections(present, absent[k], owns[k], spacing)
         pull = _largest_pull(best, f"{effect.name}@{place}.")
         level = support_level(robustness, held_out[k], pull)
         supports.append(Support(effect.name, str(place), level, robustness, held_out[k], pull))
@@ -111,10 +116,25 @@ def _largest_pull(fit: Fit, label: str) -> float:
 
 
 def evaluate_corrections(base, observations: Sequence, job: tuple) -> dict[tuple, float]:
-    """Log evidence of a model with a correction of each element; `job` is (fit, theta, elements),
-    for `Workers.map`."""
-    fit, theta, elements = job
-    return SmoothCorrections(fit, observations, theta).by_element(elements)
+    """Log evidence of a model with a correction of each element; `job` is (fit, elements), for
+    `Workers.map`."""
+    fit, elements = job
+    return SmoothCorrections(fit, observations).by_element(elements)
+
+
+def evaluate_without(base, observations: Sequence, job: tuple) -> list[dict[tuple, float]]:
+    """Log evidence of the models without an effect, with a correction of each element; for
+    `Workers.map`.
+
+    `job` is (models, wide, elements): pairs (fit, theta or None), which also get corrections at the
+    positions that promise most in any of them, and the fit with wide priors, without a correction.
+    """
+    models, wide, elements = job
+    corrections = [SmoothCorrections(fit, observations, theta) for fit, theta in models]
+    positions = [e for each in corrections for e in each.promising_positions()]
+    tried = list(dict.fromkeys([*elements, *positions]))
+    tables = [each.by_element(tried) for each in corrections]
+    return [*tables, SmoothCorrections(wide, observations).by_element([(NONE, None)])]
 
 
 def support_level(robustness: Robustness, held_out: float, pull: float) -> str:

@@ -63,7 +63,8 @@ class Remainder:
 def find_remainder(fit: Fit, observations: Sequence) -> Remainder | None:
     """The remainder of a fit; None where the fit is as good as the data allow."""
     corrections = SmoothCorrections(fit, observations)
-    table = corrections.by_element(elements_of(fit.twin.rig, observations))
+    elements = elements_of(fit.twin.rig, observations)
+    table = corrections.by_element([*elements, *corrections.promising_positions()])
     plain = table.pop((NONE, None))
     best = max(table, key=table.get)
     gain = table[best] - plain
@@ -74,7 +75,7 @@ def find_remainder(fit: Fit, observations: Sequence) -> Remainder | None:
         misfit=score_fit(fit, observations).misfit,
         model_error=float(fit.model_error),
         element=best if found else None,
-        interval=_interval(table, best, float(fit.twin.rig.length)) if found else None,
+        interval=_interval(corrections, best) if found else None,
         log_bayes_factor=float(gain),
         law=_law(corrections, best) if found else None,
         bands_hz=residual_frequency_bands(fit, observations),
@@ -82,20 +83,16 @@ def find_remainder(fit: Fit, observations: Sequence) -> Remainder | None:
     )
 
 
-def _interval(table: dict, best: tuple, length: float) -> tuple[float, float] | None:
-    """Ends (m) of the positions whose correction of the same kind is nearly as good."""
-    kind = best[0]
-    if kind not in ("shunt", "series"):
+def _interval(corrections: SmoothCorrections, best: tuple) -> tuple[float, float] | None:
+    """Ends (m) of the positions whose correction of the same kind promises nearly as much."""
+    kind, position = best
+    if kind not in corrections.promises:
         return None
-    positions = sorted(x for k, x in table if k == kind)
-    inside = [x for x in positions if table[kind, x] > table[best] - EQUIVALENT_LOG_BAYES_FACTOR]
-    at = {x: k for k, x in enumerate(positions)}
-    low, high = at[min(inside)], at[max(inside)]
-    ends = positions[max(low - 1, 0)], positions[min(high + 1, len(positions) - 1)]
-    return (
-        max(0.5 * (ends[0] + positions[low]), 0.0) if low else 0.0,
-        0.5 * (ends[1] + positions[high]) if high < len(positions) - 1 else length,
-    )
+    positions, promises = corrections.promises[kind]
+    half, length = 0.5 * (positions[1] - positions[0]), corrections.network.length
+    close = positions[promises > np.max(promises) - EQUIVALENT_LOG_BAYES_FACTOR]
+    low, high = min(close[0] - half, position), max(close[-1] + half, position)
+    return float(max(low, 0.0)), float(min(high, length))
 
 
 def _law(corrections: SmoothCorrections, element: tuple) -> str | None:

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.special import logsumexp
@@ -38,7 +39,9 @@ CORRELATION_HZ = 400.0  # l
 MODEL_ERRORS = np.geomspace(1e-3, 1.5, 13)
 ERRORS_BELOW, ERRORS_ABOVE = 5, 1  # grid values of the model error around that of the fit
 MIN_EIGENVALUE = 1e-3  # share of the kernel's largest; smaller ones are left out
-MAX_POSITIONS = 12  # along the line, each a shunt and a series element
+POSITIONS_PER_WAVELENGTH = 4
+"""Of the highest frequency: at so many places along the line an element is tried."""
+POSITIONS_SOLVED = 3  # of each kind of element, those that promise most
 STEP_SHARES = (1.0, 0.5, 0.25)
 """Of the way to the most likely correction, besides none of it. A linear step may overshoot: near a
 sharp resonance a small correction changes the prediction by much."""
@@ -62,7 +65,7 @@ class SmoothCorrections:
         self._posterior.estimate_errors(self._prediction, self.theta)
         self.network = self._posterior.forward.network(self.theta)
         self._observed = observable_of(self._posterior, self.network, self.theta)
-        self._basis = smooth_basis(self._posterior.forward.frequency_hz)
+        self._basis = smooth_basis(self.frequency_hz)
         slopes = self._posterior.slopes(self.theta, self._prediction)
         at = int(np.searchsorted(MODEL_ERRORS, self._posterior.model_error))
         self._errors = MODEL_ERRORS[max(at - ERRORS_BELOW, 0) : at + ERRORS_ABOVE + 1]
@@ -92,7 +95,7 @@ class SmoothCorrections:
         solved = self._solve(element)
         power = self._posterior.power * solved.model_error**2
         weight = np.sum(np.abs(solved.change) ** 2, axis=0) / power
-        return self._posterior.forward.frequency_hz, solved.correction, weight
+        return self.frequency_hz, solved.correction, weight
 
     def _solve(self, element: tuple) -> _Solved:
         """Average over model errors and amplitudes of a correction, and the most likely of them."""
@@ -100,17 +103,10 @@ class SmoothCorrections:
         amplitudes = np.zeros(1) if change is None else AMPLITUDES
         values = np.empty((len(self._errors), len(amplitudes)))
         linear = []
-        free = None
-        if change is not None:
-            free = np.concatenate([self._basis, 1j * self._basis])[:, None] * change
-        for k, (r, jacobian, log_determinant) in enumerate(self._expanded):
-            columns = jacobian
-            if free is not None:
-                self._posterior.model_error = float(self._errors[k])
-                whitened = self._posterior.whiten_slopes(self._prediction, free)[1]
-                columns = np.concatenate([jacobian, whitened])
-            linear.append((r, columns @ columns.T, columns @ r))
-            scales = np.array([self._scale(a, len(columns)) for a in amplitudes])
+        free = self._free_changes(change)
+        for k, (_, _, log_determinant) in enumerate(self._expanded):
+            linear.append(self._columns(k, free))
+            scales = np.array([self._scale(a, len(linear[k][1])) for a in amplitudes])
             values[k] = _log_likelihoods(*linear[k], scales) - log_determinant
         solved: list[tuple] = []
         for m in np.argsort(-np.max(values, axis=0)):
@@ -189,6 +185,60 @@ class SmoothCorrections:
         characteristic = np.sqrt(self.network.shunt[0] / self.network.series[0])
         return characteristic if kind == "shunt" else 1.0 / characteristic
 
+    @cached_property
+    def promises(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Positions (N,), m, along the whole line and the promise (N,) of a correction there, of
+        each kind of element at a position."""
+        rig = self.fit.twin.rig
+        count = max(int(np.ceil(rig.length / position_spacing(rig, self.frequency_hz))), 1)
+        positions = (np.arange(count) + 0.5) / count * self.network.length
+        return {
+            kind: (positions, np.array([self._promise((kind, float(x))) for x in positions]))
+            for kind in ("shunt", "series")
+        }
+
+    def promising_positions(self) -> list[tuple]:
+        """The elements at the positions that promise most, of each kind the best local maxima."""
+        chosen = []
+        for kind, (positions, promises) in self.promises.items():
+            padded = np.concatenate([[-np.inf], promises, [-np.inf]])
+            highest = (promises >= padded[:-2]) & (promises >= padded[2:])
+            best = sorted(np.flatnonzero(highest), key=lambda k: -promises[k])[:POSITIONS_SOLVED]
+            chosen += [(kind, float(positions[k])) for k in best]
+        return chosen
+
+    @property
+    def frequency_hz(self) -> np.ndarray:
+        """Frequencies (F,) of all observations side by side."""
+        return self._posterior.forward.frequency_hz
+
+    def _promise(self, element: tuple) -> float:
+        """Log likelihood with the correction of an element at the fit's own model error and the
+        most likely amplitude, to first order."""
+        at = int(np.argmin(np.abs(np.log(self._errors / self.fit.model_error))))
+        r, _, log_determinant = self._expanded[at]
+        _, gram, along = self._columns(at, self._free_changes(self.change(element)))
+        scales = np.array([self._scale(a, len(gram)) for a in AMPLITUDES])
+        return float(np.max(_log_likelihoods(r, gram, along, scales)) - log_determinant)
+
+    def _free_changes(self, change: np.ndarray | None) -> np.ndarray | None:
+        """Changes (2 K, S, F) that the amplitudes of a correction make, given that of a unit."""
+        if change is None:
+            return None
+        return np.concatenate([self._basis, 1j * self._basis])[:, None] * change
+
+    def _columns(
+        self, error: int, free: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Residual, Gram matrix of the columns and columns times residual at a model error (its
+        index): those of the parameters, and of changes `free`."""
+        r, columns, _ = self._expanded[error]
+        if free is not None:
+            self._posterior.model_error = float(self._errors[error])
+            whitened = self._posterior.whiten_slopes(self._prediction, free)[1]
+            columns = np.concatenate([columns, whitened])
+        return r, columns @ columns.T, columns @ r
+
     def by_element(self, elements: Sequence[tuple]) -> dict[tuple, float]:
         """Log evidence with the correction of each of `elements`, keys as in `elements_of`."""
         return {e: self.log_evidence(e) for e in elements}
@@ -237,19 +287,23 @@ def elements_of(rig, observations: Sequence, own: Sequence[tuple] = ()) -> list[
     """The elements whose correction is tried: pairs (kind, where).
 
     (NONE, None); ("source", None); ("sensor", index); ("segment series" or "segment shunt", index
-    or indices); ("shunt" or "series", position in m). `own` are further ones.
+    or indices); ("shunt" or "series", position in m) at both ends. `own` are further ones. Which
+    positions between the ends matter depends on the model (`promising_positions`).
     """
-    positions = (np.arange(MAX_POSITIONS) + 0.5) / MAX_POSITIONS * rig.length
     elements: list[tuple] = [(NONE, None)]
     if not all(o.kind == "input_impedance" for o in observations):
         elements += [("source", None), *(("sensor", k) for k in range(len(rig.sensors)))]
     elements += [
         (f"segment {kind}", k) for k in range(len(rig.line)) for kind in ("series", "shunt")
     ]
-    elements += [
-        (kind, float(x)) for x in (0.0, *positions, rig.length) for kind in ("shunt", "series")
-    ]
+    elements += [(kind, float(x)) for x in (0.0, rig.length) for kind in ("shunt", "series")]
     return [*elements, *(e for e in own if e not in elements)]
+
+
+def position_spacing(rig, frequency_hz: np.ndarray) -> float:
+    """Distance (m) of the positions that are tried: closer ones cannot be told apart."""
+    wavelengths = rig.delay * float(np.max(frequency_hz))
+    return float(rig.length) / (POSITIONS_PER_WAVELENGTH * wavelengths)
 
 
 def own_element(effect, place, values: Mapping[str, float], rig) -> tuple:
