@@ -49,7 +49,7 @@ from rippletwin.explanation.checks.prior_sensitivity import (
 )
 from rippletwin.explanation.checks.profile_intervals import add_profile_intervals
 from rippletwin.explanation.checks.sensor_wiring import find_swapped_sensors
-from rippletwin.explanation.checks.support import Support, judge_effects
+from rippletwin.explanation.checks.support import Support, judge_beside_network, judge_effects
 from rippletwin.explanation.fit_jobs import FitJob, PlainCalibration, open_workers
 from rippletwin.explanation.localise.free_corrections import locate_mismatch
 from rippletwin.explanation.localise.phase_modulation import (
@@ -61,7 +61,7 @@ from rippletwin.explanation.localise.remainder import find_remainder
 from rippletwin.explanation.localise.shaft_order_interval import add_amplitude_interval
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders, analyse_shaft_orders
 from rippletwin.explanation.localise.source_free_fits import refit_source_free
-from rippletwin.explanation.search.passive_networks import best_explanation, fit_passive_networks
+from rippletwin.explanation.search.passive_networks import accepted_network, fit_passive_networks
 from rippletwin.explanation.search.stepwise_search import Search, resume_search, search_effects
 from rippletwin.explanation.thresholds import MODULATION_SHARE, ROUGH_MODULATION_SHARE
 from rippletwin.explanation.verdict.decision import decide
@@ -143,12 +143,15 @@ def explain_observations(
             best = add_profile_intervals(workers, best)
             networks = fit_passive_networks(workers, best)
             search = replace(search, best=best, passive_networks=networks)
+            network = accepted_network(search)
+            if network is not None:
+                supports = judge_beside_network(workers, network, supports)
             contradiction = find_swapped_sensors(base, data, search)
         # Steps 11 to 14: checks
         point_fits = fit_each_observation(workers, search.base)
         alarms = read_alarms(search.base, data, point_fits, early, late, rig.delay)
         source_free_fits = refit_source_free(workers, search.leading_fits)
-        explanation = best_explanation(search)
+        explanation = accepted_network(search) or search.best
         calibrated = None
         if explanation.hypothesis:
             calibrated = workers.fit([FitJob((), PlainCalibration())])[0]

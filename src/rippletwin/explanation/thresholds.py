@@ -6,6 +6,8 @@ logarithm). exp(3) is about 20.
 
 from __future__ import annotations
 
+import numpy as np
+
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.posterior import MIN_MODEL_ERROR
 from rippletwin.twin.effects.base import Effect
@@ -27,6 +29,18 @@ FALSE_ALARM_RATE = 0.02  # of cases without an effect, for the threshold of a bo
 GOOD_MODEL_ERROR = 1.25 * MIN_MODEL_ERROR
 """Relative model error up to which no effect can improve a fit noticeably. It saves work: beside
 such a fit no network is tried. No name depends on it."""
+
+GOOD_RIPPLE_ERROR = 0.05
+"""Relative error of the nominal ripple up to which the same holds. A line that lacks an element
+leaves to the pump what it cannot fit: with two sensors each harmonic has one equation more than the
+pump has unknowns."""
+
+
+def leaves_nothing(fit: Fit) -> bool:
+    """Whether a fit is as good as the data allow, in the readings and in the pump's ripple."""
+    ripple_error = np.hypot(fit.source_sd, fit.smooth_sd)
+    return bool(fit.model_error <= GOOD_MODEL_ERROR and ripple_error <= GOOD_RIPPLE_ERROR)
+
 
 # Parameters and data of several recordings
 

@@ -11,7 +11,7 @@ Effects are judged one by one: the others stay in both models.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,7 +22,13 @@ from rippletwin.calibration.shaft_angles import fit_shaft_angles
 from rippletwin.explanation.checks.cross_validation import Fold, make_folds
 from rippletwin.explanation.checks.prior_sensitivity import WithoutEffect, fit_without_each_effect
 from rippletwin.explanation.checks.robustness import Robustness, compare_beside_corrections
-from rippletwin.explanation.fit_jobs import FitJob, FromTheta, Workers, transfer_theta
+from rippletwin.explanation.fit_jobs import (
+    FitJob,
+    FromTheta,
+    Workers,
+    job_without_effect,
+    transfer_theta,
+)
 from rippletwin.explanation.localise.smooth_corrections import (
     NONE,
     SmoothCorrections,
@@ -75,6 +81,29 @@ def judge_effects(
             return best, supports, without
         weakest = min(weak, key=lambda k: supports[k].robustness.plain)
         best = without[weakest].stated
+
+
+def judge_beside_network(
+    workers: Workers, network: Fit, supports: Sequence[Support]
+) -> tuple[Support, ...]:
+    """The supports where a passive network stands in for what remains.
+
+    An effect is established only if it keeps its evidence beside the network: what is not there may
+    fit a part of what the network stands for.
+    """
+    named = [k for k, (effect, _) in enumerate(network.hypothesis) if effect.named]
+    fits = workers.fit([job_without_effect(network, k, workers.base) for k in named])
+    lost = {
+        f"{effect.name}@{place}": network.evidence - fit.evidence
+        for (effect, place), fit in zip((network.hypothesis[k] for k in named), fits)
+    }
+    return tuple(
+        replace(support, level="supported")
+        if support.level == "established"
+        and lost.get(f"{support.name}@{support.place}", np.inf) < MIN_LOG_BAYES_FACTOR
+        else support
+        for support in supports
+    )
 
 
 def _judge_each(

@@ -9,12 +9,29 @@ from starts about their places. Several networks may stand in together.
 
 from __future__ import annotations
 
+import numpy as np
+
 from rippletwin.calibration.fit import Fit
-from rippletwin.explanation.fit_jobs import Continuation, FitJob, Workers, rank_by_evidence
+from rippletwin.explanation.fit_jobs import (
+    Continuation,
+    FitJob,
+    Workers,
+    rank_by_evidence,
+    score_extension,
+)
 from rippletwin.explanation.search.single_effects import refined_starts
-from rippletwin.explanation.search.stepwise_moves import LOST_MODEL_ERROR, extension_job
+from rippletwin.explanation.search.stepwise_moves import (
+    LOST_MODEL_ERROR,
+    MIN_PROMISE,
+    extension_job,
+)
 from rippletwin.explanation.search.stepwise_search import Search
-from rippletwin.explanation.thresholds import GOOD_MODEL_ERROR, MIN_LOG_BAYES_FACTOR
+from rippletwin.explanation.thresholds import (
+    EQUIVALENT_LOG_BAYES_FACTOR,
+    GOOD_MODEL_ERROR,
+    MIN_LOG_BAYES_FACTOR,
+    leaves_nothing,
+)
 from rippletwin.twin.effects import library
 
 BENT_MODEL_ERROR = 0.02
@@ -25,15 +42,18 @@ MAX_NETWORKS = 3  # in one line
 
 
 def fit_passive_networks(workers: Workers, best: Fit) -> list[Fit]:
-    """Fits of passive networks alone and added to `best`, best first; none where `best` is good.
-
-    A good fit leaves nothing that a network could explain.
-    """
-    if best.model_error <= GOOD_MODEL_ERROR:
+    """Fits of passive networks alone and added to `best`, best first; none where `best` leaves
+    nothing that a network could explain, or no network promises anything."""
+    if leaves_nothing(best):
         return []
     networks = library.candidates(workers.base.rig, named=False)
-    fits = workers.fit([extension_job(best, network) for network in networks])
-    if not best.hypothesis or min(f.model_error for f in fits) > BENT_MODEL_ERROR:
+    scored = workers.map(score_extension, [extension_job(best, network) for network in networks])
+    jobs = [job for promise, job in scored if promise >= MIN_PROMISE]
+    if best.model_error <= GOOD_MODEL_ERROR and not jobs:
+        return []
+    fits = workers.fit(jobs)
+    bent = min((f.model_error for f in fits), default=np.inf) > BENT_MODEL_ERROR
+    if not best.hypothesis or bent:
         usual = tuple(member for member in best.hypothesis if member[0].usual)
         fits += workers.fit([FitJob((*usual, network)) for network in networks])
     fits = rank_by_evidence(fits)
@@ -82,9 +102,11 @@ def _count(fit: Fit) -> int:
     return sum(not effect.named for effect, _ in fit.hypothesis)
 
 
-def best_explanation(search: Search) -> Fit:
-    """The best hypothesis of named effects, or a passive network where that has more evidence."""
-    networks, best = search.passive_networks, search.best
-    if networks and networks[0].evidence > best.evidence and best.model_error > GOOD_MODEL_ERROR:
-        return networks[0]
-    return best
+def accepted_network(search: Search) -> Fit | None:
+    """The best passive network, if it has so much more evidence than the best hypothesis of named
+    effects that it stands in for what remains."""
+    best, network = search.best, next(iter(search.passive_networks), None)
+    needed = EQUIVALENT_LOG_BAYES_FACTOR if best.hypothesis else MIN_LOG_BAYES_FACTOR
+    if network is None or network.evidence <= best.evidence + needed:
+        return None
+    return network

@@ -15,12 +15,11 @@ from rippletwin.calibration.fit import Fit
 from rippletwin.explanation.checks.alarms import Alarms
 from rippletwin.explanation.checks.bootstrap import NullDistribution
 from rippletwin.explanation.checks.support import Support
+from rippletwin.explanation.search.passive_networks import accepted_network
 from rippletwin.explanation.search.position_search import equivalent_positions
 from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.thresholds import (
     EQUIVALENT_LOG_BAYES_FACTOR,
-    GOOD_MODEL_ERROR,
-    MIN_LOG_BAYES_FACTOR,
 )
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import is_limit
@@ -60,16 +59,14 @@ def decide(
 ) -> Decision:
     """Decide by the support of the effects of the best explanation, and by the alarms.
 
-    supports          of the effects of `search.best`
+    supports          of the effects of `search.best`, beside the network that is accepted
     contradiction     why the data contradict themselves, if they do
     null_distribution of the evidence without an effect, if it was asked for
     """
     best = search.best
     if contradiction:
         return Decision("bad_data", search.base, contradiction=contradiction)
-    network = search.passive_networks[0] if search.passive_networks else None
-    if network is not None and network.evidence <= best.evidence + evidence_needed_by_network(best):
-        network = None
+    network = accepted_network(search)
     if null_distribution is not None and best.hypothesis:
         if search.log_bayes_factor(best) < null_distribution.threshold:
             return _nothing_missing(search.base, alarms)
@@ -98,16 +95,6 @@ def _nothing_missing(base: Fit, alarms: Alarms, verdict: str = "consistent") -> 
         return Decision("unexplained", base)
     off_data_sheet = {"pull", "disagreement"} & set(alarms.raised)
     return Decision("calibration_only" if off_data_sheet else verdict, base)
-
-
-def evidence_needed_by_network(best: Fit) -> float:
-    """Log evidence by which a passive network must exceed the best named explanation.
-
-    Infinite where that is a good fit, to which a network adds nothing.
-    """
-    if not best.hypothesis:
-        return MIN_LOG_BAYES_FACTOR
-    return np.inf if best.model_error <= GOOD_MODEL_ERROR else EQUIVALENT_LOG_BAYES_FACTOR
 
 
 def equivalent_effects(search: Search) -> tuple[tuple[str, ...], ...]:
