@@ -117,6 +117,8 @@ class Posterior:
             self._scale,
             SIZE_SD_OF_PUMP if twin.uncertain_pump else SIZE_SD,
         )
+        # By which sigma is multiplied: nothing is unknown of a known source, all of a free one.
+        self._source_scale = np.where(self._known, 0.0, np.where(self._free, np.inf, self._scale))
         self.count = 2 * (self.values.size - int(np.sum(self._free)))
         self._pressures = all(o.kind != "input_impedance" for o in data)
 
@@ -187,7 +189,7 @@ class Posterior:
         return Whitening(
             self._rotate(prediction),
             np.sqrt(self._variance(self.model_error)),
-            np.where(self._known, 0.0, np.where(self._free, np.inf, self.source_sd * self._scale)),
+            self.source_sd * self._source_scale,
             self._smooth.frequencies,
             self._smooth.sds(self.smooth_sd)[:, None] * self._smooth.basis,
         )
@@ -237,7 +239,7 @@ class Posterior:
                 h,
                 self._noise.variances + self._products,
                 self.power,
-                np.where(self._known, 0.0, np.where(self._free, np.inf, self._scale)),
+                self._source_scale,
                 self._smooth.frequencies,
                 self._smooth.basis,
                 model_errors,

@@ -216,10 +216,9 @@ class SmoothCorrections:
         """Log likelihood with the correction of an element at the fit's own model error and the
         most likely amplitude, to first order."""
         at = int(np.argmin(np.abs(np.log(self._errors / self.fit.model_error))))
-        r, _, log_determinant = self._expanded[at]
-        _, gram, along = self._columns(at, self._free_changes(self.change(element)))
-        scales = np.array([self._scale(a, len(gram)) for a in AMPLITUDES])
-        return float(np.max(_log_likelihoods(r, gram, along, scales)) - log_determinant)
+        linear = self._columns(at, self._free_changes(self.change(element)))
+        scales = np.array([self._scale(a, len(linear[1])) for a in AMPLITUDES])
+        return float(np.max(_log_likelihoods(*linear, scales)) - self._expanded[at][2])
 
     def _free_changes(self, change: np.ndarray | None) -> np.ndarray | None:
         """Changes (2 K, S, F) that the amplitudes of a correction make, given that of a unit."""

@@ -9,8 +9,6 @@ from starts about their places. Several networks may stand in together.
 
 from __future__ import annotations
 
-import numpy as np
-
 from rippletwin.calibration.fit import Fit
 from rippletwin.explanation.fit_jobs import (
     Continuation,
@@ -47,13 +45,14 @@ def fit_passive_networks(workers: Workers, best: Fit) -> list[Fit]:
     if leaves_nothing(best):
         return []
     networks = library.candidates(workers.base.rig, named=False)
-    scored = workers.map(score_extension, [extension_job(best, network) for network in networks])
-    jobs = [job for promise, job in scored if promise >= MIN_PROMISE]
-    if best.model_error <= GOOD_MODEL_ERROR and not jobs:
-        return []
+    jobs = [extension_job(best, network) for network in networks]
+    if best.model_error <= GOOD_MODEL_ERROR:  # only the ripple errs, which a network need not mend
+        scored = workers.map(score_extension, jobs)
+        jobs = [job for promise, job in scored if promise >= MIN_PROMISE]
+        if not jobs:
+            return []
     fits = workers.fit(jobs)
-    bent = min((f.model_error for f in fits), default=np.inf) > BENT_MODEL_ERROR
-    if not best.hypothesis or bent:
+    if not best.hypothesis or min(f.model_error for f in fits) > BENT_MODEL_ERROR:
         usual = tuple(member for member in best.hypothesis if member[0].usual)
         fits += workers.fit([FitJob((*usual, network)) for network in networks])
     fits = rank_by_evidence(fits)

@@ -39,9 +39,8 @@ LOST_MODEL_ERROR = 0.1
 PROMISING = 8
 """Candidates of a round that are fitted at most, those with the best score tests
 (`score_extension`)."""
-FITTED_TOGETHER = (
-    2  # of them: then those that promise less than the best of these adds are left out
-)
+FITTED_TOGETHER = 2
+"""Of them: what promises less than the best of those fitted so far has added is left out."""
 MIN_PROMISE = 0.5 * MIN_LOG_BAYES_FACTOR  # of a candidate that is fitted
 RESTARTED = 3  # extensions of a fit that are also fitted from the data sheet
 MIN_IMPROVEMENT = 1.0  # log evidence by which an exchange or another position must be better

@@ -18,9 +18,7 @@ from rippletwin.explanation.checks.support import Support
 from rippletwin.explanation.search.passive_networks import accepted_network
 from rippletwin.explanation.search.position_search import equivalent_positions
 from rippletwin.explanation.search.stepwise_search import Search
-from rippletwin.explanation.thresholds import (
-    EQUIVALENT_LOG_BAYES_FACTOR,
-)
+from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import is_limit
 
