@@ -4,11 +4,10 @@ from pathlib import Path
 
 from job import open_log
 from rippletwin.case.load import load_case
-from rippletwin.case.plausibility import warn_of_pump
 from rippletwin.diagnosis.diagnose import select_recordings
 from rippletwin.diagnosis.diagnosis_file import write_diagnosis
 from rippletwin.diagnosis.faults.library import select_faults
-from rippletwin.diagnosis.kept_answers import diagnose_changed
+from rippletwin.diagnosis.kept_answers import diagnose_changed, warnings_of
 from rippletwin.figures.fault_posterior import draw
 from rippletwin.twin.twin_file import load_twin
 
@@ -25,8 +24,8 @@ answers = diagnose_changed(
     folder,
     lambda what, done, total: report_progress(f"{what}: {done} of {total}"),
 )
-warnings = dict.fromkeys([*case.warnings, *warn_of_pump(twin.rig.pump)])
-result = write_diagnosis([each.entry for each in answers], folder, warnings=list(warnings))
+entries = [each.entry for each in answers]
+result = write_diagnosis(entries, folder, warnings=warnings_of(case, twin))
 draw([each.numbers for each in answers], folder)
 report_progress(f"{sum(each.kept for each in answers)} of {len(answers)} answers were kept")
 for each in result["recordings"]:

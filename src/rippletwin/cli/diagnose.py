@@ -74,11 +74,10 @@ def command(
     """
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     from rippletwin.case.load import load_case
-    from rippletwin.case.plausibility import warn_of_pump
     from rippletwin.diagnosis.diagnose import select_recordings
     from rippletwin.diagnosis.diagnosis_file import write_diagnosis
     from rippletwin.diagnosis.faults.library import select_faults
-    from rippletwin.diagnosis.kept_answers import diagnose_changed
+    from rippletwin.diagnosis.kept_answers import diagnose_changed, warnings_of
     from rippletwin.twin.effects.library import add_effects
 
     faults = select_faults(list(fault_names))
@@ -91,9 +90,9 @@ def command(
     with progress_bars(as_json) as progress:
         twin = _twin_of(twin_file, out, processes, read, recordings, progress)
         found = diagnose_changed(read, twin, recordings, faults, out, progress)
-    warnings = dict.fromkeys([*read.warnings, *warn_of_pump(twin.rig.pump)])
     entries = [each.entry for each in found]
-    result = write_diagnosis(entries, out, _answers(networks, recordings, read), list(warnings))
+    warnings = warnings_of(read, twin)
+    result = write_diagnosis(entries, out, _answers(networks, recordings, read), warnings)
     if not no_figures:
         from rippletwin.figures.fault_posterior import draw
 

@@ -23,6 +23,7 @@ from threadpoolctl import threadpool_limits
 import rippletwin
 from rippletwin import store
 from rippletwin.case.model import Case, Recording
+from rippletwin.case.plausibility import warn_of_pump
 from rippletwin.diagnosis.diagnose import (
     ReadOnce,
     check_twin,
@@ -92,6 +93,11 @@ def diagnose_changed(
     if progress:
         progress("diagnosing", len(recordings), len(recordings))
     return answers
+
+
+def warnings_of(case: Case, twin: Twin) -> list[str]:
+    """Warnings of a case and of the pump that its twin simulates, each once."""
+    return list(dict.fromkeys([*case.warnings, *warn_of_pump(twin.rig.pump)]))
 
 
 def _recalibrated(
