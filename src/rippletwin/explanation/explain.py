@@ -131,15 +131,14 @@ def explain_observations(
         state, search = _search_again(state, search, observations, processes, progress)
         state, search = _search_with_coupled_pump(state, search, processes, progress)
     base, data = state.base, state.observations
-    early = _select_fitted(early, rig, state.modulation)
-    late = _select_fitted(late, rig, state.modulation)
-    held_out = late if len(data) == 1 and late else None
+    early, late = _select_fitted(early, rig, data), _select_fitted(late, rig, data)
+    halves = (early[0], late[0]) if len(data) == 1 and late else None
     supports: tuple[Support, ...] = ()
     without: tuple[WithoutEffect, ...] = ()
     with open_workers(base, data, processes) as workers:
         if not contradiction:
             # Steps 7 to 10: the best explanation and its competitors
-            best, supports, without = judge_effects(workers, search.base, search.best, held_out)
+            best, supports, without = judge_effects(workers, search.base, search.best, halves)
             best = add_profile_intervals(workers, best)
             networks = fit_passive_networks(workers, best)
             search = replace(search, best=best, passive_networks=networks)
@@ -155,7 +154,7 @@ def explain_observations(
         calibrated = None
         if explanation.hypothesis:
             calibrated = workers.fit([FitJob((), PlainCalibration())])[0]
-        validation = cross_validate(workers, search.base, explanation, held_out, calibrated)
+        validation = cross_validate(workers, search.base, explanation, halves, calibrated)
         null_distribution = None
         if draws and search.best.hypothesis:
             null_distribution = bootstrap_null(search.base, data, draws, processes, progress)
@@ -289,11 +288,12 @@ def _search_with_coupled_pump(
 
 
 def _select_fitted(
-    observations: Sequence[Observation], rig: Rig, modulation: ShaftOrders | None
+    halves: Sequence[Observation], rig: Rig, data: Sequence[Observation]
 ) -> list[Observation]:
-    """The halves of recordings as they are fitted."""
-    modulated = with_phase_modulation(observations, modulation)
-    return select_fitted_frequencies(modulated, rig, HIGHEST_HZ)
+    """The halves of recordings as the whole ones, `data`, are fitted."""
+    ripples = {o.label: o.flow_ripple for o in data}
+    fitted = [replace(half, flow_ripple=ripples[half.label]) for half in halves]
+    return select_fitted_frequencies(fitted, rig, HIGHEST_HZ)
 
 
 def _analyse_shaft_orders(fit: Fit, observations: Sequence[Observation]) -> ShaftOrders | None:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from rippletwin.calibration.corrected_ripple import correct_ripple
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.misfit import score_fit
 from rippletwin.calibration.posterior import MIN_MODEL_ERROR
@@ -99,7 +100,8 @@ def compare_without_each_effect(
     workers: Workers, accepted: Fit, without: Sequence[WithoutEffect]
 ) -> tuple[PriorSensitivity, ...]:
     """`PriorSensitivity` of every accepted effect, given the fits without each."""
-    accepted_misfit = score_fit(accepted, workers.observations).misfit
+    # A misfit below the model error says nothing.
+    accepted_misfit = max(_misfit(accepted, workers.observations), MIN_MODEL_ERROR)
     line = workers.base
     results = []
     for (effect, _), each in zip(accepted.hypothesis, without):
@@ -122,7 +124,6 @@ def compare_without_each_effect(
                     misfit < WIDE_PRIOR_MISFIT_RATIO * accepted_misfit
                     or lost < MIN_LOG_BAYES_FACTOR
                 ),
-                # A misfit below the model error says nothing.
                 refutes=bool(
                     pull > PULL_ALARM
                     and WIDE_PRIOR_MISFIT_RATIO * max(misfit, MIN_MODEL_ERROR) < accepted_misfit
@@ -157,8 +158,13 @@ def refit_with_wide_priors(
             jobs.append(
                 FitJob(fit.hypothesis, FromTheta(theta), base=base, source_free=fit.source_free)
             )
-    refits = [(score_fit(fit, workers.observations).misfit, fit) for fit in workers.fit(jobs)]
+    refits = [(_misfit(fit, workers.observations), fit) for fit in workers.fit(jobs)]
     return [min(pair, key=lambda refit: refit[0]) for pair in zip(refits[::2], refits[1::2])]
+
+
+def _misfit(fit: Fit, observations: Sequence) -> float:
+    """Relative misfit with the pump's flow ripple corrected: what only the line can account for."""
+    return score_fit(fit, observations, ripple=correct_ripple(fit, observations)).misfit
 
 
 def widen_priors(rig: Rig) -> Rig:

@@ -19,7 +19,7 @@ from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.levenberg_marquardt import descend
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.shaft_angles import fit_shaft_angles
-from rippletwin.explanation.checks.cross_validation import Fold, make_folds
+from rippletwin.explanation.checks.cross_validation import Fold, Halves, make_folds
 from rippletwin.explanation.checks.prior_sensitivity import WithoutEffect, fit_without_each_effect
 from rippletwin.explanation.checks.robustness import Robustness, compare_beside_corrections
 from rippletwin.explanation.fit_jobs import (
@@ -61,7 +61,7 @@ class Support:
 
 
 def judge_effects(
-    workers: Workers, base: Fit, best: Fit, late: Sequence | None = None
+    workers: Workers, base: Fit, best: Fit, halves: Halves | None = None
 ) -> tuple[Fit, tuple[Support, ...], tuple[WithoutEffect, ...]]:
     """`best` without the effects that only the search suggests, the support of each that is left,
     and the fits without each.
@@ -71,7 +71,7 @@ def judge_effects(
     """
     while True:
         without = fit_without_each_effect(workers, base, best)
-        supports = _judge_each(workers, best, without, late)
+        supports = _judge_each(workers, best, without, halves)
         weak = [
             k
             for k, support in enumerate(supports)
@@ -107,10 +107,10 @@ def judge_beside_network(
 
 
 def _judge_each(
-    workers: Workers, best: Fit, without: Sequence[WithoutEffect], late: Sequence | None
+    workers: Workers, best: Fit, without: Sequence[WithoutEffect], halves: Halves | None
 ) -> tuple[Support, ...]:
     """`Support` of every effect of `best`."""
-    folds = make_folds(workers, late)
+    folds = make_folds(workers, halves)
     held_out = _held_out_gains(best, without, folds)
     rig, values = best.twin.rig, best.twin.effect_values(best.twin.theta)
     owns = [own_element(effect, place, value, rig) for effect, place, value in values]
