@@ -18,11 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rippletwin.calibration.corrected_ripple import CorrectedRipple
 from rippletwin.calibration.error_model import ErrorModel
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.shaft_angles import best_turn, fit_shaft_angles
+from rippletwin.twin.corrected_ripple import CorrectedRipple
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rippletwin.calibration.corrected_ripple import correct_ripple
 from rippletwin.calibration.fit import posterior_at_fit
 from rippletwin.calibration.misfit import predict_with_ripple
+from rippletwin.calibration.ripple_correction import correct_ripple
 from rippletwin.explanation.checks.profile_intervals import effect_intervals
 from rippletwin.explanation.localise.missing_immittance import missing_immittance
 from rippletwin.explanation.localise.residual_bands import residual_map

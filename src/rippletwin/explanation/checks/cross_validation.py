@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rippletwin.calibration.corrected_ripple import correct_ripple
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.misfit import Score, score_fit
+from rippletwin.calibration.ripple_correction import correct_ripple
 from rippletwin.explanation.fit_jobs import Workers, job_from
 from rippletwin.spectra.frequency_selection import select_frequencies
 from rippletwin.spectra.observation import Observation

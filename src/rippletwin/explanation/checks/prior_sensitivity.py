@@ -12,10 +12,10 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from rippletwin.calibration.corrected_ripple import correct_ripple
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.misfit import score_fit
 from rippletwin.calibration.posterior import MIN_MODEL_ERROR
+from rippletwin.calibration.ripple_correction import correct_ripple
 from rippletwin.case.model import Rig, Uncertainty
 from rippletwin.explanation.checks import alarms
 from rippletwin.explanation.fit_jobs import (

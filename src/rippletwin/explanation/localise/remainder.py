@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rippletwin.calibration.corrected_ripple import correct_ripple
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.misfit import score_fit
+from rippletwin.calibration.ripple_correction import correct_ripple
 from rippletwin.explanation.localise.missing_immittance import describe_law
 from rippletwin.explanation.localise.residual_bands import (
     residual_conditions,
