@@ -49,8 +49,8 @@ def line_of(lengths, diameters, speeds, creep=None) -> FrequencyDomainLine:
 )
 def test_it_is_the_line_cut_and_joined(values, position, lengths, kinds):
     """Pressures at both sensors and the input impedance are those of the chain with a pipe of its
-    own in place of the stretch and a leak at its middle, whose formulas the two-port does not use, to rounding. A sensor
-    inside the piece is left out: that is the limit that the module states."""
+    own in place of the stretch and a leak at its middle, whose formulas the two-port does not
+    use, to rounding. A sensor inside the piece is left out: the module states that limit."""
     piece = kinds.index(None)
     d = [values["diameter_ratio"] * DIAMETERS[0] if k is None else DIAMETERS[k] for k in kinds]
     a = [values["wave_speed_ratio"] * SPEEDS[0] if k is None else SPEEDS[k] for k in kinds]
