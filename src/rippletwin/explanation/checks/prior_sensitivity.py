@@ -43,6 +43,7 @@ class PriorSensitivity:
     """A fit without one effect and with wide priors.
 
     effect     name of the effect that is left out
+    place      where it acts, in words
     evidence   log evidence lost without it, with priors as stated; None if nothing fits
     misfit     relative, in sample, with wide priors
     parameter  line parameter that moves furthest from the data sheet
@@ -55,6 +56,7 @@ class PriorSensitivity:
     """
 
     effect: str
+    place: str
     evidence: float | None
     misfit: float
     parameter: str
@@ -104,7 +106,7 @@ def compare_without_each_effect(
     accepted_misfit = max(_misfit(accepted, workers.observations), MIN_MODEL_ERROR)
     line = workers.base
     results = []
-    for (effect, _), each in zip(accepted.hypothesis, without):
+    for (effect, place), each in zip(accepted.hypothesis, without):
         stated, wide, misfit = each.stated, each.wide, each.wide_misfit
         theta = coordinates(line.parameters, wide.twin.values())
         pull, name = alarms.largest_pull(replace(wide, twin=line.with_(theta=theta)))
@@ -113,6 +115,7 @@ def compare_without_each_effect(
         results.append(
             PriorSensitivity(
                 effect=effect.name,
+                place=str(place),
                 evidence=lost if np.isfinite(lost) else None,
                 misfit=misfit,
                 parameter=parameter.name,

@@ -149,8 +149,8 @@ def _judge_each(
         jobs.append((((each.stated, None), (each.stated, start)), each.wide, elements))
     absent = workers.map(evaluate_without, jobs)
     tried = list(dict.fromkeys(e for tables in absent for table in tables for e in table))
-    halves = workers.map(evaluate_corrections, [(best, tried[k::2]) for k in range(2)])
-    present = halves[0] | halves[1]
+    one, other = workers.map(evaluate_corrections, [(best, tried[k::2]) for k in range(2)])
+    present = one | other
     frequency_hz = np.concatenate([o.frequency_hz for o in workers.observations])
     spacing = position_spacing(rig, frequency_hz)
     supports = []

@@ -12,7 +12,7 @@ from rippletwin.explanation.verdict.decision import equivalent_places
 from rippletwin.explanation.verdict.explanation import Explanation
 from rippletwin.explanation.verdict.number_text import (
     load_sentences,
-    parameter_sentence,
+    parameters_sentence,
     plain_number,
     pump_sentences,
     sensor_sentences,
@@ -88,14 +88,14 @@ def _named(e: Explanation, result: dict, entries: Sequence[dict]) -> list[str]:
         f"pump's flow ripple corrected, the misfit on held-out data goes from {before:.1%} to "
         f"{after:.1%} of the measured ripple."
     ]
-    for entry in certain:
-        sentences += [parameter_sentence(name, p) for name, p in entry["parameters"].items()]
+    for name, entry in zip(names, certain):
+        if entry["parameters"]:
+            sentences.append(parameters_sentence(name, entry["parameters"]))
         if entry["effect"].certain:
             sentences.append(
                 f"{spaced(entry['effect'].name).capitalize()} is always present, so it is included "
                 "unless the data contradict it."
             )
-    sentences = list(dict.fromkeys(sentences))  # two effects may act through one parameter
     sentences += _lesser(e, [x for x in named if x not in certain], levels)
     sentences += _data_sheet_rivals(e)
     sentences += liquid_like_air(
@@ -189,9 +189,9 @@ def _capital(text: str) -> str:
 def _data_sheet_rivals(e: Explanation) -> list[str]:
     """Fits without an effect that only the data sheet rejects."""
     return [
-        f"Without {spaced(s.effect)} the line would fit to {s.misfit:.1%} with {s.parameter} at "
-        f"{plain_number(s.value)} {s.unit}. That is {s.pull:.0f} standard deviations from the data "
-        "sheet, and only the data sheet rejects it."
+        f"Without {spaced(s.effect)} ({s.place}) the line would fit to {s.misfit:.1%} with "
+        f"{s.parameter} at {plain_number(s.value)} {s.unit}. That is {s.pull:.0f} standard "
+        "deviations from the data sheet, and only the data sheet rejects it."
         for s in e.prior_sensitivity
         if s.rivals and s.pull > PULL_ALARM
     ]
