@@ -97,7 +97,7 @@ def _named(e: Explanation, result: dict, entries: Sequence[dict]) -> list[str]:
                 "unless the data contradict it."
             )
     sentences += _lesser(e, [x for x in named if x not in certain], levels)
-    sentences += _data_sheet_rivals(e)
+    sentences += _data_sheet_rivals(e, result["fit"])
     sentences += liquid_like_air(
         [entry["effect"].name for entry in certain], [o.load_pressure for o in e.observations]
     )
@@ -139,7 +139,7 @@ def _unexplained(e: Explanation, result: dict, entries: Sequence[dict]) -> list[
         names = join_words([_effect_and_place(e, entry) for entry in named])
         sentences.append(f"In the library {names} comes nearest.")
         sentences += _lesser(e, named, levels)
-        sentences += _data_sheet_rivals(e)
+        sentences += _data_sheet_rivals(e, result["fit"])
     return sentences
 
 
@@ -186,8 +186,13 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _data_sheet_rivals(e: Explanation) -> list[str]:
-    """Fits without an effect that only the data sheet rejects."""
+def _data_sheet_rivals(e: Explanation, fit: dict) -> list[str]:
+    """Fits without an effect that only the data sheet rejects.
+
+    Their misfits have the nominal ripple: where it is wrong they compare nothing.
+    """
+    if _ripple_error(fit):
+        return []
     return [
         f"Without {spaced(s.effect)} ({s.place}) the line would fit to {s.misfit:.1%} with "
         f"{s.parameter} at {plain_number(s.value)} {s.unit}. That is {s.pull:.0f} standard "
