@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from rippletwin.calibration.laplace import UNCONVERGED_GAIN
 from rippletwin.explanation.checks.alarms import largest_pull
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders
 from rippletwin.explanation.localise.source_free_fits import compare_evidence
@@ -67,6 +68,7 @@ def summary_text(e: Explanation, result: dict, entries: Sequence[dict]) -> str:
     sentences += _remainder(result["remainder"])
     if entries and any(o.source == "nominal" for o in e.observations):
         sentences += _ripple_error(result["fit"])
+    sentences += _unfinished_fit(result["fit"])
     sentences += pump_sentences(result["pump"])
     sentences += load_sentences(result["load"])
     sentences += sensor_sentences(result["sensors"])
@@ -179,6 +181,17 @@ def _ripple_error(fit: dict) -> list[str]:
     return [
         f"With the pump's nominal flow ripple the corrected line misses {misfit:.0%} of the "
         f"reading, with the corrected ripple {fit['after']['in_sample']:.1%}."
+    ]
+
+
+def _unfinished_fit(fit: dict) -> list[str]:
+    """That the fit has not come to a stationary point, where that could change the verdict."""
+    gain = fit["expected_gain"]["after"]
+    if gain <= UNCONVERGED_GAIN:
+        return []
+    return [
+        f"The fit did not converge: one more step promises {gain:.1f} of log posterior. Its "
+        "numbers and the verdict are uncertain."
     ]
 
 
