@@ -6,7 +6,7 @@ import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from rippletwin.figures.quantities import write_number
+from rippletwin.case.quantities import write_number
 from rippletwin.report.tables import Cell, Table, text
 
 
