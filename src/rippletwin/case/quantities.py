@@ -135,7 +135,7 @@ def write_probability(p: float) -> str:
 
 
 def plain(text: str) -> str:
-    """Text as a terminal shows it: spaces at which a line may break, and the minus of a keyboard."""
+    """Text for a terminal: spaces at which a line may break, and the minus of a keyboard."""
     return text.replace("\u00a0", " ").replace(MINUS, "-")
 
 
