@@ -16,6 +16,16 @@ from rippletwin.report.page import write_report
 from rippletwin.report.results import read_results
 from rippletwin.report.workflow_tables import accuracy_table, answer_table, timing_table
 
+ATTENTION = {
+    "simulated": "Where networks look in simulated signals (Grad-CAM), and how much of their "
+    "attention is where the fault changes the signal.",
+    "recorded": "Where networks look in recorded signals (Grad-CAM), and what they call them.",
+}
+LETTERS = (
+    "H: healthy. S: worn slipper. C1, C2: scratched cylinder block, slightly and severely; C: of "
+    "unknown severity."
+)
+
 report_progress = open_log(snakemake)
 params, paths = snakemake.params, snakemake.input
 rows = summarise(pd.read_csv(paths.table)).to_dict("records") if paths.table else []
@@ -26,12 +36,12 @@ pictures = []
 for path in map(Path, paths.attention):
     windows = path.stem.rpartition("_")[2]
     picture = "data:image/png;base64," + b64encode(path.read_bytes()).decode()
-    pictures.append((f"Where the networks look (Grad-CAM): {windows} signals", picture))
+    pictures.append((f"{ATTENTION[windows]} {LETTERS}", picture))
 theirs = {(p.architecture, p.dataset): (p.mean, p.std) for p in paper}
 answers = json.loads(Path(paths.answers).read_text()) if paths.answers else {}
 tables = [
     *([answer_table(answers)] if answers else []),
-    *([accuracy_table(rows, theirs)] if rows else []),
+    *([accuracy_table(rows, theirs, params.datasets)] if rows else []),
     timing_table(params.benchmarks),
 ]
 population = None

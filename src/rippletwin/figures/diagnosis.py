@@ -34,6 +34,7 @@ def confusion(
         ax.set_yticks(range(len(truth)), truth)
         ax.spines[:].set_visible(False)
         ax.tick_params(length=0)
+    fig.suptitle("What do the networks call the recordings of each state?")
     fig.supxlabel("predicted (% of the recording's windows)", fontsize=9)
     fig.supylabel("recorded", fontsize=9)
     return fig
@@ -62,6 +63,7 @@ def accuracy(
         ax.set_xlim(0, 105)
     axes[0, 0].set_yticks(rows, architectures)
     axes[0, 0].invert_yaxis()
+    fig.suptitle("How often are the networks right?", x=0.02, ha="left")
     fig.supxlabel("accuracy on recordings / %", fontsize=9)
     handles, labels = axes[0, 0].get_legend_handles_labels()
     fig.legend(handles, labels, loc="outside upper right", ncols=2)
@@ -99,6 +101,7 @@ def sst(
         )  # fmt: skip
         ax.set_title(name, fontsize=7)
         order_ticks(ax, frequency_hz, shaft_hz, pistons)
+    fig.suptitle("Which frequencies does each signal have, and when?")
     fig.supxlabel("revolutions", fontsize=9)
     fig.supylabel(ORDERS, fontsize=9)
     fig.colorbar(mesh, ax=axes, label=label, shrink=0.8, extend="max" if top else "neither")

@@ -11,24 +11,45 @@ from rippletwin.report.tables import Cell, Table, text
 
 
 def accuracy_table(
-    rows: Sequence[Mapping], paper: Mapping[tuple[str, str], tuple[float, float]]
+    rows: Sequence[Mapping],
+    paper: Mapping[tuple[str, str], tuple[float, float]],
+    datasets: Mapping[str, Mapping[str, str]],
 ) -> Table:
     """Accuracy of every network and dataset in per cent, beside the paper's.
 
-    rows   each with architecture, title, dataset, mean and std
-    paper  mean and standard deviation by (architecture, dataset)
+    rows      each with architecture, title, dataset, mean and std
+    paper     mean and standard deviation by (architecture, dataset)
+    datasets  the row of config/datasets.tsv of each dataset
     """
     cells = []
     for row in rows:
         theirs = paper.get((row["architecture"], row["dataset"]))
         beside = Cell("", -1.0) if theirs is None else _mean(*theirs)
         ours = _mean(row["mean"], row["std"])
-        cells.append([text(row["title"]), text(row["dataset"]), ours, beside])
+        cells.append(
+            [text(row["title"]), text(describe_dataset(row["dataset"], datasets)), ours, beside]
+        )
     columns = ("Network", "Learnt from", "Accuracy / %", "The paper's / %")
     return Table(
         "Accuracy on recordings: mean and standard deviation over seeds",
         columns, (False, False, True, True), cells,
     )  # fmt: skip
+
+
+def describe_dataset(name: str, datasets: Mapping[str, Mapping[str, str]]) -> str:
+    """What networks learnt from, in words, with the dataset's name."""
+    row = datasets.get(name)
+    if row is None:
+        return name
+    if row["line"] == "rig":
+        return f"recordings of all states ({name})"
+    made = f"{row['twin']} twin" if row["twin"] != "none" else "pump alone, on a pipe"
+    words = [f"{row['signal']} of the {made}"]
+    if row["randomised"] == "yes":
+        words.append("range of severities")
+    if row["anchored"] == "yes":
+        words.append("set on the healthy recording")
+    return f"{', '.join(words)} ({name})"
 
 
 def answer_table(answers: Mapping[str, Mapping[str, Mapping]]) -> Table:
