@@ -84,6 +84,14 @@ def test_no_text_is_cut_off(name):
 
 
 @pytest.mark.parametrize("name", DRAWN)
+def test_no_text_lies_on_another(name):
+    """Titles, legends, labels and ticks keep apart."""
+    boxes = [(t.get_text(), t.get_window_extent().shrunk(0.98, 0.9)) for t in texts(DRAWN[name]())]
+    for k, (one, box) in enumerate(boxes):
+        assert not [(one, other) for other, b in boxes[k + 1 :] if box.overlaps(b)]
+
+
+@pytest.mark.parametrize("name", DRAWN)
 def test_a_figure_asks_a_question_and_names_no_identifier(name):
     """Its title asks what it answers, and labels are words; labels of recordings are the user's."""
     figure = DRAWN[name]()

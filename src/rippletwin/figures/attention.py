@@ -122,14 +122,13 @@ def ranks(groups: Mapping[str, tuple[Sequence[str], np.ndarray, np.ndarray, np.n
                 color=colours[name], label=name, mfc="white" if square else None,
             )  # fmt: skip
         ax.axvline(1, color=style.NEUTRAL, lw=0.8, ls=":")
-        ax.set(title=dataset, ylim=(-3, 103))
+        ax.set(title=dataset, ylim=(-3, 103), xlabel="alignment of attention (1: chance)")
     fig.suptitle("Are networks that attend to the simulated fault right more often?")
-    fig.supxlabel("alignment of attention with the simulated fault (1: chance)", fontsize=9)
     fig.supylabel("accuracy on recordings / %", fontsize=9)
     handles: dict[str, object] = {}
     for ax in axes.flat:
         handles |= {label: handle for handle, label in zip(*ax.get_legend_handles_labels())}
-    fig.legend(handles.values(), handles, loc="outside upper center", ncols=4, fontsize=7)
+    fig.legend(handles.values(), handles, loc="outside lower center", ncols=4, fontsize=7)
     return fig
 
 
@@ -154,17 +153,16 @@ def claims(groups: Mapping[str, tuple[Sequence[str], np.ndarray]]) -> Figure:
         ax.set_title(claim, loc="left")
         ax.set_yticks(rows, labels, fontsize=6)
         ax.set_ylim(max(1, len(rows)) - 0.5, -0.5)
-    fig.suptitle("Do these networks support the paper's claims?", x=0.02, ha="left")
+    fig.suptitle("Do these networks support the paper's claims?")
     axes[-1].set_xlabel("difference of accuracy / % of the windows, 95 % interval over seeds")
-    handles, names = axes[0].get_legend_handles_labels()
-    fig.legend(handles, names, loc="outside upper right", ncols=3)
+    style.legend_below(fig, axes[0])
     return fig
 
 
 def _question(where: str, region: np.ndarray | None) -> str:
     """The title of a figure, which says what its orange bars are."""
     title = f"{where} do the networks attend?"
-    return title if region is None else f"{title} Orange: where the fault changes the signal"
+    return title if region is None else f"{title}\nOrange: where the fault changes the signal"
 
 
 def _panels(networks: Sequence[str], states: Sequence[str], height: float):

@@ -60,13 +60,11 @@ def accuracy(
                 mean, rows, xerr=spread, fmt="D", ms=4, color=style.ALARM, label="paper", zorder=3
             )
         ax.set_title(dataset, fontsize=8)
-        ax.set_xlim(0, 105)
+        ax.set(xlim=(0, 105), xlabel="accuracy / %")
     axes[0, 0].set_yticks(rows, architectures)
     axes[0, 0].invert_yaxis()
-    fig.suptitle("How often are the networks right?", x=0.02, ha="left")
-    fig.supxlabel("accuracy on recordings / %", fontsize=9)
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside upper right", ncols=2)
+    fig.suptitle("How often are the networks right on recordings?")
+    style.legend_below(fig, axes[0, 0])
     return fig
 
 

@@ -30,7 +30,7 @@ def overlay(
         for name, values in sorted(curves.items(), key=lambda item: list(_LOOK).index(item[0])):
             ax.plot(angle_deg, values[k] / 1e5, label=name, **_LOOK[name])
         ax.set_ylabel(f"{sensor}: ripple / bar")
-    _legend(fig, axes)
+    style.legend_below(fig, axes[0, 0])
     fig.suptitle(f"Does calibration bring the twin to the recording? {title}".rstrip())
     axes[-1, 0].set_xlabel("crank angle / degrees")
     axes[-1, 0].set_xlim(angle_deg[0], angle_deg[-1])
@@ -51,8 +51,3 @@ def states(
     axes[-1, 0].set_xlabel("crank angle / degrees")
     axes[-1, 0].set_xticks(np.arange(0, 361, 40))
     return fig
-
-
-def _legend(fig: Figure, axes: np.ndarray) -> None:
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside upper right", ncols=len(labels))
