@@ -14,16 +14,11 @@ from rippletwin.learning.architectures import ARCHITECTURES
 from rippletwin.report.content import WorkflowPart
 from rippletwin.report.page import write_report
 from rippletwin.report.results import read_results
-from rippletwin.report.workflow_tables import accuracy_table, answer_table, timing_table
-
-ATTENTION = {
-    "simulated": "Where networks look in simulated signals (Grad-CAM), and how much of their "
-    "attention is where the fault changes the signal.",
-    "recorded": "Where networks look in recorded signals (Grad-CAM), and what they call them.",
-}
-LETTERS = (
-    "H: healthy. S: worn slipper. C1, C2: scratched cylinder block, slightly and severely; C: of "
-    "unknown severity."
+from rippletwin.report.workflow_tables import (
+    accuracy_table,
+    answer_table,
+    describe_attention,
+    timing_table,
 )
 
 report_progress = open_log(snakemake)
@@ -36,7 +31,7 @@ pictures = []
 for path in map(Path, paths.attention):
     windows = path.stem.rpartition("_")[2]
     picture = "data:image/png;base64," + b64encode(path.read_bytes()).decode()
-    pictures.append((f"{ATTENTION[windows]} {LETTERS}", picture))
+    pictures.append((describe_attention(windows), picture))
 theirs = {(p.architecture, p.dataset): (p.mean, p.std) for p in paper}
 answers = json.loads(Path(paths.answers).read_text()) if paths.answers else {}
 tables = [

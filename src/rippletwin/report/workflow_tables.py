@@ -9,6 +9,16 @@ from pathlib import Path
 from rippletwin.case.quantities import write_number
 from rippletwin.report.tables import Cell, Table, text
 
+ATTENTION = {
+    "simulated": "Where networks look in simulated signals (Grad-CAM), and how much of their "
+    "attention is where the fault changes the signal.",
+    "recorded": "Where networks look in recorded signals (Grad-CAM), and what they call them.",
+}
+LETTERS = (
+    "H: healthy. S: worn slipper. C1, C2: scratched cylinder block, slightly and severely; C: of "
+    "unknown severity."
+)
+
 
 def accuracy_table(
     rows: Sequence[Mapping],
@@ -50,6 +60,11 @@ def describe_dataset(name: str, datasets: Mapping[str, Mapping[str, str]]) -> st
     if row["anchored"] == "yes":
         words.append("set on the healthy recording")
     return f"{', '.join(words)} ({name})"
+
+
+def describe_attention(windows: str) -> str:
+    """What a picture of the networks' attention to `windows` (simulated, recorded) shows."""
+    return f"{ATTENTION[windows]} {LETTERS}"
 
 
 def answer_table(answers: Mapping[str, Mapping[str, Mapping]]) -> Table:
