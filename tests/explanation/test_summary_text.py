@@ -118,11 +118,12 @@ def test_air_at_one_pressure_may_be_another_liquid(name, pressures, is_warned):
 
 
 def test_a_wrong_ripple_is_told_apart_from_a_wrong_line():
-    """A misfit of 40 % beside a model error of 1 % is the ripple's; one of 2 % is not."""
-    fit = {"after": {"in_sample": 0.4}, "model_error": {"after": 0.01}}
-    (sentence,) = _ripple_error(fit)
-    assert "misses 40% of the reading" in sentence and "error of the ripple" in sentence
-    assert _ripple_error({"after": {"in_sample": 0.02}, "model_error": {"after": 0.01}}) == []
+    """With the nominal ripple a misfit of 40 % beside a model error of 1 % is the ripple's, and
+    both misfits are told; one of 2 % is not."""
+    fit = {"model_error": {"after": 0.01}, "after": {"in_sample": 0.02}}
+    (sentence,) = _ripple_error(fit | {"nominal_ripple": {"in_sample": 0.4}})
+    assert "misses 40% of the reading" in sentence and "2.0%" in sentence
+    assert _ripple_error(fit | {"nominal_ripple": {"in_sample": 0.02}}) == []
 
 
 def test_an_unknown_load_and_uncalibrated_sensors_are_told():

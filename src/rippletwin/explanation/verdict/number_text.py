@@ -11,13 +11,14 @@ from rippletwin.explanation.verdict.places import join_words
 LARGEST_PLAIN = 1e6  # larger numbers are written with a power of ten
 
 
-def parameter_sentence(name: str, parameter: dict) -> str:
-    """A parameter's value and interval."""
-    low, high = parameter["ci95"]
-    unit = "" if parameter["unit"] == "1" else f" {parameter['unit']}"
-    name = spaced(name).capitalize()
-    value, low, high = map(plain_number, (parameter["value"], low, high))
-    return f"{name}: {value}{unit} (95 % interval {low} to {high})."
+def parameters_sentence(effect: str, parameters: Mapping[str, dict]) -> str:
+    """Values and 95 % intervals of the parameters of an effect, which is told with its place."""
+    told = []
+    for name, parameter in parameters.items():
+        unit = "" if parameter["unit"] == "1" else f" {parameter['unit']}"
+        value, low, high = map(plain_number, (parameter["value"], *parameter["ci95"]))
+        told.append(f"{spaced(name)} {value}{unit} (95 % interval {low} to {high})")
+    return f"{effect[:1].upper()}{effect[1:]}: {join_words(told)}."
 
 
 def pump_sentences(parameters: dict) -> list[str]:
