@@ -7,7 +7,7 @@ import pytest
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders
 from rippletwin.explanation.verdict.number_text import (
     load_sentences,
-    parameter_sentence,
+    parameters_sentence,
     sensor_sentences,
 )
 from rippletwin.explanation.verdict.summary_text import (
@@ -78,8 +78,8 @@ def test_a_parameter_is_in_units_of_a_test_bench():
     """1e-12 m3/(Pa s) is 1e-12 times 60000 L/min and 1e5 bar: 0.006 L/min per bar; no power of ten
     is left to read, and every minus is the keyboard's."""
     conductance = {"value": 1e-12, "ci95": [-1e-12, 3e-12], "unit": "m3/(Pa s)"}
-    sentence = parameter_sentence("conductance", conductance)
-    said = "Conductance: 0.006 L/min per bar (95 % interval -0.006 to 0.018)."
+    sentence = parameters_sentence("leak (p1)", {"conductance": conductance})
+    said = "Leak (p1): conductance 0.006 L/min per bar (95 % interval -0.006 to 0.018)."
     assert sentence == said
 
 
@@ -131,11 +131,12 @@ def test_air_at_one_pressure_may_be_another_liquid(name, pressures, is_warned):
 
 
 def test_a_wrong_ripple_is_told_apart_from_a_wrong_line():
-    """A misfit of 40 % beside a model error of 1 % is the ripple's; one of 2 % is not."""
-    fit = {"after": {"in_sample": 0.4}, "model_error": {"after": 0.01}}
-    (sentence,) = _ripple_error(fit)
-    assert "misses 40% of the reading" in sentence and "error of the ripple" in sentence
-    assert _ripple_error({"after": {"in_sample": 0.02}, "model_error": {"after": 0.01}}) == []
+    """With the nominal ripple a misfit of 40 % beside a model error of 1 % is the ripple's, and
+    both misfits are told; one of 2 % is not."""
+    fit = {"model_error": {"after": 0.01}, "after": {"in_sample": 0.02}}
+    (sentence,) = _ripple_error(fit | {"nominal_ripple": {"in_sample": 0.4}})
+    assert "misses 40% of the reading" in sentence and "2.0%" in sentence
+    assert _ripple_error(fit | {"nominal_ripple": {"in_sample": 0.02}}) == []
 
 
 def test_an_unknown_load_and_uncalibrated_sensors_are_told():

@@ -15,6 +15,7 @@ import numpy as np
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.misfit import score_fit
 from rippletwin.calibration.posterior import MIN_MODEL_ERROR
+from rippletwin.calibration.ripple_correction import correct_ripple
 from rippletwin.case.model import Rig, Uncertainty
 from rippletwin.explanation.checks import alarms
 from rippletwin.explanation.fit_jobs import (
@@ -42,6 +43,7 @@ class PriorSensitivity:
     """A fit without one effect and with wide priors.
 
     effect     name of the effect that is left out
+    place      where it acts, in words
     evidence   log evidence lost without it, with priors as stated; None if nothing fits
     misfit     relative, in sample, with wide priors
     parameter  line parameter that moves furthest from the data sheet
@@ -54,6 +56,7 @@ class PriorSensitivity:
     """
 
     effect: str
+    place: str
     evidence: float | None
     misfit: float
     parameter: str
@@ -99,10 +102,11 @@ def compare_without_each_effect(
     workers: Workers, accepted: Fit, without: Sequence[WithoutEffect]
 ) -> tuple[PriorSensitivity, ...]:
     """`PriorSensitivity` of every accepted effect, given the fits without each."""
-    accepted_misfit = score_fit(accepted, workers.observations).misfit
+    # A misfit below the model error says nothing.
+    accepted_misfit = max(_misfit(accepted, workers.observations), MIN_MODEL_ERROR)
     line = workers.base
     results = []
-    for (effect, _), each in zip(accepted.hypothesis, without):
+    for (effect, place), each in zip(accepted.hypothesis, without):
         stated, wide, misfit = each.stated, each.wide, each.wide_misfit
         theta = coordinates(line.parameters, wide.twin.values())
         pull, name = alarms.largest_pull(replace(wide, twin=line.with_(theta=theta)))
@@ -111,6 +115,7 @@ def compare_without_each_effect(
         results.append(
             PriorSensitivity(
                 effect=effect.name,
+                place=str(place),
                 evidence=lost if np.isfinite(lost) else None,
                 misfit=misfit,
                 parameter=parameter.name,
@@ -122,7 +127,6 @@ def compare_without_each_effect(
                     misfit < WIDE_PRIOR_MISFIT_RATIO * accepted_misfit
                     or lost < MIN_LOG_BAYES_FACTOR
                 ),
-                # A misfit below the model error says nothing.
                 refutes=bool(
                     pull > PULL_ALARM
                     and WIDE_PRIOR_MISFIT_RATIO * max(misfit, MIN_MODEL_ERROR) < accepted_misfit
@@ -157,8 +161,13 @@ def refit_with_wide_priors(
             jobs.append(
                 FitJob(fit.hypothesis, FromTheta(theta), base=base, source_free=fit.source_free)
             )
-    refits = [(score_fit(fit, workers.observations).misfit, fit) for fit in workers.fit(jobs)]
+    refits = [(_misfit(fit, workers.observations), fit) for fit in workers.fit(jobs)]
     return [min(pair, key=lambda refit: refit[0]) for pair in zip(refits[::2], refits[1::2])]
+
+
+def _misfit(fit: Fit, observations: Sequence) -> float:
+    """Relative misfit with the pump's flow ripple corrected: what only the line can account for."""
+    return score_fit(fit, observations, ripple=correct_ripple(fit, observations)).misfit
 
 
 def widen_priors(rig: Rig) -> Rig:

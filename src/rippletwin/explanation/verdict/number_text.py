@@ -10,12 +10,15 @@ from rippletwin.case.quantities import plain, unit_of, write_interval, write_num
 from rippletwin.explanation.verdict.places import join_words
 
 
-def parameter_sentence(name: str, parameter: dict) -> str:
-    """A parameter's value and interval, in units of a test bench."""
-    unit, ends = unit_of(parameter["unit"], name), tuple(parameter["ci95"])
-    value = write_value(parameter["value"], unit, ends)
-    interval = write_interval(ends, unit)
-    return plain(f"{spaced(name).capitalize()}: {value} (95 % interval {interval}).")
+def parameters_sentence(effect: str, parameters: Mapping[str, dict]) -> str:
+    """Values and 95 % intervals of the parameters of an effect, which is told with its place; in
+    units of a test bench."""
+    told = []
+    for name, parameter in parameters.items():
+        unit, ends = unit_of(parameter["unit"], name), tuple(parameter["ci95"])
+        value = write_value(parameter["value"], unit, ends)
+        told.append(f"{spaced(name)} {value} (95 % interval {write_interval(ends, unit)})")
+    return plain(f"{effect[:1].upper()}{effect[1:]}: {join_words(told)}.")
 
 
 def pump_sentences(parameters: dict) -> list[str]:
