@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from rippletwin.calibration.laplace import UNCONVERGED_GAIN
+from rippletwin.case.quantities import plain, unit_of, write_value
 from rippletwin.explanation.checks.alarms import largest_pull
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders
 from rippletwin.explanation.localise.source_free_fits import compare_evidence
@@ -14,7 +15,6 @@ from rippletwin.explanation.verdict.explanation import Explanation
 from rippletwin.explanation.verdict.number_text import (
     load_sentences,
     parameters_sentence,
-    plain_number,
     pump_sentences,
     sensor_sentences,
     spaced,
@@ -208,8 +208,8 @@ def _data_sheet_rivals(e: Explanation, fit: dict) -> list[str]:
         return []
     return [
         f"Without {spaced(s.effect)} ({s.place}) the line would fit to {s.misfit:.1%} with "
-        f"{s.parameter} at {plain_number(s.value)} {s.unit}. That is {s.pull:.0f} standard "
-        "deviations from the data sheet, and only the data sheet rejects it."
+        f"{s.parameter} at {plain(write_value(s.value, unit_of(s.unit, s.parameter)))}. That is "
+        f"{s.pull:.0f} standard deviations from the data sheet, and only the data sheet rejects it."
         for s in e.prior_sensitivity
         if s.rivals and s.pull > PULL_ALARM
     ]
