@@ -20,7 +20,14 @@ SPREAD = ShaftOrders(0.02, 1e-9, 0.95, "piston_spread", 0.03, interval=(0.025, 0
 
 
 def summarise(
-    verdict, shaft_orders=None, raised=(), pull=(0.1, "load"), pump=None, remainder=None, **decision
+    verdict,
+    shaft_orders=None,
+    raised=(),
+    pull=(0.1, "load"),
+    pump=None,
+    remainder=None,
+    gain=0.1,
+    **decision,
 ):
     """The sentence of a verdict without effects in the line; its misfits are 2 %."""
     twin = SimpleNamespace(parameters=(), theta=())
@@ -35,6 +42,7 @@ def summarise(
         ),
     )
     fit = {"before": {"held_out": 0.02}, "after": {"held_out": 0.02}}
+    fit["expected_gain"] = {"after": gain}
     result = {"verdict": verdict, "fit": fit, "next_recording": None, "pump": pump or {}}
     result |= {"load": None, "sensors": {}}
     result["remainder"] = remainder
@@ -72,6 +80,12 @@ def test_calibration_only_names_the_value_that_is_off(raised, is_named):
     sentence = summarise("calibration_only", raised=raised, pull=(2.9, "diameter[4]"))
     assert "nominal values of the line are outside their stated tolerances" in sentence
     assert ("diameter[4] is 2.9 standard deviations from the data sheet" in sentence) is is_named
+
+
+def test_a_fit_that_did_not_converge_is_told():
+    """A step that promises 5 of log posterior is told, one of 0.1 is not."""
+    assert "did not converge: one more step promises 5.0" in summarise("consistent", gain=5.0)
+    assert "converge" not in summarise("consistent")
 
 
 def test_a_parameter_is_in_units_of_a_test_bench():

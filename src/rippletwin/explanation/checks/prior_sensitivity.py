@@ -15,7 +15,6 @@ import numpy as np
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.misfit import score_fit
 from rippletwin.calibration.posterior import MIN_MODEL_ERROR
-from rippletwin.calibration.ripple_correction import correct_ripple
 from rippletwin.case.model import Rig, Uncertainty
 from rippletwin.explanation.checks import alarms
 from rippletwin.explanation.fit_jobs import (
@@ -45,7 +44,7 @@ class PriorSensitivity:
     effect     name of the effect that is left out
     place      where it acts, in words
     evidence   log evidence lost without it, with priors as stated; None if nothing fits
-    misfit     relative, in sample, with wide priors
+    misfit     relative, in sample, with wide priors and the nominal flow ripple
     parameter  line parameter that moves furthest from the data sheet
     value      its fitted value, `unit`
     nominal    its value on the data sheet, `unit`
@@ -102,8 +101,7 @@ def compare_without_each_effect(
     workers: Workers, accepted: Fit, without: Sequence[WithoutEffect]
 ) -> tuple[PriorSensitivity, ...]:
     """`PriorSensitivity` of every accepted effect, given the fits without each."""
-    # A misfit below the model error says nothing.
-    accepted_misfit = max(_misfit(accepted, workers.observations), MIN_MODEL_ERROR)
+    accepted_misfit = score_fit(accepted, workers.observations).misfit
     line = workers.base
     results = []
     for (effect, place), each in zip(accepted.hypothesis, without):
@@ -127,6 +125,7 @@ def compare_without_each_effect(
                     misfit < WIDE_PRIOR_MISFIT_RATIO * accepted_misfit
                     or lost < MIN_LOG_BAYES_FACTOR
                 ),
+                # A misfit below the model error says nothing.
                 refutes=bool(
                     pull > PULL_ALARM
                     and WIDE_PRIOR_MISFIT_RATIO * max(misfit, MIN_MODEL_ERROR) < accepted_misfit
@@ -161,13 +160,8 @@ def refit_with_wide_priors(
             jobs.append(
                 FitJob(fit.hypothesis, FromTheta(theta), base=base, source_free=fit.source_free)
             )
-    refits = [(_misfit(fit, workers.observations), fit) for fit in workers.fit(jobs)]
+    refits = [(score_fit(fit, workers.observations).misfit, fit) for fit in workers.fit(jobs)]
     return [min(pair, key=lambda refit: refit[0]) for pair in zip(refits[::2], refits[1::2])]
-
-
-def _misfit(fit: Fit, observations: Sequence) -> float:
-    """Relative misfit with the pump's flow ripple corrected: what only the line can account for."""
-    return score_fit(fit, observations, ripple=correct_ripple(fit, observations)).misfit
 
 
 def widen_priors(rig: Rig) -> Rig:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from rippletwin.calibration.laplace import UNCONVERGED_GAIN
 from rippletwin.case.quantities import plain, unit_of, write_value
 from rippletwin.explanation.checks.alarms import largest_pull
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders
@@ -67,6 +68,7 @@ def summary_text(e: Explanation, result: dict, entries: Sequence[dict]) -> str:
     sentences += _remainder(result["remainder"])
     if entries and any(o.source == "nominal" for o in e.observations):
         sentences += _ripple_error(result["fit"])
+    sentences += _unfinished_fit(result["fit"])
     sentences += pump_sentences(result["pump"])
     sentences += load_sentences(result["load"])
     sentences += sensor_sentences(result["sensors"])
@@ -97,7 +99,7 @@ def _named(e: Explanation, result: dict, entries: Sequence[dict]) -> list[str]:
                 "unless the data contradict it."
             )
     sentences += _lesser(e, [x for x in named if x not in certain], levels)
-    sentences += _data_sheet_rivals(e)
+    sentences += _data_sheet_rivals(e, result["fit"])
     sentences += liquid_like_air(
         [entry["effect"].name for entry in certain], [o.load_pressure for o in e.observations]
     )
@@ -139,7 +141,7 @@ def _unexplained(e: Explanation, result: dict, entries: Sequence[dict]) -> list[
         names = join_words([_effect_and_place(e, entry) for entry in named])
         sentences.append(f"In the library {names} comes nearest.")
         sentences += _lesser(e, named, levels)
-        sentences += _data_sheet_rivals(e)
+        sentences += _data_sheet_rivals(e, result["fit"])
     return sentences
 
 
@@ -182,12 +184,28 @@ def _ripple_error(fit: dict) -> list[str]:
     ]
 
 
+def _unfinished_fit(fit: dict) -> list[str]:
+    """That the fit has not come to a stationary point, where that could change the verdict."""
+    gain = fit["expected_gain"]["after"]
+    if gain <= UNCONVERGED_GAIN:
+        return []
+    return [
+        f"The fit did not converge: one more step promises {gain:.1f} of log posterior. Its "
+        "numbers and the verdict are uncertain."
+    ]
+
+
 def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _data_sheet_rivals(e: Explanation) -> list[str]:
-    """Fits without an effect that only the data sheet rejects."""
+def _data_sheet_rivals(e: Explanation, fit: dict) -> list[str]:
+    """Fits without an effect that only the data sheet rejects.
+
+    Their misfits have the nominal ripple: where it is wrong they compare nothing.
+    """
+    if _ripple_error(fit):
+        return []
     return [
         f"Without {spaced(s.effect)} ({s.place}) the line would fit to {s.misfit:.1%} with "
         f"{s.parameter} at {plain(write_value(s.value, unit_of(s.unit, s.parameter)))}. That is "

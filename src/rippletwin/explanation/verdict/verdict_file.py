@@ -269,6 +269,10 @@ def _fit_scores(e: Explanation) -> dict:
             "before": float(e.search.base.model_error),
             "after": float(e.decision.accepted.model_error),
         },
+        "expected_gain": {
+            "before": float(e.search.base.expected_gain),
+            "after": float(e.decision.accepted.expected_gain),
+        },
         "left_out": list(e.validation.left_out),
         "parameters_agree_within_sd": float(e.validation.disagreement),
     }
