@@ -18,7 +18,7 @@ SMALL = """\
 results: out
 datasets: [CFD-MOC-P+, experimental]
 seeds: 1
-samples_per_class: {time: 16, image: 8, randomised: 2}
+samples_per_class: {time: 16, image: 10, randomised: 2}
 architectures: [cnn1d_341_100]
 training: {plain: {max_epochs: 2}}
 """
