@@ -90,7 +90,8 @@ def undisturbed(tmp_path_factory) -> dict[str, bytes]:
     return final_results(folder / "out")
 
 
-@pytest.mark.parametrize("kills", [3, pytest.param(100, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("kills", [3, 100])
 def test_a_killed_run_ends_as_an_undisturbed_one(undisturbed, tmp_path, kills):
     """SIGKILL to the whole process group at random moments: no finished file is torn, and once the
     run may end, tables, verdict and twin have the bytes of a run that nobody disturbed. A run that
