@@ -204,7 +204,8 @@ def test_check_reports_a_case(tmp_path, capsys):
     write_case(tmp_path, sheet())
     assert main(["check", str(tmp_path)]) == 0
     text = capsys.readouterr().out
-    assert "revolutions at 1000." in text and "cycle scatter" in text
+    assert "revolutions at 1000." in text and "noise 0.010" in text
+    assert "mean 9" in text and "scatter of the revolutions 0.0" in text
     assert "5 of 33 piston harmonics" in text
 
 

@@ -101,7 +101,7 @@ def test_state_space_is_the_twins_line(exported):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--recording", "nothing"], "there are healthy_0"),
+        (["--recording", "nothing"], "There are healthy_0"),
         (["--twin", "none.json"], "cannot be read"),
         (["--state-space"], "--twin"),
         (["--max-frequency", "1"], "no frequency of the recording is between"),

@@ -69,16 +69,32 @@ def test_every_number_is_explained(tmp_path):
 
 
 def test_questions_ask_for_what_is_missing(tmp_path):
-    """Answers give the same sheet as flags; one that makes no sense is asked for again."""
-    answers = ["9", "32", "5950,19.7,2.5", "3000,19.7,850m/s", "", "p1,420", "p2", "p2,2590", ""]
-    answers += ["recordings/a.h5,healthy,1000,95", ""]
-    options = ["--ask", "--temperature", "65", "--flow", "38"]
+    """Answers give the same sheet as flags; one that makes no sense is asked for again. An empty
+    answer says that a number of the pump is not known, and takes 50 °C."""
+    answers = [
+        "nine",
+        "9",
+        "17",
+        "33.5",
+        *[""] * 5,
+        "65",
+        "32",
+        "5950,19.7,2.5",
+        "3000,19.7,850m/s",
+        "",
+        "p1,420",
+        "p2",
+        "p2,2590",
+        "",
+    ]
+    answers += ["38", "recordings/a.h5,healthy,1000,95", "", "hPa", "bar"]
     run = CliRunner().invoke(
-        command, [str(tmp_path / "asked"), *options], input="\n".join(answers) + "\n"
+        command, [str(tmp_path / "asked"), "--ask"], input="\n".join(answers) + "\n"
     )
     assert run.exception is None, run.output
-    assert "'p2' is not NAME,POSITION" in run.output
-    assert main(["new", str(tmp_path / "given"), *flags()]) == 0
+    assert "'p2' is not NAME,POSITION" in run.output and "nine is no number" in run.output
+    more = ["--unit", "bar", "--piston-diameter", "17", "--pitch-radius", "33.5"]
+    assert main(["new", str(tmp_path / "given"), *flags(), *more]) == 0
     asked, given = (
         yaml.safe_load((tmp_path / name / "rig.yaml").read_text()) for name in ("asked", "given")
     )
@@ -95,7 +111,13 @@ def test_what_is_missing_is_told_at_once(tmp_path, capsys):
 
 REFUSED = {
     "a length of text": ("segment", "long,20,2", "no length"),
-    "a bore below zero": ("segment", "5950,-20,2", "no length"),
+    "a bore below zero": ("segment", "5950,-20,2", "-20 is no bore. Give a positive number of mm"),
+    "a bore in m": ("segment", "5.95,0.0197,2", "possible; it looks like m (19.7 mm). Give mm"),
+    "pistons in words": ("pistons", "nine", "Give a whole number from 3 to 15"),
+    "a piston in m": ("piston-diameter", "0.017", "it looks like m (17 mm). Give mm"),
+    "an area in m2": ("port-area", "1.2e-4", "it looks like m2 (120 mm2). Give mm2"),
+    "a viscosity in m2/s": ("viscosity", "3.2e-5", "it looks like m2/s (32 cSt). Give cSt"),
+    "pistons that overlap": ("pitch-radius", "11", "overlap on a circle"),
     "a wall of cheese": ("segment", "5950,20,2,cheese", "no known modulus"),
     "a sensor behind the pump": ("sensor", "p1,-4", "no position"),
     "a state nobody knows": ("recording", "a.h5,worn,1000,95", "worn is no state"),
@@ -108,9 +130,44 @@ REFUSED = {
 def test_what_makes_no_sense(tmp_path, capsys, name):
     """Refused with the option or the field, and no rig.yaml is left."""
     option, value, words = REFUSED[name]
-    assert main(["new", str(tmp_path / "case"), *flags(**{option: [value]})]) == 2
+    pump = {"piston-diameter": ["17"]} | {option: [value]}
+    assert main(["new", str(tmp_path / "case"), *flags(**pump)]) == 2
     assert words in capsys.readouterr().err
     assert not (tmp_path / "case" / "rig.yaml").exists()
+
+
+def test_two_sensors_of_one_name(tmp_path, capsys):
+    """Neither of them is dropped: the command line is refused, and can be given again."""
+    case = str(tmp_path / "case")
+    assert main(["new", case, *flags(sensor=["p1,420", "p1,900"])]) == 2
+    assert "p1 is the name of sensors[0] too" in capsys.readouterr().err
+    assert main(["new", case, *flags(sensor=["p1,420", "p2,900"])]) == 0
+
+
+def test_the_catalogue_s_pump(tmp_path, capsys):
+    """A pump of nine pistons of 17 mm on a radius of 33.5 mm at 17 degrees displaces 41.8 cm3: nine
+    times pi/4 17^2 times twice 33.5 mm times tan(17°). Its numbers are in the sheet in SI units,
+    those that are not given as comments, and nothing warns of a generic pump."""
+    case = tmp_path / "case"
+    catalogue = {"piston-diameter": "17", "pitch-radius": "33.5", "swash-angle": "17"}
+    catalogue |= {"port-area": "110"}
+    options = flags(**{name: [value] for name, value in catalogue.items()})
+    assert main(["new", str(case), *options]) == 0
+    said = capsys.readouterr()
+    assert "pump: 41.8 cm3 per revolution" in said.out and "generic" not in said.err
+    pump = read_sheet(case / "rig.yaml")["pump"]
+    assert pump == {
+        "pistons": 9,
+        "piston_diameter": 0.017,
+        "pitch_radius": 0.0335,
+        "swash_angle_deg": 17,
+        "port_area": 1.1e-4,
+    }
+    text = (case / "rig.yaml").read_text()
+    (case / "rig.yaml").write_text(text.replace("# port_opening_deg", "port_opening_deg"))
+    assert read_sheet(case / "rig.yaml")["pump"]["port_opening_deg"] == 30
+    assert main(["new", str(tmp_path / "b"), *flags()]) == 0
+    assert "generic pump" in capsys.readouterr().err
 
 
 def test_nothing_is_overwritten(tmp_path, capsys):

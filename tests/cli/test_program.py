@@ -23,11 +23,12 @@ OPTIONS = {
     "negative frequency": ("calibrate", ["--max-frequency", "-5"], "--max-frequency", "-5"),
     "no frequency": ("calibrate", ["--max-frequency", "nan"], "--max-frequency", "nan"),
     "infinite frequency": ("calibrate", ["--max-frequency", "inf"], "--max-frequency", "inf"),
-    "no processes": ("explain", ["--processes", "0"], "--processes", "0 processes"),
-    "negative processes": ("explain", ["--processes", "-1"], "--processes", "-1 processes"),
+    "no processes": ("explain", ["--processes", "0"], "--processes", "0 is no number of processes"),
+    "negative processes": ("explain", ["--processes", "-1"], "--processes", "-1 is no number"),
     "too many processes": ("explain", ["--processes", "99999"], "--processes", "99999"),
     "too few draws": ("explain", ["--bootstrap", "3"], "--bootstrap", "3 draws"),
-    "a word for a number": ("explain", ["--processes", "two"], "--processes", "two processes"),
+    "a word for a number": ("explain", ["--processes", "two"], "--processes", "two is no number"),
+    "no such command": ("explian", [], "command", "Did you mean 'explain'? See"),
     "no such option": ("explain", ["--procesess", "2"], "--procesess", "explain --help"),
     "no such finding": ("explain", ["--fail-on", "anything"], "--fail-on", "anything"),
     "no folder": ("explain", ["--out", ""], "--out", "no folder is named"),
@@ -176,6 +177,21 @@ def test_reader_that_leaves_ends_without_a_traceback(tmp_path):
     run.stdout.close()
     told = run.stderr.read()
     assert (run.wait(timeout=60), told) == (141, "")
+
+
+def test_a_terminal_without_the_letters_of_a_label(tmp_path):
+    """An ASCII terminal gets their codes, and no traceback."""
+
+    def cyrillic(content):
+        content["recordings"][0]["label"] = "насос"
+
+    spoilt(tmp_path, cyrillic)
+    command = [sys.executable, "-m", "rippletwin", "export", str(tmp_path), "--out"]
+    environment = ENVIRONMENT | {"PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
+    run = subprocess.run(
+        [*command, str(tmp_path / "out")], capture_output=True, text=True, env=environment
+    )
+    assert run.returncode == 0 and "\\u043d" in run.stdout, run.stderr
 
 
 def test_module_is_the_command(tmp_path):

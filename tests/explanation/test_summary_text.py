@@ -5,7 +5,11 @@ from types import SimpleNamespace
 import pytest
 
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders
-from rippletwin.explanation.verdict.number_text import load_sentences, sensor_sentences
+from rippletwin.explanation.verdict.number_text import (
+    load_sentences,
+    parameters_sentence,
+    sensor_sentences,
+)
 from rippletwin.explanation.verdict.summary_text import (
     _ripple_error,
     liquid_like_air,
@@ -16,7 +20,14 @@ SPREAD = ShaftOrders(0.02, 1e-9, 0.95, "piston_spread", 0.03, interval=(0.025, 0
 
 
 def summarise(
-    verdict, shaft_orders=None, raised=(), pull=(0.1, "load"), pump=None, remainder=None, **decision
+    verdict,
+    shaft_orders=None,
+    raised=(),
+    pull=(0.1, "load"),
+    pump=None,
+    remainder=None,
+    gain=0.1,
+    **decision,
 ):
     """The sentence of a verdict without effects in the line; its misfits are 2 %."""
     twin = SimpleNamespace(parameters=(), theta=())
@@ -31,6 +42,7 @@ def summarise(
         ),
     )
     fit = {"before": {"held_out": 0.02}, "after": {"held_out": 0.02}}
+    fit["expected_gain"] = {"after": gain}
     result = {"verdict": verdict, "fit": fit, "next_recording": None, "pump": pump or {}}
     result |= {"load": None, "sensors": {}}
     result["remainder"] = remainder
@@ -70,12 +82,27 @@ def test_calibration_only_names_the_value_that_is_off(raised, is_named):
     assert ("diameter[4] is 2.9 standard deviations from the data sheet" in sentence) is is_named
 
 
+def test_a_fit_that_did_not_converge_is_told():
+    """A step that promises 5 of log posterior is told, one of 0.1 is not."""
+    assert "did not converge: one more step promises 5.0" in summarise("consistent", gain=5.0)
+    assert "converge" not in summarise("consistent")
+
+
+def test_a_parameter_is_in_units_of_a_test_bench():
+    """1e-12 m3/(Pa s) is 1e-12 times 60000 L/min and 1e5 bar: 0.006 L/min per bar; no power of ten
+    is left to read, and every minus is the keyboard's."""
+    conductance = {"value": 1e-12, "ci95": [-1e-12, 3e-12], "unit": "m3/(Pa s)"}
+    sentence = parameters_sentence("leak (p1)", {"conductance": conductance})
+    said = "Leak (p1): conductance 0.006 L/min per bar (95 % interval -0.006 to 0.018)."
+    assert sentence == said
+
+
 def test_the_pump_is_mentioned_if_it_differs_from_the_data_sheet():
     """Ports that open half a degree late are mentioned; a value within its interval is not."""
     modulus = {"value": 1.21e9, "sheet": 1.25e9, "ci95": [1.15e9, 1.27e9], "unit": "Pa"}
     timing = {"value": 0.5, "sheet": 0.0, "ci95": [0.4, 0.6], "unit": "deg"}
     pump = {"bulk_modulus": modulus, "port_timing": timing}
-    assert "of the pump: port timing 0.5 deg (data sheet 0)." in summarise("consistent", pump=pump)
+    assert "of the pump: port timing 0.50° (data sheet 0)." in summarise("consistent", pump=pump)
     timing["ci95"] = [-0.1, 1.1]
     assert "port" not in summarise("consistent", pump=pump)
 
@@ -118,11 +145,12 @@ def test_air_at_one_pressure_may_be_another_liquid(name, pressures, is_warned):
 
 
 def test_a_wrong_ripple_is_told_apart_from_a_wrong_line():
-    """A misfit of 40 % beside a model error of 1 % is the ripple's; one of 2 % is not."""
-    fit = {"after": {"in_sample": 0.4}, "model_error": {"after": 0.01}}
-    (sentence,) = _ripple_error(fit)
-    assert "misses 40% of the reading" in sentence and "error of the ripple" in sentence
-    assert _ripple_error({"after": {"in_sample": 0.02}, "model_error": {"after": 0.01}}) == []
+    """With the nominal ripple a misfit of 40 % beside a model error of 1 % is the ripple's, and
+    both misfits are told; one of 2 % is not."""
+    fit = {"model_error": {"after": 0.01}, "after": {"in_sample": 0.02}}
+    (sentence,) = _ripple_error(fit | {"nominal_ripple": {"in_sample": 0.4}})
+    assert "misses 40% of the reading" in sentence and "2.0%" in sentence
+    assert _ripple_error(fit | {"nominal_ripple": {"in_sample": 0.02}}) == []
 
 
 def test_an_unknown_load_and_uncalibrated_sensors_are_told():
@@ -138,12 +166,12 @@ def test_an_unknown_load_and_uncalibrated_sensors_are_told():
     assert load_sentences(None) == [] and sensor_sentences({}) == []
 
 
-def test_numbers_up_to_a_million_have_no_power_of_ten():
-    """A resonance is at 3000 Hz, not at 3e+03 Hz; 1.3 GPa keeps its power."""
+def test_numbers_have_no_power_of_ten():
+    """A resonance is at 3004 Hz, not at 3e+03 Hz; 1.3e9 Pa are 1.3 GPa."""
     pump = {
         "frequency": {"value": 3004.0, "ci95": [2998.0, 3010.0], "sheet": 2500.0, "unit": "Hz"},
         "bulk_modulus": {"value": 1.3e9, "ci95": [1.2e9, 1.4e9], "sheet": 1.7e9, "unit": "Pa"},
     }
     sentence = summarise("consistent", pump=pump)
-    assert "frequency 3000 Hz (data sheet 2500)" in sentence
-    assert "bulk modulus 1.3e+09 Pa (data sheet 1.7e+09)" in sentence
+    assert "frequency 3004 Hz (data sheet 2500)" in sentence
+    assert "bulk modulus 1.30 GPa (data sheet 1.70)" in sentence

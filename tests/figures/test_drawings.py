@@ -1,4 +1,4 @@
-"""Figures of explain and diagnose: words, scale, nothing cut off, the place said or denied."""
+"""Figures: words, scale, nothing cut off, a question asked, the place said or denied."""
 
 from dataclasses import replace
 
@@ -8,13 +8,45 @@ from matplotlib.text import Text
 
 from made_results import AMPLITUDES, ORDERS, made_change, made_numbers
 from rippletwin.diagnosis import diagnosed_numbers
-from rippletwin.figures import explained_numbers
+from rippletwin.figures import attention, diagnosis, explained_numbers, ripple
 from rippletwin.figures.explained_ripple import curve, plot_residuals, plot_ripple
 from rippletwin.figures.explained_search import plot_evidence, plot_immittance
 from rippletwin.figures.fault_posterior import plot_change, plot_severity
 from rippletwin.figures.line_drawing import plot_place
 
+NETWORKS, STATES = ["CNN1D (341@100)", "CNN2D (7×7@2)"], ["H", "S", "C1"]
+ANGLES, HZ = np.arange(0, 360, 7.5), np.geomspace(30, 1500, 16)
+RIPPLES = {"calibrated": 2e5 * np.sin(np.deg2rad([ANGLES] * 2))}
+SHARES = [["", "24% of it on the orange 24%", "called C1: 100%"]] * 2
+ALIKE = np.linspace(0.5, 1.5, 3 * 16 * 16).reshape(3, 16, 16)
+
+
+def attended(region):
+    """A figure of attention in images, with marks where the fault is or without."""
+    marks = np.tile(HZ < 200, (3, 1)) if region else None
+    heat = np.stack([ALIKE, ALIKE])
+    return attention.images(NETWORKS, STATES, ALIKE, heat, SHARES, HZ, 16.7, 9, marks)
+
+
 DRAWN = {
+    "calibration": lambda: ripple.overlay(ANGLES, RIPPLES, ["p1", "p2"], "1000 r/min"),
+    "states": lambda: ripple.states(ANGLES, dict(zip(STATES, ALIKE[:, 0].repeat(3, 1))), "bar"),
+    "confusion": lambda: diagnosis.confusion(dict.fromkeys(NETWORKS, np.eye(3)), STATES, STATES),
+    "accuracy": lambda: diagnosis.accuracy(
+        NETWORKS, {"CFD-P": np.array([[90.0, 3.0]] * 2)}, {"CFD-P": np.array([[80.0, 2.0]] * 2)}
+    ),
+    "images": lambda: diagnosis.sst(dict(zip(STATES, ALIKE)), HZ, 16.7, 9),
+    "attention": lambda: attention.windows(
+        NETWORKS, STATES, ALIKE[:, 0], np.stack([ALIKE[:, 0]] * 2), SHARES, "ripple / bar"
+    ),
+    "attention in images": lambda: attended(region=False),
+    "attention in images, marked": lambda: attended(region=True),
+    "ranks": lambda: attention.ranks(
+        {"CFD-P": (NETWORKS, [False, True], np.full((2, 2), 0.9), np.full((2, 2), 80.0))}
+    ),
+    "claims": lambda: attention.claims(
+        {"Images are better": (["a network", "another"], np.array([[5.0, 2, 8], [-3, -9, 1]]))}
+    ),
     "ripple": lambda: plot_ripple(made_numbers()),
     "ripple, nothing found": lambda: plot_ripple(made_numbers(found=False)),
     "residuals": lambda: plot_residuals(made_numbers()),
@@ -49,6 +81,14 @@ def test_no_text_is_cut_off(name):
         box = text.get_window_extent()
         inside = box.x0 > -1 and box.y0 > -1 and box.x1 < width + 1 and box.y1 < height + 1
         assert inside, (text.get_text(), box)
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_no_text_lies_on_another(name):
+    """Titles, legends, labels and ticks keep apart."""
+    boxes = [(t.get_text(), t.get_window_extent().shrunk(0.98, 0.9)) for t in texts(DRAWN[name]())]
+    for k, (one, box) in enumerate(boxes):
+        assert not [(one, other) for other, b in boxes[k + 1 :] if box.overlaps(b)]
 
 
 @pytest.mark.parametrize("name", DRAWN)

@@ -46,5 +46,6 @@ def test_phrases_say_the_element_where_the_name_does_not():
     assert name_parameter("wave_speed[2]") == "wave speed of segment 2"
     assert name_parameter("position[p1]") == "position of sensor p1"
     assert name_parameter("gain[p2]") == "gain of sensor p2"
+    assert name_parameter("state[cold oil]") == "wave speed during cold oil, relative"
     assert name_parameter("reflection[3]") == "Schur parameter 3 of the load"
     assert name_element("between pump and p1") == "between the pump and p1"

@@ -16,6 +16,7 @@ from rippletwin.report.content import WorkflowPart, make_page
 from rippletwin.report.page import render, write_report
 from rippletwin.report.results import read_results
 from rippletwin.report.tables import Cell, Table
+from rippletwin.report.workflow_tables import describe_dataset
 
 VOID = {"meta", "br", "img", "link", "input", "hr"}
 
@@ -241,6 +242,18 @@ def test_a_folder_that_holds_no_verdict_is_bad_input(folder, tmp_path):
     (tmp_path / "verdict.json").write_text("{")
     with pytest.raises(InputError, match="is no JSON"):
         read_results(folder, explained=tmp_path)
+
+
+def test_a_dataset_is_named_in_words():
+    """What its row of config/datasets.tsv says; a name without a row stays as it is."""
+    row = {"signal": "pressure", "line": "twin", "twin": "corrected"}
+    row |= {"randomised": "yes", "anchored": "no"}
+    rig = row | {"line": "rig", "twin": "none", "randomised": "no"}
+    datasets = {"CFD-MOC-PR": row, "experimental": rig}
+    said = "pressure of the corrected twin, range of severities (CFD-MOC-PR)"
+    assert describe_dataset("CFD-MOC-PR", datasets) == said
+    assert describe_dataset("experimental", datasets) == "recordings of all states (experimental)"
+    assert describe_dataset("mine", datasets) == "mine"
 
 
 def test_workflow_parts_are_shown(folder):

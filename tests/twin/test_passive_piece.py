@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
+from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine, Insert
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
 from rippletwin.twin.effects.base import LineState, Place
 from rippletwin.twin.effects.library import EFFECTS
@@ -15,7 +15,7 @@ DENSITY, VISCOSITY = 870.0, 3.2e-5
 PIECE = EFFECTS["passive_piece"], Place("position")
 HOSE = {
     "length": 0.3, "diameter_ratio": 1.2, "wave_speed_ratio": 0.5,
-    "compliance_ratio": 0.1, "retardation_time": 2e-4,
+    "compliance_ratio": 0.1, "retardation_time": 2e-4, "conductance": 3e-11,
 }  # fmt: skip
 CHAMBER = HOSE | {"diameter_ratio": 2.0, "wave_speed_ratio": 1.0}
 
@@ -49,12 +49,14 @@ def line_of(lengths, diameters, speeds, creep=None) -> FrequencyDomainLine:
 )
 def test_it_is_the_line_cut_and_joined(values, position, lengths, kinds):
     """Pressures at both sensors and the input impedance are those of the chain with a pipe of its
-    own in place of the stretch, whose formulas the two-port does not use, to rounding. A sensor
-    inside the piece is left out: that is the limit that the module states."""
+    own in place of the stretch and a leak at its middle, whose formulas the two-port does not
+    use, to rounding. A sensor inside the piece is left out: the module states that limit."""
     piece = kinds.index(None)
     d = [values["diameter_ratio"] * DIAMETERS[0] if k is None else DIAMETERS[k] for k in kinds]
     a = [values["wave_speed_ratio"] * SPEEDS[0] if k is None else SPEEDS[k] for k in kinds]
     joined = line_of(lengths, d, a, creep=piece)
+    middle = sum(lengths[:piece]) + 0.5 * lengths[piece]
+    joined.inserts.append(Insert(middle, "shunt", values["conductance"] + 0.0 * S))
     changed = line_of(LENGTHS, DIAMETERS, SPEEDS)
     state = LineState(
         DENSITY, VISCOSITY, np.array(DIAMETERS), np.array(SPEEDS), np.array(LENGTHS),

@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 
 from rippletwin.line.time_domain.weighting_functions import conduction_terms
+from rippletwin.twin import twin_file
+from rippletwin.twin.corrected_ripple import CorrectedRipple
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS, candidates
 from rippletwin.twin.effects.thermal_boundary_layer import thermal_factor
-from rippletwin.twin.propagation import propagate
+from rippletwin.twin.propagation import line_in_time, propagate, pump_change
 from two_domains import ORDERS, PRESSURE, SPEED_HZ, STEPS, both, corrected, misfit, rig, ripple
 
 
@@ -130,3 +132,26 @@ def test_conducting_terms_are_the_boundary_layer():
         exact = thermal_factor(s, 1.5e-5, 2.0 * radius, 1.4, 0.71)
         assert np.max(np.abs(summed - exact) / np.abs(exact - 1.0)) < 0.002
         assert min(kappa for kappa, _ in terms) > 0.0
+
+
+def test_simulations_take_the_corrected_ripple():
+    """The harmonics at the piston orders of a healthy pump are those of the nominal one times the
+    ratio, by Fourier analysis of the flow that drives the line; a faulty pump gets the same flow
+    on top, and a twin.json keeps the ratio."""
+    orders = 9 * np.arange(1, 20)
+    ratio = 1.0 - 0.01 * np.arange(1, 20) * np.exp(0.1j * np.arange(1, 20))
+    ripple_ratio = CorrectedRipple({"healthy": orders}, {"healthy": ratio}, {"healthy": 0.0})
+    twin = twin_file.from_dict(twin_file.to_dict(corrected().with_(ripple=ripple_ratio)))
+    healthy, point = ripple().flow, (SPEED_HZ, PRESSURE)
+    change, _ = pump_change(twin, healthy, *point)
+    driven = np.fft.rfft(line_in_time(twin, healthy, healthy, *point).flow)
+    plain = np.fft.rfft(line_in_time(corrected(), healthy, healthy, *point).flow)
+    np.testing.assert_allclose(driven[orders], ratio * plain[orders], rtol=1e-9)
+    np.testing.assert_allclose(driven[[0, 3, 10]], plain[[0, 3, 10]], atol=1e-9 * abs(plain[0]))
+    faulty = 0.9 * healthy
+    np.testing.assert_allclose(
+        line_in_time(twin, faulty, healthy, *point).flow
+        - line_in_time(corrected(), faulty, healthy, *point).flow,
+        change,
+        atol=1e-9 * np.max(healthy),
+    )

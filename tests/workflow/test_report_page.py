@@ -28,7 +28,7 @@ def test_the_page_has_what_only_a_workflow_knows(tmp_path):
         (benchmarks / f"{name}.tsv").write_text(f"s\tmax_rss\n{seconds}\t300.0\n")
     (benchmarks / "short.tsv").write_text("s\tmax_rss\n0.01\t-\n")
     (tmp_path / "rows.json").write_text(json.dumps(made_rows()))
-    Image.new("RGB", (4, 4)).save(tmp_path / "attention.png")
+    Image.new("RGB", (4, 4)).save(tmp_path / "attention_time_simulated.png")
     said = {"run 7": {"cnn1d_3_1": {"state": "cylinder", "share": 0.875, "unlike": 0.0625}}}
     (tmp_path / "networks.json").write_text(json.dumps(said))
     run_script(
@@ -40,6 +40,15 @@ def test_the_page_has_what_only_a_workflow_knows(tmp_path):
             "recordings": "the virtual rig's",
             "benchmarks": str(tmp_path / "benchmarks"),
             "population": [str(tmp_path / "rows.json"), "digest"],
+            "datasets": {
+                "CFD-P": {
+                    "line": "pipe",
+                    "signal": "pressure",
+                    "twin": "none",
+                    "randomised": "no",
+                    "anchored": "no",
+                }
+            },
             "configuration": {"seeds": 2, "case": "<virtualrig>"},
         },
         rig=str(case / "rig.yaml"),
@@ -48,7 +57,7 @@ def test_the_page_has_what_only_a_workflow_knows(tmp_path):
         table=str(tmp_path / "accuracy.csv"),
         answers=str(tmp_path / "networks.json"),
         paper=str(tmp_path / "paper.csv"),
-        attention=[str(tmp_path / "attention.png")],
+        attention=[str(tmp_path / "attention_time_simulated.png")],
     )
     page = (tmp_path / "report.html").read_text()
     for words in (
@@ -61,6 +70,8 @@ def test_the_page_has_what_only_a_workflow_knows(tmp_path):
         "case: &lt;virtualrig&gt;",
         "Missing physics found and named",
         "60 recordings of 10 virtual rigs",
+        "pressure of the pump alone, on a pipe (CFD-P)",
+        "S: worn slipper.",
         "blocked port: cylinder 5, unlike 5",
     ):
         assert words in page, words

@@ -122,6 +122,7 @@ rule report_page:
         recordings="the virtual rig's" if RECORDED_HERE else f"those of {CASE}",
         benchmarks=f"{RESULTS}/benchmarks",
         population=scored_population(),
+        datasets={name: DATASETS[name]._asdict() for name in CHOSEN},
         configuration=config,
     script:
         "../scripts/report_page.py"

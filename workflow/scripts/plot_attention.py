@@ -26,7 +26,7 @@ called = [
 
 def aligned(share, region):
     """Title of a simulated fault's panel."""
-    return "no attention" if np.isnan(share) else f"{share:.0%} on the fault's {region:.0%}"
+    return "no attention" if np.isnan(share) else f"{share:.0%} of it on the orange {region:.0%}"
 
 
 shares = [
@@ -44,8 +44,8 @@ def draw(states, variable, titles, region=None):
         axis = (frequency_hz, first.speed_hz, pistons)
         return attention.images(networks, states, signal, heat, titles, *axis, region)
     pressure = first.simulated.attrs["units"] == "Pa"
-    label = "pressure ripple / MPa" if pressure else "flow ripple / L/min"
-    scale = 1e6 if pressure else 1e-3 / 60
+    label = "pressure ripple / bar" if pressure else "flow ripple / L/min"
+    scale = 1e5 if pressure else 1e-3 / 60
     return attention.windows(networks, states, signal / scale, heat, titles, label, region)
 
 

@@ -32,7 +32,7 @@ signals = seeds.signal.isel(channel=0).values
 signals = signals - signals.mean(axis=-1, keepdims=True)
 
 pressure = seeds.signal.attrs["units"] == "Pa"
-scale, label = (1e6, "pressure ripple / MPa") if pressure else (1e-3 / 60, "flow ripple / L/min")
+scale, label = (1e5, "pressure ripple / bar") if pressure else (1e-3 / 60, "flow ripple / L/min")
 angle = np.arange(signals.shape[-1]) * 360 / signals.shape[-1]
 figure = ripple.states(
     angle, dict(zip(states, signals)), f"{snakemake.wildcards.dataset}: {label}", scale

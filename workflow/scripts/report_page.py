@@ -14,7 +14,12 @@ from rippletwin.learning.architectures import ARCHITECTURES
 from rippletwin.report.content import WorkflowPart
 from rippletwin.report.page import write_report
 from rippletwin.report.results import read_results
-from rippletwin.report.workflow_tables import accuracy_table, answer_table, timing_table
+from rippletwin.report.workflow_tables import (
+    accuracy_table,
+    answer_table,
+    describe_attention,
+    timing_table,
+)
 
 report_progress = open_log(snakemake)
 params, paths = snakemake.params, snakemake.input
@@ -26,12 +31,12 @@ pictures = []
 for path in map(Path, paths.attention):
     windows = path.stem.rpartition("_")[2]
     picture = "data:image/png;base64," + b64encode(path.read_bytes()).decode()
-    pictures.append((f"Where the networks look (Grad-CAM): {windows} signals", picture))
+    pictures.append((describe_attention(windows), picture))
 theirs = {(p.architecture, p.dataset): (p.mean, p.std) for p in paper}
 answers = json.loads(Path(paths.answers).read_text()) if paths.answers else {}
 tables = [
     *([answer_table(answers)] if answers else []),
-    *([accuracy_table(rows, theirs)] if rows else []),
+    *([accuracy_table(rows, theirs, params.datasets)] if rows else []),
     timing_table(params.benchmarks),
 ]
 population = None

@@ -17,7 +17,7 @@ from rippletwin.calibration.frequency_continuation import (
     continuation_limits,
     fit_by_continuation,
 )
-from rippletwin.calibration.laplace import laplace
+from rippletwin.calibration.laplace import UNCONVERGED_GAIN, Mode, laplace
 from rippletwin.calibration.likelihood import EVENNESS, Likelihood
 from rippletwin.calibration.misfit import Misfit, misfit
 from rippletwin.calibration.shaft_angles import fit_shaft_angles
@@ -131,19 +131,23 @@ def conclude(model: Likelihood, theta: np.ndarray, settings: Settings = DEFAULTS
         objective=mode.objective,
         before=misfit(model, nominal),
         after=after,
-        warnings=_warnings(fitted, mode.covariance, after),
+        warnings=_warnings(fitted, mode, after),
         observations=tuple(model.observations),
     )
 
 
-def _warnings(twin: Twin, covariance: np.ndarray, after: Misfit) -> tuple[str, ...]:
+def _warnings(twin: Twin, mode: Mode, after: Misfit) -> tuple[str, ...]:
     out = []
     if not after.relative < BAD_MISFIT:
         out.append(
             f"bad fit: {100 * after.relative:.0f} % of what was measured is left over after "
             "calibration; the model lacks physics, or the data sheet is wrong"
         )
-    sd = np.sqrt(np.diag(covariance))
+    if mode.expected_gain > UNCONVERGED_GAIN:
+        out.append(
+            f"not converged: one more step promises {mode.expected_gain:.1f} of log posterior"
+        )
+    sd = np.sqrt(np.diag(mode.covariance))
     for p, u, s in zip(twin.parameters, twin.theta, sd):
         value, value_sd = float(p.value(u)), p.value_sd(u, s)
         if p.flat:

@@ -33,6 +33,7 @@ class Fit:
     plain         whether the error model was that of calibration (`likelihood`), without smooth
                   source errors, and not that of explaining (`posterior`)
     has_nonlinear_compliance   whether the line has a compliance that depends on the pressure
+    expected_gain   what a Newton step promises to add to the log posterior; 0 at a stationary point
     interval_ends   lower and upper end of the 95 % interval of a parameter, by its index, in
                     theta's coordinates; only where a profile was traced (`profile_intervals`)
     """
@@ -48,6 +49,7 @@ class Fit:
     source_free: bool = False
     plain: bool = False
     has_nonlinear_compliance: bool = False
+    expected_gain: float = 0.0
     interval_ends: Mapping[int, tuple[float, float]] = field(default_factory=dict, repr=False)
 
     @property
@@ -95,6 +97,7 @@ def laplace_fit(model: Posterior | Likelihood, hypothesis: Hypothesis, theta: np
         model.source_free,
         isinstance(model, Likelihood),
         model.forward.has_nonlinear_compliance,
+        mode.expected_gain,
     )
 
 

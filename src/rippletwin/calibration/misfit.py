@@ -21,7 +21,8 @@ import numpy as np
 from rippletwin.calibration.error_model import ErrorModel
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.posterior import Posterior
-from rippletwin.calibration.shaft_angles import fit_shaft_angles
+from rippletwin.calibration.shaft_angles import best_turn, fit_shaft_angles
+from rippletwin.twin.corrected_ripple import CorrectedRipple
 
 
 @dataclass(frozen=True)
@@ -81,10 +82,13 @@ class Score:
     theil: float
 
 
-def score_fit(fit: Fit, observations: Sequence, turn: bool = False) -> Score:
+def score_fit(
+    fit: Fit, observations: Sequence, turn: bool = False, ripple: CorrectedRipple | None = None
+) -> Score:
     """Misfits of a fit's predictions; free sources get their most likely amplitude.
 
-    turn   whether the shaft angles are fitted first; every recording has its own
+    turn     whether the shaft angles are fitted first; every recording has its own
+    ripple   corrects the nominal flow ripple of the pump; None to take it as it is
     """
     posterior = Posterior(fit.twin, observations, None, fit.source_free)
     posterior.model_error, posterior.source_sd = fit.model_error, fit.source_sd
@@ -92,4 +96,26 @@ def score_fit(fit: Fit, observations: Sequence, turn: bool = False) -> Score:
     if turn:
         theta = fit_shaft_angles(posterior, theta)
     h = posterior.best_source(posterior.predict(theta))
+    if ripple is not None:
+        h = predict_with_ripple(posterior, h, ripple, turn)
     return Score(relative_misfit(posterior.values, h), theil(posterior.values, h))
+
+
+def predict_with_ripple(
+    posterior: Posterior, prediction: np.ndarray, ripple: CorrectedRipple, turn: bool = False
+) -> np.ndarray:
+    """A prediction (S, F) with the corrected flow ripple in place of the nominal one.
+
+    turn   whether the shaft angle of each recording is fitted again
+    """
+    corrected = np.array(prediction)
+    for o, part in zip(posterior.observations, posterior.forward.slices):
+        if o.source != "nominal":
+            continue
+        orders = np.asarray(o.orders, int)
+        h = corrected[:, part] * ripple.at(o.label, orders)
+        if turn:
+            weighted = np.sum(np.conj(h) * posterior.values[:, part], axis=0)
+            h = h * np.exp(1j * orders * best_turn(weighted, orders)[0])
+        corrected[:, part] = h
+    return corrected

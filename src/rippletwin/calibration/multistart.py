@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rippletwin.calibration.error_model import ErrorModel
-from rippletwin.calibration.laplace import hessian
+from rippletwin.calibration.laplace import gradient_and_hessian
 from rippletwin.calibration.shaft_angles import align_shaft_angles
 
 SCALINGS = (0.0, -0.7, 0.7, -1.4, 1.4, -2.1, 2.1)
@@ -78,7 +78,9 @@ def draw_around_modes(
         prediction = model.predict(theta)
         model.estimate_errors(prediction, theta)
         model.model_error = MAX_MODEL_ERROR_BELOW_LIMIT  # the line is not yet the right one
-        root = np.linalg.inv(np.linalg.cholesky(hessian(model, theta, prediction))).T
+        root = np.linalg.inv(
+            np.linalg.cholesky(gradient_and_hessian(model, theta, prediction)[1])
+        ).T
         spread = root @ rng.normal(size=(len(theta), draws))
         states += [align_shaft_angles(above, theta + step) for step in spread.T]
     return sorted(states, key=lambda g: g[0])[:count]

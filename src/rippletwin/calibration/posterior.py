@@ -304,6 +304,12 @@ class Posterior:
         """The prediction with every free source at its most likely amplitude, (S, F)."""
         return np.where(self._free, self._amplitude(prediction), 1.0) * prediction
 
+    def most_likely_source(self, prediction: np.ndarray) -> np.ndarray:
+        """Most likely source (F,) relative to that of the prediction, at the present errors."""
+        whitening = self._whitening(prediction)
+        whitened = whitening.apply(self._rotated - self._rotate(prediction))
+        return self._source(prediction, whitening, whitened)
+
     def _source(self, prediction, whitening: Whitening, whitened: np.ndarray) -> np.ndarray:
         """Most likely source (F,) relative to that of the prediction, given whitened residuals."""
         pull = np.sum(np.conj(self._rotate(prediction)) * whitening.adjoint(whitened), axis=0)

@@ -35,13 +35,7 @@ def align_shaft_angles(
         if index is not None and not model.source_free:
             orders = np.asarray(o.orders, int)
             order = np.gcd.reduce(orders)
-            lines = np.zeros(ANGLES_PER_TURN * orders[-1] // order, complex)
-            lines[orders // order] = weighted
-            matches = np.fft.fft(lines).real
-            turn = 2 * np.pi * np.argmax(matches) / (len(lines) * order)
-            match = np.max(matches)
-            if between:
-                turn, match = _maximise_match(weighted, orders, turn)
+            turn, match = best_turn(weighted, orders, between)
             parameter = twin.parameters[index]
             angle = parameter.value(theta[index]) + turn
             angle = (angle + np.pi / order) % (2 * np.pi / order) - np.pi / order
@@ -49,6 +43,26 @@ def align_shaft_angles(
         misfit += float(np.sum(square / power) - 2 * match)
         count += measured.size
     return misfit / count, theta
+
+
+def best_turn(
+    weighted: np.ndarray, orders: np.ndarray, between: bool = True
+) -> tuple[float, float]:
+    """Angle where Re sum_k weighted_k exp(-j k angle) is greatest, and the maximum.
+
+    weighted   (F,) conjugate prediction times measurement, at shaft orders (F,), ascending
+    between    whether the angle is moved between the points of a grid
+
+    The prediction agrees best with the measurement when order k is multiplied by exp(j k angle).
+    """
+    order = np.gcd.reduce(orders)
+    lines = np.zeros(ANGLES_PER_TURN * orders[-1] // order, complex)
+    lines[orders // order] = weighted
+    matches = np.fft.fft(lines).real
+    turn = 2 * np.pi * np.argmax(matches) / (len(lines) * order)
+    if between:
+        return _maximise_match(weighted, orders, turn)
+    return turn, float(np.max(matches))
 
 
 def _maximise_match(weighted: np.ndarray, orders: np.ndarray, turn: float) -> tuple[float, float]:

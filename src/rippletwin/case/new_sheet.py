@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -11,16 +12,17 @@ import yaml
 
 from rippletwin.errors import InputError
 
-GENERIC_PUMP = """\
-  # Without its geometry, faults are simulated with a generic pump of 42 cm3 per revolution:
-  # piston_diameter: 0.017        # m
-  # pitch_radius: 0.0335          # m, of the circle of the pistons' axes
-  # swash_angle_deg: 17           # at the working point
-  # dead_volume: 3.5e-6           # m3, of a chamber at the end of delivery
-  # port_area: 1.2e-4             # m2, fully open
-  # port_opening_deg: 30          # shaft angle over which a port opens; it shapes the ripple most
-  # port_overlap_deg: 5           # about each dead centre, where a chamber is shut off
-"""
+GENERIC_PUMP = {
+    "piston_diameter": (0.017, "m", "diameter of a piston"),
+    "pitch_radius": (0.0335, "m", "radius of the circle of the pistons' axes"),
+    "swash_angle_deg": (17, "", "angle of the swash plate at the working point"),
+    "dead_volume": ("3.5e-6", "m3", "volume of a chamber at the end of delivery"),
+    "port_area": ("1.2e-4", "m2", "area of a port that is fully open"),
+    "port_opening_deg": (30, "", "shaft angle over which a port opens; it shapes the ripple most"),
+    "port_overlap_deg": (5, "", "shaft angle about each dead centre where a chamber is shut off"),
+}
+"""Numbers of a pump of 42 cm3 per revolution: key -> value as written, unit, what it is."""
+COMMENTS = {key: words for key, (_, _, words) in GENERIC_PUMP.items()}
 UNCERTAINTY = """\
 # How well the numbers above are known: relative standard deviations, sensor_position in metres.
 # Calibration moves each number by some of these. Too small, and a wrong number looks like missing
@@ -52,16 +54,17 @@ class NewSheet:
     """What `rippletwin new` knows of a rig.
 
     density, viscosity  kg/m3 and m2/s, with the temperature in words
-    sensors             name -> m from the pump outlet
+    pump                the keys of rig.yaml's `pump`; None where a number is not known
+    sensors             names, and m from the pump outlet
     recordings          entries as rig.yaml has them
     """
 
     density: float
     viscosity: float
     temperature: str
-    pistons: int
+    pump: Mapping[str, float | None]
     segments: Sequence[NewSegment]
-    sensors: Mapping[str, float]
+    sensors: Sequence[tuple[str, float]]
     load: str
     coefficient: float | None = None
     recordings: Sequence[Mapping] = field(default_factory=tuple)
@@ -74,11 +77,11 @@ class NewSheet:
                 "# above the atmosphere. Check it with: rippletwin check FOLDER\n\n",
                 f"fluid:\n  density: {self.density:.4g}  # kg/m3 {self.temperature}\n"
                 f"  kinematic_viscosity: {_decimal(self.viscosity)}  # m2/s {self.temperature}\n\n",
-                f"pump:\n  pistons: {self.pistons}\n{GENERIC_PUMP}\n",
+                f"{self._pump_text()}\n",
                 "line:\n  segments:  # pump first, load last\n",
                 *(_segment_text(segment) for segment in self.segments),
                 "\nsensors:  # m from the pump outlet\n",
-                *(f"  - {_flow(name=n, position=_number(x))}\n" for n, x in self.sensors.items()),
+                *(f"  - {_flow(name=n, position=_number(x))}\n" for n, x in self.sensors),
                 f"\n{self._load_text()}\n",
                 UNCERTAINTY.format(wave_speed=self._wave_speed_uncertainty()),
                 "\n# state: healthy recordings teach the twin; unknown ones are diagnosed.\n",
@@ -86,6 +89,31 @@ class NewSheet:
                 *(f"  - {_flow(**entry)}\n" for entry in self.recordings),
             ]
         )
+
+    @property
+    def displacement(self) -> float | None:
+        """What the pump displaces in one revolution, m3; None where its geometry is not known."""
+        keys = ("pistons", "piston_diameter", "pitch_radius", "swash_angle_deg")
+        known = [self.pump.get(key) for key in keys]
+        if None in known:
+            return None
+        pistons, bore, radius, angle = known
+        return pistons * math.pi / 4 * bore**2 * 2 * radius * math.tan(math.radians(angle))
+
+    def _pump_text(self) -> str:
+        """The pump's numbers; those that are not known stand as comments."""
+        lines = ["pump:", f"  pistons: {self.pump['pistons']}"]
+        if any(self.pump.get(key) is None for key in GENERIC_PUMP):
+            lines += [
+                "  # A number behind a # is not known; faults are then simulated with that of a",
+                "  # generic pump of 42 cm3 per revolution. Correct it and take the # away.",
+            ]
+        for key, (example, unit, words) in GENERIC_PUMP.items():
+            value = self.pump.get(key)
+            comment = f"{unit}, {words}" if unit else words
+            sign, shown = ("# ", example) if value is None else ("", _plain(value))
+            lines.append(f"  {sign}{key}: {shown}  # {comment}")
+        return "\n".join(lines) + "\n"
 
     def _load_text(self) -> str:
         text = f"load:\n  kind: {self.load}\n"
@@ -146,6 +174,11 @@ def _number(value: float, digits: int = 6) -> float | int:
     """A number with few digits; a whole one without a decimal point."""
     rounded = float(f"{value:.{digits}g}")
     return int(rounded) if rounded.is_integer() else rounded
+
+
+def _plain(value: float) -> str:
+    """A number as YAML reads it, with a power of ten where it is small."""
+    return str(_number(value)) if value == 0 or abs(value) >= 1e-3 else _decimal(value)
 
 
 def _decimal(value: float) -> str:

@@ -68,7 +68,7 @@ def command(
             "command line",
             "--bootstrap",
             f"{bootstrap} draws tell no threshold",
-            f"give at least {MIN_DRAWS}, or leave it out",
+            f"Give at least {MIN_DRAWS}, or leave it out",
         )
     read = load_case(case, states={"healthy"}, band_hz=(min_frequency, max_frequency))
     add_effects(effects, read.rig)

@@ -69,7 +69,7 @@ def command(
     known = {recording.label: recording for recording in read.recordings}
     for label in set(labels) - set(known):
         raise InputError(
-            "command line", "--recording", f"no recording {label}", f"there are {', '.join(known)}"
+            "command line", "--recording", f"no recording {label}", f"There are {', '.join(known)}"
         )
     warn(read.warnings)
     written = []

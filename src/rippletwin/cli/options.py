@@ -29,8 +29,8 @@ class CheckedValue(click.ParamType):
             raise InputError("command line", param.opts[-1], problem, remedy) from None
 
 
-def number(text: str, what: str, unit: str) -> float:
-    """A positive, finite number.
+def number(text: str, what: str, unit: str, floor: float | None = None) -> float:
+    """A finite number that is positive or, where `floor` is given, not below it.
 
     Raises
     ------
@@ -40,22 +40,28 @@ def number(text: str, what: str, unit: str) -> float:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not (math.isfinite(value) and value > 0):
-        raise ValueError(f"{text} is no {what}. give a positive number of {unit}")
+    if math.isfinite(value) and (value > 0 if floor is None else value >= floor):
+        return value
+    which = "a positive number" if floor is None else f"a number from {floor:g} up"
+    raise ValueError(f"{text} is no {what}. Give {which} of {unit}")
+
+
+def whole_number(text: str, what: str, low: int, high: int) -> int:
+    """A whole number from `low` to `high`; ValueError says what it is not."""
+    try:
+        value = int(text)
+    except ValueError:
+        value = low - 1
+    if not low <= value <= high:
+        raise ValueError(f"{text} is no {what}. Give a whole number from {low} to {high}")
     return value
 
 
 def _processes(text: str) -> int:
     try:
-        value = int(text)
-    except ValueError:
-        value = 0
-    if not 1 <= value <= MAX_PROCESSES:
-        raise ValueError(
-            f"{text} processes cannot be started. give a number from 1 to {MAX_PROCESSES}; "
-            "as many as there are processors is best"
-        )
-    return value
+        return whole_number(text, "number of processes", 1, MAX_PROCESSES)
+    except ValueError as error:
+        raise ValueError(f"{error}; as many as there are processors is best") from None
 
 
 def _out_folder(text: str) -> str:
@@ -75,14 +81,14 @@ def _out_folder(text: str) -> str:
     except (OSError, ValueError) as error:
         problem = f"cannot be opened ({getattr(error, 'strerror', None) or error})"
     if problem is not None:
-        raise ValueError(f"{problem}. name a folder that you may write to")
+        raise ValueError(f"{problem}. Name a folder that you may write to")
     return text
 
 
 def _out_file(text: str) -> str:
     """Raise ValueError where a file of this name could not be written."""
     if Path(text).is_dir():
-        raise ValueError(f"{text} is a folder, not a file. name a file, such as report.html")
+        raise ValueError(f"{text} is a folder, not a file. Name a file, such as report.html")
     _out_folder(str(Path(text).parent) if text.strip() else text)
     return text
 

@@ -6,6 +6,7 @@ It imports what it needs when it runs, so that the command line answers at once.
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import sys
@@ -69,6 +70,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     if instruction := os.environ.get(completion.VARIABLE):
         return shell_complete(program, {}, completion.PROGRAM, completion.VARIABLE, instruction)
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a label in letters that the terminal has not
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         return _run(sys.argv[1:] if argv is None else list(argv))
     except InputError as error:
@@ -97,7 +100,8 @@ def _run(argv: list[str]) -> int:
     except click.UsageError as error:
         path = completion.PROGRAM if error.ctx is None else error.ctx.command_path
         problem = error.format_message().rstrip(".")
-        print(f"rippletwin: command line: {problem}. See {path} --help", file=sys.stderr)
+        end = "" if problem.endswith("?") else "."
+        print(f"rippletwin: command line: {problem}{end} See {path} --help", file=sys.stderr)
         return error.exit_code
     except click.Abort:  # Ctrl-C or the end of input at a question
         return INTERRUPTED

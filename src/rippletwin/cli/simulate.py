@@ -23,7 +23,7 @@ def read_area(text: str) -> float:
     ------
     ValueError : says what is wrong, and how to write it.
     """
-    remedy = "give a positive area with its unit, such as 0.2mm2 or 2e-7m2"
+    remedy = "Give a positive area with its unit, such as 0.2mm2 or 2e-7m2"
     for unit, factor in SQUARE_METRES.items():
         if text.strip().endswith(unit):
             try:
@@ -76,7 +76,7 @@ def command(
     """
     if out is None and not as_json:
         raise InputError(
-            "command line", "--out", "no file is named", "name one, or print JSON with --json"
+            "command line", "--out", "no file is named", "Name one, or print JSON with --json"
         )
     healthy = fault == "healthy"
     if healthy == bool(areas):
@@ -84,7 +84,7 @@ def command(
             "command line",
             "--severity",
             "a healthy pump has no leak" if healthy else f"the leak area of {fault} is missing",
-            "leave it out" if healthy else "give one, such as --severity 0.2mm2",
+            "Leave it out" if healthy else "Give one, such as --severity 0.2mm2",
         )
     from rippletwin.diagnosis.faults.library import find_fault
     from rippletwin.diagnosis.simulated_fault import simulate_fault

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rippletwin.case.quantities import plain, unit_of, write_quantity
 from rippletwin.diagnosis.diagnosis import Diagnosis
 from rippletwin.diagnosis.doubts import doubts
 
@@ -45,8 +46,8 @@ def _unlike(d: Diagnosis) -> str:
 
 def _fault(d: Diagnosis, fault) -> str:
     area = d.severities[fault.name]
-    text = f"{fault.words} with a leak of {area.value:.2g} m2"
-    text += f" ({area.low:.2g} to {area.high:.2g})"
+    size = write_quantity(area.value, unit_of("m2"), (area.low, area.high))
+    text = plain(f"{fault.words} with a leak of {size}")
     if not fault.one_piston:
         return text
     piston = d.pistons.get(fault.name)

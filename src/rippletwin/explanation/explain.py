@@ -44,12 +44,11 @@ from rippletwin.explanation.checks.cross_validation import cross_validate
 from rippletwin.explanation.checks.data_contradictions import find_contradictions
 from rippletwin.explanation.checks.prior_sensitivity import (
     PriorSensitivity,
-    WithoutEffect,
     compare_without_each_effect,
 )
 from rippletwin.explanation.checks.profile_intervals import add_profile_intervals
 from rippletwin.explanation.checks.sensor_wiring import find_swapped_sensors
-from rippletwin.explanation.checks.support import Support, judge_beside_network, judge_effects
+from rippletwin.explanation.checks.support import Judged, judge_beside_network, judge_effects
 from rippletwin.explanation.fit_jobs import FitJob, PlainCalibration, open_workers
 from rippletwin.explanation.localise.free_corrections import locate_mismatch
 from rippletwin.explanation.localise.phase_modulation import (
@@ -131,21 +130,20 @@ def explain_observations(
         state, search = _search_again(state, search, observations, processes, progress)
         state, search = _search_with_coupled_pump(state, search, processes, progress)
     base, data = state.base, state.observations
-    early = _select_fitted(early, rig, state.modulation)
-    late = _select_fitted(late, rig, state.modulation)
-    held_out = late if len(data) == 1 and late else None
-    supports: tuple[Support, ...] = ()
-    without: tuple[WithoutEffect, ...] = ()
+    early, late = _select_fitted(early, rig, data), _select_fitted(late, rig, data)
+    halves = (early[0], late[0]) if len(data) == 1 and late else None
+    judged = Judged(search.best, (), ())
     with open_workers(base, data, processes) as workers:
         if not contradiction:
             # Steps 7 to 10: the best explanation and its competitors
-            best, supports, without = judge_effects(workers, search.base, search.best, held_out)
-            best = add_profile_intervals(workers, best)
-            networks = fit_passive_networks(workers, best)
-            search = replace(search, best=best, passive_networks=networks)
+            judged = judge_effects(workers, search.base, search.best, halves)
+            judged = replace(judged, best=add_profile_intervals(workers, judged.best))
+            networks = fit_passive_networks(workers, judged.best)
+            search = replace(search, best=judged.best, passive_networks=networks)
             network = accepted_network(search)
-            if network is not None:
-                supports = judge_beside_network(workers, network, supports)
+            if network is not None and set(judged.best.hypothesis) <= set(network.hypothesis):
+                network, judged = judge_beside_network(workers, search.base, network, judged)
+                search = replace(search, best=judged.best, passive_networks=[network, *networks])
             contradiction = find_swapped_sensors(base, data, search)
         # Steps 11 to 14: checks
         point_fits = fit_each_observation(workers, search.base)
@@ -155,15 +153,15 @@ def explain_observations(
         calibrated = None
         if explanation.hypothesis:
             calibrated = workers.fit([FitJob((), PlainCalibration())])[0]
-        validation = cross_validate(workers, search.base, explanation, held_out, calibrated)
+        validation = cross_validate(workers, search.base, explanation, halves, calibrated)
         null_distribution = None
         if draws and search.best.hypothesis:
             null_distribution = bootstrap_null(search.base, data, draws, processes, progress)
         # Steps 15 and 16: decision
-        decision = decide(search, alarms, supports, contradiction, null_distribution)
+        decision = decide(search, alarms, judged.supports, contradiction, null_distribution)
         sensitivity: tuple[PriorSensitivity, ...] = ()
         if decision.supports:
-            sensitivity = compare_without_each_effect(workers, search.best, without)
+            sensitivity = compare_without_each_effect(workers, search.best, judged.without)
     # Steps 17 and 18: where the mismatch is
     location = locate_mismatch(search.base, data)
     remainder = None if contradiction else find_remainder(decision.accepted, data)
@@ -289,11 +287,12 @@ def _search_with_coupled_pump(
 
 
 def _select_fitted(
-    observations: Sequence[Observation], rig: Rig, modulation: ShaftOrders | None
+    halves: Sequence[Observation], rig: Rig, data: Sequence[Observation]
 ) -> list[Observation]:
-    """The halves of recordings as they are fitted."""
-    modulated = with_phase_modulation(observations, modulation)
-    return select_fitted_frequencies(modulated, rig, HIGHEST_HZ)
+    """The halves of recordings as the whole ones, `data`, are fitted."""
+    ripples = {o.label: o.flow_ripple for o in data}
+    fitted = [replace(half, flow_ripple=ripples[half.label]) for half in halves]
+    return select_fitted_frequencies(fitted, rig, HIGHEST_HZ)
 
 
 def _analyse_shaft_orders(fit: Fit, observations: Sequence[Observation]) -> ShaftOrders | None:

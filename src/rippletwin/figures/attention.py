@@ -1,8 +1,8 @@
 """Grad-CAM behind ripples and images, and alignment against accuracy.
 
 Heat is attention over its mean, 1 where it is spread evenly, so that networks can be compared. A
-figure has a column for each network and a row for each state; a bar at the edge marks the region of
-the fault.
+figure has a column for each network and a row for each state; an orange bar at the edge marks the
+region of the fault.
 """
 
 from __future__ import annotations
@@ -50,6 +50,7 @@ def windows(
             ax.broken_barh(stretches, (-reach, 0.13 * reach), **_BAR)
         ax.set_title(titles[network][row], fontsize=7)
         ax.set(xlim=(0, 360), ylim=(-reach, reach), xticks=(0, 120, 240, 360))
+    fig.suptitle(_question("At which shaft angles", region))
     fig.supxlabel("crank angle / degrees", fontsize=9)
     fig.supylabel(label, fontsize=9)
     _key(fig, axes, mesh)
@@ -93,6 +94,7 @@ def images(
         order_ticks(ax, frequency_hz, shaft_hz, pistons)
         ax.tick_params(labelsize=6)
         ax.set(xlim=(0, 2), ylim=(bottom, top), xticks=(0, 1, 2))
+    fig.suptitle(_question("At which frequencies and times", region))
     fig.supxlabel("revolutions", fontsize=9)
     fig.supylabel(ORDERS, fontsize=9)
     _key(fig, axes, mesh)
@@ -120,13 +122,13 @@ def ranks(groups: Mapping[str, tuple[Sequence[str], np.ndarray, np.ndarray, np.n
                 color=colours[name], label=name, mfc="white" if square else None,
             )  # fmt: skip
         ax.axvline(1, color=style.NEUTRAL, lw=0.8, ls=":")
-        ax.set(title=dataset, ylim=(-3, 103))
-    fig.supxlabel("alignment of attention with the simulated fault (1: chance)", fontsize=9)
+        ax.set(title=dataset, ylim=(-3, 103), xlabel="alignment of attention (1: chance)")
+    fig.suptitle("Are networks that attend to the simulated fault right more often?")
     fig.supylabel("accuracy on recordings / %", fontsize=9)
     handles: dict[str, object] = {}
     for ax in axes.flat:
         handles |= {label: handle for handle, label in zip(*ax.get_legend_handles_labels())}
-    fig.legend(handles.values(), handles, loc="outside upper center", ncols=4, fontsize=7)
+    fig.legend(handles.values(), handles, loc="outside lower center", ncols=4, fontsize=7)
     return fig
 
 
@@ -151,10 +153,16 @@ def claims(groups: Mapping[str, tuple[Sequence[str], np.ndarray]]) -> Figure:
         ax.set_title(claim, loc="left")
         ax.set_yticks(rows, labels, fontsize=6)
         ax.set_ylim(max(1, len(rows)) - 0.5, -0.5)
+    fig.suptitle("Do these networks support the paper's claims?")
     axes[-1].set_xlabel("difference of accuracy / % of the windows, 95 % interval over seeds")
-    handles, names = axes[0].get_legend_handles_labels()
-    fig.legend(handles, names, loc="outside upper right", ncols=3)
+    style.legend_below(fig, axes[0])
     return fig
+
+
+def _question(where: str, region: np.ndarray | None) -> str:
+    """The title of a figure, which says what its orange bars are."""
+    title = f"{where} do the networks attend?"
+    return title if region is None else f"{title}\nOrange: where the fault changes the signal"
 
 
 def _panels(networks: Sequence[str], states: Sequence[str], height: float):

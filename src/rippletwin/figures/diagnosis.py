@@ -34,6 +34,7 @@ def confusion(
         ax.set_yticks(range(len(truth)), truth)
         ax.spines[:].set_visible(False)
         ax.tick_params(length=0)
+    fig.suptitle("What do the networks call the recordings of each state?")
     fig.supxlabel("predicted (% of the recording's windows)", fontsize=9)
     fig.supylabel("recorded", fontsize=9)
     return fig
@@ -59,12 +60,11 @@ def accuracy(
                 mean, rows, xerr=spread, fmt="D", ms=4, color=style.ALARM, label="paper", zorder=3
             )
         ax.set_title(dataset, fontsize=8)
-        ax.set_xlim(0, 105)
+        ax.set(xlim=(0, 105), xlabel="accuracy / %")
     axes[0, 0].set_yticks(rows, architectures)
     axes[0, 0].invert_yaxis()
-    fig.supxlabel("accuracy on recordings / %", fontsize=9)
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside upper right", ncols=2)
+    fig.suptitle("How often are the networks right on recordings?")
+    style.legend_below(fig, axes[0, 0])
     return fig
 
 
@@ -99,6 +99,7 @@ def sst(
         )  # fmt: skip
         ax.set_title(name, fontsize=7)
         order_ticks(ax, frequency_hz, shaft_hz, pistons)
+    fig.suptitle("Which frequencies does each signal have, and when?")
     fig.supxlabel("revolutions", fontsize=9)
     fig.supylabel(ORDERS, fontsize=9)
     fig.colorbar(mesh, ax=axes, label=label, shrink=0.8, extend="max" if top else "neither")

@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
+from rippletwin.case.quantities import write_share
 from rippletwin.figures import style
 from rippletwin.figures.explained_numbers import ExplainedNumbers, Point
-from rippletwin.figures.quantities import write_share
 
 MAX_COLUMNS = 4  # operating points side by side
 SAMPLES_PER_PITCH = 360

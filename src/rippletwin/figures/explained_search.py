@@ -7,9 +7,9 @@ import textwrap
 import numpy as np
 from matplotlib.figure import Figure
 
+from rippletwin.case.quantities import unit_of, write_number
 from rippletwin.figures import style
 from rippletwin.figures.explained_numbers import ExplainedNumbers
-from rippletwin.figures.quantities import unit_of, write_number
 
 MAX_COLUMNS = 3  # effects side by side
 LETTERS = 84  # of all titles side by side

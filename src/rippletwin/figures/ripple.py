@@ -28,10 +28,10 @@ def overlay(
     fig, axes = style.figure(len(sensors), 1, height=1.9, sharex=True)
     for k, (ax, sensor) in enumerate(zip(axes[:, 0], sensors)):
         for name, values in sorted(curves.items(), key=lambda item: list(_LOOK).index(item[0])):
-            ax.plot(angle_deg, values[k] / 1e6, label=name, **_LOOK[name])
-        ax.set_ylabel(f"{sensor}: ripple / MPa")
-    _legend(fig, axes)
-    axes[0, 0].set_title(title, loc="left")
+            ax.plot(angle_deg, values[k] / 1e5, label=name, **_LOOK[name])
+        ax.set_ylabel(f"{sensor}: ripple / bar")
+    style.legend_below(fig, axes[0, 0])
+    fig.suptitle(f"Does calibration bring the twin to the recording? {title}".rstrip())
     axes[-1, 0].set_xlabel("crank angle / degrees")
     axes[-1, 0].set_xlim(angle_deg[0], angle_deg[-1])
     axes[-1, 0].set_xticks(np.arange(0, 361, 40))
@@ -46,12 +46,8 @@ def states(
     for ax, (name, values) in zip(axes[:, 0], curves.items()):
         ax.plot(angle_deg, values / scale, color=style.CALIBRATED)
         ax.set_title(name, loc="left")
+    fig.suptitle("How does one revolution of each simulated state look?")
     fig.supylabel(ylabel, fontsize=9)
     axes[-1, 0].set_xlabel("crank angle / degrees")
     axes[-1, 0].set_xticks(np.arange(0, 361, 40))
     return fig
-
-
-def _legend(fig: Figure, axes: np.ndarray) -> None:
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside upper right", ncols=len(labels))

@@ -82,6 +82,8 @@ def name_parameter(name: str) -> str:
         return words
     if stem in ("position", "gain", "phase"):
         return f"{stem} of sensor {index}"
+    if stem == "state":
+        return f"wave speed during {index}, relative"
     if stem == "reflection":
         return f"Schur parameter {index} of the load"
     return f"shaft angle of {index}" if stem == "angle" else f"{words} of segment {index}"

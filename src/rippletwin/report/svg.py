@@ -14,7 +14,7 @@ import numpy as np
 from markupsafe import Markup
 
 WIDTH, HEIGHT = 400, 236
-LEFT, RIGHT, TOP, BOTTOM = 54, 18, 8, 42
+LEFT, RIGHT, TOP, BOTTOM = 68, 18, 8, 42
 TICKS = 5
 FEW_DECADES = 2.2  # of a logarithmic x: below it 2 and 5 have ticks too
 DIGITS = 4

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rippletwin.case.model import Case
-from rippletwin.figures.quantities import (
+from rippletwin.case.quantities import (
     unit_of,
     write_certainty,
     write_interval,
@@ -124,21 +124,15 @@ def effect_table(effects: Sequence[Mapping]) -> Table:
                     Cell(write_value(entry["value"], unit, ends), entry["value"]),
                     Cell(interval, entry["value"]),
                 ]
-            rows.append(
-                [
-                    text(words),
-                    text(support),
-                    Cell(said, -1.0 if probability is None else probability),
-                    text(_effect_parameter(name)),
-                    *cells,
-                ]
-            )
-    columns = ["Effect", "Support", "Probability", "Parameter", "Value", "95 % interval"]
-    is_number = [False, False, True, False, True, True]
-    if not any(row[1].text for row in rows):
-        del columns[1], is_number[1]
+            probable = Cell(said, -1.0 if probability is None else probability)
+            parameter = text(_effect_parameter(name))
+            rows.append([text(words), parameter, *cells, probable, text(support)])
+    columns = ["Effect", "Parameter", "Value", "95 % interval", "Probability", "Support"]
+    is_number = [False, False, True, True, True, False]
+    if not any(row[-1].text for row in rows):
+        del columns[-1], is_number[-1]
         for row in rows:
-            del row[1]
+            del row[-1]
     return Table("Effects and their parameters", columns, is_number, rows)
 
 

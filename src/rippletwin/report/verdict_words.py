@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from rippletwin.figures.quantities import write_probability, write_share
+from rippletwin.case.quantities import write_probability, write_share
 from rippletwin.figures.words import join_words, name_effect, name_place
 
 TITLES = {
@@ -142,7 +142,7 @@ def mismatch_sentences(verdict: Mapping) -> list[str]:
     if not mismatch.get("present"):
         return []
     chance = write_probability(mismatch["p_value"])
-    sentences = [f"The probability of so much evidence where nothing is missing is {chance}."]
+    sentences = [f"If nothing were missing, so much evidence would have a probability of {chance}."]
     where = mismatch.get("where") or {}
     if where.get("bands_hz"):
         bands = _bands(where["bands_hz"])

@@ -6,29 +6,65 @@ import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from rippletwin.figures.quantities import write_number
+from rippletwin.case.quantities import write_number
 from rippletwin.report.tables import Cell, Table, text
+
+ATTENTION = {
+    "simulated": "Where networks look in simulated signals (Grad-CAM), and how much of their "
+    "attention is where the fault changes the signal.",
+    "recorded": "Where networks look in recorded signals (Grad-CAM), and what they call them.",
+}
+LETTERS = (
+    "H: healthy. S: worn slipper. C1, C2: scratched cylinder block, slightly and severely; C: of "
+    "unknown severity."
+)
 
 
 def accuracy_table(
-    rows: Sequence[Mapping], paper: Mapping[tuple[str, str], tuple[float, float]]
+    rows: Sequence[Mapping],
+    paper: Mapping[tuple[str, str], tuple[float, float]],
+    datasets: Mapping[str, Mapping[str, str]],
 ) -> Table:
     """Accuracy of every network and dataset in per cent, beside the paper's.
 
-    rows   each with architecture, title, dataset, mean and std
-    paper  mean and standard deviation by (architecture, dataset)
+    rows      each with architecture, title, dataset, mean and std
+    paper     mean and standard deviation by (architecture, dataset)
+    datasets  the row of config/datasets.tsv of each dataset
     """
     cells = []
     for row in rows:
         theirs = paper.get((row["architecture"], row["dataset"]))
         beside = Cell("", -1.0) if theirs is None else _mean(*theirs)
         ours = _mean(row["mean"], row["std"])
-        cells.append([text(row["title"]), text(row["dataset"]), ours, beside])
+        cells.append(
+            [text(row["title"]), text(describe_dataset(row["dataset"], datasets)), ours, beside]
+        )
     columns = ("Network", "Learnt from", "Accuracy / %", "The paper's / %")
     return Table(
         "Accuracy on recordings: mean and standard deviation over seeds",
         columns, (False, False, True, True), cells,
     )  # fmt: skip
+
+
+def describe_dataset(name: str, datasets: Mapping[str, Mapping[str, str]]) -> str:
+    """What networks learnt from, in words, with the dataset's name."""
+    row = datasets.get(name)
+    if row is None:
+        return name
+    if row["line"] == "rig":
+        return f"recordings of all states ({name})"
+    made = f"{row['twin']} twin" if row["twin"] != "none" else "pump alone, on a pipe"
+    words = [f"{row['signal']} of the {made}"]
+    if row["randomised"] == "yes":
+        words.append("range of severities")
+    if row["anchored"] == "yes":
+        words.append("set on the healthy recording")
+    return f"{', '.join(words)} ({name})"
+
+
+def describe_attention(windows: str) -> str:
+    """What a picture of the networks' attention to `windows` (simulated, recorded) shows."""
+    return f"{ATTENTION[windows]} {LETTERS}"
 
 
 def answer_table(answers: Mapping[str, Mapping[str, Mapping]]) -> Table:

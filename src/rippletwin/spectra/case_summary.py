@@ -14,6 +14,7 @@ from rippletwin.case.diagnosed_point import (
     recordings_to_diagnose,
 )
 from rippletwin.case.model import Case, Recording, Rig
+from rippletwin.case.quantities import BAR, plain, write_value
 from rippletwin.case.recording_advice import PlannedRecording, advise
 from rippletwin.case.speed_estimate import estimate_speed
 from rippletwin.spectra.noise import noise_cycle_scatter, noise_mad
@@ -104,21 +105,24 @@ def recording_in_words(summary: dict) -> Iterator[str]:
         return
     yield (
         f"  {summary['revolutions']} whole revolutions at {summary['speed_rpm']:.2f} r/min "
-        f"(nominal {summary['nominal_speed_rpm']:g}), wandering by "
+        f"(nominal {summary['nominal_speed_rpm']:g}); it varies by "
         f"{100 * summary['speed_wander']:.3f} % rms"
     )
     if summary["analysed_revolutions"] < summary["revolutions"]:
         low, high = summary["speed_range_rpm"]
         yield (
-            f"  speed from beginning to end {low:.4g} to {high:.4g} r/min; harmonics and cycle "
+            f"  speed from beginning to end {low:.4g} to {high:.4g} r/min; harmonics and "
             f"scatter are those of {summary['analysed_revolutions']} revolutions in the middle"
         )
     for sensor in summary["sensors"]:
         piston, other = sensor["piston_harmonics"], sensor["other_orders"]
+        noise, scatter = (
+            plain(write_value(sensor[key], BAR)) for key in ("noise_pa", "cycle_scatter_pa")
+        )
         yield (
-            f"  {sensor['name']}: mean {sensor['mean_pa'] / 1e6:.3f} MPa, "
-            f"noise {sensor['noise_pa']:.0f} Pa (wavelets), {sensor['cycle_scatter_pa']:.0f} Pa "
-            f"(cycle scatter); above noise: {piston[0]} of {piston[1]} piston harmonics, "
+            f"  {sensor['name']}: mean {sensor['mean_pa'] * BAR.factor:.2f} bar, noise {noise}, "
+            f"scatter of the revolutions {scatter}; "
+            f"above noise: {piston[0]} of {piston[1]} piston harmonics, "
             f"{other[0]} of {other[1]} other shaft orders; "
             f"{100 * sensor['repeating_share']:.2f} % of the ripple repeats"
         )

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.signal import resample
 
 from rippletwin.errors import InputError
-from rippletwin.harmonics import one_period
+from rippletwin.harmonics import one_period, peak_amplitudes
 from rippletwin.line.time_domain import method_of_characteristics
 from rippletwin.line.time_domain.line_elements import End, Pipe, TimeDomainLine, capacitance
 from rippletwin.twin.effects.base import LineState
@@ -121,8 +121,8 @@ def _gain(gain: complex, s: np.ndarray) -> np.ndarray:
 
 
 def pump_change(twin: Twin, healthy_flow, speed_hz: float, load_pressure: float):
-    """Flow (M,), m3/s, and capacitance, m3/Pa, that the twin's parameters of the pump add to the
-    data sheet's, for a healthy and for a faulty pump alike."""
+    """Flow (M,), m3/s, and capacitance, m3/Pa, that the twin's parameters of the pump and its
+    corrected ripple add to the data sheet's, for a healthy and for a faulty pump alike."""
     count, mean = len(healthy_flow), float(np.mean(healthy_flow))
     flow, capacity = np.zeros(count), 0.0
     pumping = np.array([2j * np.pi * speed_hz * twin.rig.pump.get("pistons", 1)])
@@ -132,4 +132,12 @@ def pump_change(twin: Twin, healthy_flow, speed_hz: float, load_pressure: float)
         spectrum = np.array([u, u**2]) @ change.harmonics(orders, mean)
         flow += one_period(spectrum, count, orders)
         capacity += u * float(change.source_admittance(pumping)[0].imag / pumping[0].imag)
+    if twin.ripple is not None:
+        pistons = twin.rig.pump.get("pistons", 1)
+        even = orders[orders % pistons == 0]  # equal pistons make no other orders
+        spectrum = np.zeros(len(orders), complex)
+        spectrum[even - 1] = (twin.ripple.at("", even) - 1.0) * peak_amplitudes(
+            healthy_flow + flow
+        )[even]
+        flow = flow + one_period(spectrum, count, orders)
     return flow, capacity

@@ -31,6 +31,7 @@ import numpy as np
 from rippletwin.case.model import FlowRipple, Rig, Segment, Sensor
 from rippletwin.line.frequency_domain.pipe_immittance import FRICTION_LAWS
 from rippletwin.twin import parameters as coordinates
+from rippletwin.twin.corrected_ripple import CorrectedRipple
 from rippletwin.twin.forward_model import ForwardModel, characteristic_impedance
 from rippletwin.twin.operating_point import (
     OperatingCondition,
@@ -87,6 +88,8 @@ class Twin:
         model calculates how they change the ripple.
     changing_state : whether the line's temperature differs between recordings, where there are two
         or more.
+    ripple : the pump's flow ripple as recordings correct it, for simulations; predictions of
+        observations, which a fit compares with them, take the nominal ripple.
 
     Raises ValueError for an unknown friction or a theta of the wrong length.
     """
@@ -102,11 +105,12 @@ class Twin:
         guessed_load: bool | None = None,
         uncertain_pump: bool = False,
         changing_state: bool = False,
+        ripple: CorrectedRipple | None = None,
     ):
         if friction not in FRICTION_LAWS:
             raise ValueError(f"friction must be one of {FRICTION_LAWS}, not {friction!r}")
         self.rig, self.friction, self.effects = rig, friction, tuple(effects)
-        self.source_sd = source_sd
+        self.source_sd, self.ripple = source_sd, ripple
         self.labels = tuple(
             o.label for o in observations if o.kind == "periodic" and o.source != "free"
         )
@@ -247,7 +251,8 @@ class Twin:
     # copies
 
     def with_(self, **changes) -> Twin:
-        """A copy with other friction, effects, source_sd or theta (nominal if effects change)."""
+        """A copy with other friction, effects, source_sd, ripple or theta; if effects change, theta
+        is nominal and so is the ripple."""
         state = {
             "friction": self.friction,
             "effects": self.effects,
@@ -256,6 +261,7 @@ class Twin:
             "uncertain_pump": self.uncertain_pump,
             "changing_state": self.changing_state,
             "theta": None if "effects" in changes else self.theta,
+            "ripple": None if "effects" in changes else self.ripple,
         }
         labels = [OperatingCondition(label) for label in self.labels]
         twin = Twin(self.rig, labels, **{**state, **changes})

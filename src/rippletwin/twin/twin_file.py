@@ -11,6 +11,7 @@ import numpy as np
 
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor, Uncertainty
 from rippletwin.errors import InputError
+from rippletwin.twin.corrected_ripple import CorrectedRipple
 from rippletwin.twin.effects.base import Effect, Place
 from rippletwin.twin.effects.library import add_effects, find_effect
 from rippletwin.twin.operating_point import OperatingCondition
@@ -32,6 +33,7 @@ def to_dict(twin: Twin) -> dict:
         "changing_state": twin.changing_state,
         "effects": [_effect(e, place) for e, place in twin.effects],
         "theta": twin.theta.tolist(),
+        "flow_ripple": None if twin.ripple is None else twin.ripple.as_dict(),
         "values": twin.values(),
     }
 
@@ -53,6 +55,7 @@ def from_dict(data: dict) -> Twin:
         uncertain_pump=data.get("uncertain_pump", False),
         changing_state=data.get("changing_state", False),
         theta=np.array(data["theta"]),
+        ripple=CorrectedRipple.from_dict(ripple) if (ripple := data.get("flow_ripple")) else None,
     )
 
 

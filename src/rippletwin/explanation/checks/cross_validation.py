@@ -12,10 +12,14 @@ import numpy as np
 
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.misfit import Score, score_fit
+from rippletwin.calibration.ripple_correction import correct_ripple
 from rippletwin.explanation.fit_jobs import Workers, job_from
 from rippletwin.spectra.frequency_selection import select_frequencies
+from rippletwin.spectra.observation import Observation
 
 UNDETERMINED_VARIANCE = 0.5  # of a coordinate in a fold; its prior has 1
+Halves = tuple[Observation, Observation]
+"""A single periodic recording's first and second half."""
 FREQUENCY_BLOCKS = 8  # of a single spectrum, every second of which is held out
 
 
@@ -23,14 +27,18 @@ FREQUENCY_BLOCKS = 8  # of a single spectrum, every second of which is held out
 class Validation:
     """Scores of the base ("before") and the explanation ("after"), in sample and held out.
 
-    calibrated    those of the plain calibration without effects; None if it was not made
-    left_out      what each fold left out, in words
-    disagreement  largest difference of an effect's parameter between a fold and the whole fit, in
-                  standard deviations
+    The explanation corrects the pump's flow ripple as well as the line.
+
+    nominal_ripple  those of the explanation with the nominal ripple of the pump in its place
+    calibrated      those of the plain calibration without effects; None if it was not made
+    left_out        what each fold left out, in words
+    disagreement    largest difference of an effect's parameter between a fold and the whole fit, in
+                    standard deviations
     """
 
     before: dict[str, Score]
     after: dict[str, Score]
+    nominal_ripple: dict[str, Score]
     left_out: tuple[str, ...]
     disagreement: float
     calibrated: dict[str, Score] | None = None
@@ -50,7 +58,7 @@ def cross_validate(
     workers: Workers,
     base: Fit,
     best: Fit,
-    late: Sequence | None = None,
+    halves: Halves | None = None,
     calibrated: Fit | None = None,
 ) -> Validation:
     """Cross-validate the base and the best fit, and the plain calibration if there is one.
@@ -59,25 +67,52 @@ def cross_validate(
     folds differ in their data only.
     """
     fits = [base, best] if calibrated is None else [base, best, calibrated]
-    folds = make_folds(workers, late)
+    folds = make_folds(workers, halves)
     jobs = [job_from(f, observations=fold.indices) for fold in folds for f in fits]
     if all(fold.workers is workers for fold in folds):
         flat = workers.fit(jobs)  # all folds side by side
     else:
         flat = [fit for fold in folds for fit in fold.workers.fit([job_from(f) for f in fits])]
     refitted = [flat[len(fits) * k : len(fits) * (k + 1)] for k in range(len(folds))]
-    scores = []
-    for which, fit in enumerate(fits):
-        each = [score_fit(r[which], fold.held_out, turn=True) for r, fold in zip(refitted, folds)]
-        outside = Score(_rms([s.misfit for s in each]), _rms([s.theil for s in each]))
-        scores.append({"in_sample": score_fit(fit, workers.observations), "held_out": outside})
+    before, after, *plain = (
+        _score(fit, [r[k] for r in refitted], folds, workers.observations)
+        for k, fit in enumerate(fits)
+    )
     return Validation(
-        scores[0],
-        scores[1],
+        before,
+        _score(best, [r[1] for r in refitted], folds, workers.observations, corrects_ripple=True),
+        after,
         tuple(fold.left_out for fold in folds),
         max((_largest_difference(best, fold[1]) for fold in refitted), default=0.0),
-        None if calibrated is None else scores[2],
+        *plain,
     )
+
+
+def _score(
+    fit: Fit,
+    refitted: Sequence[Fit],
+    folds: Sequence[Fold],
+    observations: Sequence,
+    corrects_ripple: bool = False,
+) -> dict[str, Score]:
+    """Scores of a fit in sample, and of its refits to the folds on what those left out.
+
+    corrects_ripple   whether the flow ripple is corrected, by the data of the same fit alone
+    """
+    ripple = correct_ripple(fit, observations) if corrects_ripple else None
+    each = [
+        score_fit(
+            refit,
+            fold.held_out,
+            turn=True,
+            ripple=correct_ripple(refit, fold.fitted) if corrects_ripple else None,
+        )
+        for refit, fold in zip(refitted, folds)
+    ]
+    return {
+        "in_sample": score_fit(fit, observations, ripple=ripple),
+        "held_out": Score(_rms([s.misfit for s in each]), _rms([s.theil for s in each])),
+    }
 
 
 @dataclass(frozen=True)
@@ -94,12 +129,18 @@ class Fold:
     held_out: list
     left_out: str
 
+    @property
+    def fitted(self) -> list:
+        """The observations that are fitted."""
+        every = self.workers.observations
+        return every if self.indices is None else [every[k] for k in self.indices]
 
-def make_folds(workers: Workers, late: Sequence | None = None) -> list[Fold]:
+
+def make_folds(workers: Workers, halves: Halves | None = None) -> list[Fold]:
     """The folds of the observations of `workers`.
 
-    Each operating point is held out in turn. With a single one, `late`, its late windows, are held
-    out, or else every second block of frequencies.
+    Each operating point is held out in turn. With a single one, the second of its `halves` is held
+    out, or without halves every second block of frequencies.
     """
     observations = workers.observations
     count = len(observations)
@@ -113,8 +154,10 @@ def make_folds(workers: Workers, late: Sequence | None = None) -> list[Fold]:
             )
             for left in range(count)
         ]
-    if late is not None:
-        return [Fold(workers, None, list(late), "the second half of the recording")]
+    if halves is not None:
+        early, late = halves
+        own = Workers(workers.base, [early])
+        return [Fold(own, None, [late], "the second half of the recording")]
     (observation,) = observations
     frequencies = len(observation.frequency_hz)
     block = np.floor(FREQUENCY_BLOCKS * np.arange(frequencies) / frequencies)

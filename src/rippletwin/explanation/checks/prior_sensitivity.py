@@ -42,8 +42,9 @@ class PriorSensitivity:
     """A fit without one effect and with wide priors.
 
     effect     name of the effect that is left out
+    place      where it acts, in words
     evidence   log evidence lost without it, with priors as stated; None if nothing fits
-    misfit     relative, in sample, with wide priors
+    misfit     relative, in sample, with wide priors and the nominal flow ripple
     parameter  line parameter that moves furthest from the data sheet
     value      its fitted value, `unit`
     nominal    its value on the data sheet, `unit`
@@ -54,6 +55,7 @@ class PriorSensitivity:
     """
 
     effect: str
+    place: str
     evidence: float | None
     misfit: float
     parameter: str
@@ -102,7 +104,7 @@ def compare_without_each_effect(
     accepted_misfit = score_fit(accepted, workers.observations).misfit
     line = workers.base
     results = []
-    for (effect, _), each in zip(accepted.hypothesis, without):
+    for (effect, place), each in zip(accepted.hypothesis, without):
         stated, wide, misfit = each.stated, each.wide, each.wide_misfit
         theta = coordinates(line.parameters, wide.twin.values())
         pull, name = alarms.largest_pull(replace(wide, twin=line.with_(theta=theta)))
@@ -111,6 +113,7 @@ def compare_without_each_effect(
         results.append(
             PriorSensitivity(
                 effect=effect.name,
+                place=str(place),
                 evidence=lost if np.isfinite(lost) else None,
                 misfit=misfit,
                 parameter=parameter.name,

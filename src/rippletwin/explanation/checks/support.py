@@ -19,7 +19,7 @@ from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.levenberg_marquardt import descend
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.shaft_angles import fit_shaft_angles
-from rippletwin.explanation.checks.cross_validation import Fold, make_folds
+from rippletwin.explanation.checks.cross_validation import Fold, Halves, make_folds
 from rippletwin.explanation.checks.prior_sensitivity import WithoutEffect, fit_without_each_effect
 from rippletwin.explanation.checks.robustness import Robustness, compare_beside_corrections
 from rippletwin.explanation.fit_jobs import (
@@ -36,6 +36,7 @@ from rippletwin.explanation.localise.smooth_corrections import (
     own_element,
     position_spacing,
 )
+from rippletwin.explanation.search.stepwise_moves import extension_job
 from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR, PULL_ALARM
 
 HELD_OUT_STEPS = 8  # of the descent in shaft angle and state of a recording that was left out
@@ -60,57 +61,84 @@ class Support:
     pull: float
 
 
-def judge_effects(
-    workers: Workers, base: Fit, best: Fit, late: Sequence | None = None
-) -> tuple[Fit, tuple[Support, ...], tuple[WithoutEffect, ...]]:
-    """`best` without the effects that only the search suggests, the support of each that is left,
-    and the fits without each.
+@dataclass(frozen=True)
+class Judged:
+    """A fit, the support of each of its effects, and the fits without each, in the same order."""
+
+    best: Fit
+    supports: tuple[Support, ...]
+    without: tuple[WithoutEffect, ...]
+
+
+def judge_effects(workers: Workers, base: Fit, best: Fit, halves: Halves | None = None) -> Judged:
+    """`best` without the effects that only the search suggests, and what supports the others.
 
     A suggested effect is dropped only if another is left: the last one says what comes nearest.
     An always-present effect stays.
     """
     while True:
         without = fit_without_each_effect(workers, base, best)
-        supports = _judge_each(workers, best, without, late)
+        supports = _judge_each(workers, best, without, halves)
         weak = [
             k
             for k, support in enumerate(supports)
             if support.level == "suggested" and not best.hypothesis[k][0].certain
         ]
         if not weak or len(best.hypothesis) == 1:
-            return best, supports, without
+            return Judged(best, supports, without)
         weakest = min(weak, key=lambda k: supports[k].robustness.plain)
         best = without[weakest].stated
 
 
 def judge_beside_network(
-    workers: Workers, network: Fit, supports: Sequence[Support]
-) -> tuple[Support, ...]:
-    """The supports where a passive network stands in for what remains.
+    workers: Workers, base: Fit, network: Fit, judged: Judged
+) -> tuple[Fit, Judged]:
+    """The fit with a passive network that stands in for what remains, and the effects beside it.
 
-    An effect is established only if it keeps its evidence beside the network: what is not there may
-    fit a part of what the network stands for.
+    What is not there may fit a part of what the network stands for. Each effect is therefore left
+    out beside the network, and beside one that is begun anew without it. An effect that the network
+    makes needless is dropped, but an always-present one; it is established only if it keeps its
+    evidence.
     """
-    named = [k for k, (effect, _) in enumerate(network.hypothesis) if effect.named]
-    fits = workers.fit([job_without_effect(network, k, workers.base) for k in named])
-    lost = {
-        f"{effect.name}@{place}": network.evidence - fit.evidence
-        for (effect, place), fit in zip((network.hypothesis[k] for k in named), fits)
-    }
-    return tuple(
+    while True:
+        fits = _fit_without_beside(workers, network, judged)
+        lost = [
+            np.inf if effect.certain else network.evidence - fit.evidence
+            for (effect, _), fit in zip(judged.best.hypothesis, fits)
+        ]
+        if min(lost, default=0.0) >= 0.0:
+            break
+        k = int(np.argmin(lost))
+        network, best = fits[k], judged.without[k].stated
+        supports = judged.supports[:k] + judged.supports[k + 1 :]
+        judged = Judged(best, supports, fit_without_each_effect(workers, base, best))
+    supports = tuple(
         replace(support, level="supported")
-        if support.level == "established"
-        and lost.get(f"{support.name}@{support.place}", np.inf) < MIN_LOG_BAYES_FACTOR
+        if support.level == "established" and gain < MIN_LOG_BAYES_FACTOR
         else support
-        for support in supports
+        for support, gain in zip(judged.supports, lost)
     )
+    return network, replace(judged, supports=supports)
+
+
+def _fit_without_beside(workers: Workers, network: Fit, judged: Judged) -> list[Fit]:
+    """The fits with the network and without each effect of `judged.best`, in its order."""
+    places = [member for member in network.hypothesis if not member[0].named]
+    jobs = [
+        job_without_effect(network, network.hypothesis.index(effect), workers.base)
+        for effect in judged.best.hypothesis
+    ]
+    if len(places) == 1:
+        jobs += [extension_job(each.stated, places[0]) for each in judged.without]
+    fits, count = workers.fit(jobs), len(judged.best.hypothesis)
+    return [max(fits[k::count], key=lambda fit: fit.evidence) for k in range(count)]
 
 
 def _judge_each(
-    workers: Workers, best: Fit, without: Sequence[WithoutEffect], late: Sequence | None
+    workers: Workers, best: Fit, without: Sequence[WithoutEffect], halves: Halves | None
 ) -> tuple[Support, ...]:
     """`Support` of every effect of `best`."""
-    folds = make_folds(workers, late)
+    folds = make_folds(workers, halves)
     held_out = _held_out_gains(best, without, folds)
     rig, values = best.twin.rig, best.twin.effect_values(best.twin.theta)
     owns = [own_element(effect, place, value, rig) for effect, place, value in values]
@@ -121,8 +149,8 @@ def _judge_each(
         jobs.append((((each.stated, None), (each.stated, start)), each.wide, elements))
     absent = workers.map(evaluate_without, jobs)
     tried = list(dict.fromkeys(e for tables in absent for table in tables for e in table))
-    halves = workers.map(evaluate_corrections, [(best, tried[k::2]) for k in range(2)])
-    present = halves[0] | halves[1]
+    one, other = workers.map(evaluate_corrections, [(best, tried[k::2]) for k in range(2)])
+    present = one | other
     frequency_hz = np.concatenate([o.frequency_hz for o in workers.observations])
     spacing = position_spacing(rig, frequency_hz)
     supports = []

@@ -13,6 +13,7 @@ import numpy as np
 
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.misfit import score_fit
+from rippletwin.calibration.ripple_correction import correct_ripple
 from rippletwin.explanation.localise.missing_immittance import describe_law
 from rippletwin.explanation.localise.residual_bands import (
     residual_conditions,
@@ -72,7 +73,7 @@ def find_remainder(fit: Fit, observations: Sequence) -> Remainder | None:
         return None
     found = gain >= MIN_LOG_BAYES_FACTOR
     return Remainder(
-        misfit=score_fit(fit, observations).misfit,
+        misfit=score_fit(fit, observations, ripple=correct_ripple(fit, observations)).misfit,
         model_error=float(fit.model_error),
         element=best if found else None,
         interval=_interval(corrections, best) if found else None,

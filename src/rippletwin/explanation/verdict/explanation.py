@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rippletwin.calibration.fit import Fit
+from rippletwin.calibration.ripple_correction import correct_ripple
 from rippletwin.case.model import Rig
 from rippletwin.explanation.checks.alarms import Alarms
 from rippletwin.explanation.checks.bootstrap import NullDistribution
@@ -72,4 +73,5 @@ class Explanation:
     @property
     def twin(self) -> Twin:
         """The corrected twin, which later stages use."""
-        return self.decision.accepted.twin
+        accepted = self.decision.accepted
+        return accepted.twin.with_(ripple=correct_ripple(accepted, self.observations))

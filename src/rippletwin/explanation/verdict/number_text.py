@@ -6,29 +6,31 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from rippletwin.case.quantities import plain, unit_of, write_interval, write_number, write_value
 from rippletwin.explanation.verdict.places import join_words
 
-LARGEST_PLAIN = 1e6  # larger numbers are written with a power of ten
 
-
-def parameter_sentence(name: str, parameter: dict) -> str:
-    """A parameter's value and interval."""
-    low, high = parameter["ci95"]
-    unit = "" if parameter["unit"] == "1" else f" {parameter['unit']}"
-    name = spaced(name).capitalize()
-    value, low, high = map(plain_number, (parameter["value"], low, high))
-    return f"{name}: {value}{unit} (95 % interval {low} to {high})."
+def parameters_sentence(effect: str, parameters: Mapping[str, dict]) -> str:
+    """Values and 95 % intervals of the parameters of an effect, which is told with its place; in
+    units of a test bench."""
+    told = []
+    for name, parameter in parameters.items():
+        unit, ends = unit_of(parameter["unit"], name), tuple(parameter["ci95"])
+        value = write_value(parameter["value"], unit, ends)
+        told.append(f"{spaced(name)} {value} (95 % interval {write_interval(ends, unit)})")
+    return plain(f"{effect[:1].upper()}{effect[1:]}: {join_words(told)}.")
 
 
 def pump_sentences(parameters: dict) -> list[str]:
-    """The pump's parameters whose intervals exclude the data sheet's value."""
+    """The pump's parameters whose intervals exclude the data sheet's value, in the same units."""
     off = []
     for name, p in parameters.items():
         if not p["ci95"][0] <= p["sheet"] <= p["ci95"][1]:
-            unit = "" if p["unit"] == "1" else f" {p['unit']}"
-            value, sheet = plain_number(p["value"]), plain_number(p["sheet"])
-            off.append(f"{spaced(name)} {value}{unit} (data sheet {sheet})")
-    return [f"The ripple indicates of the pump: {join_words(off)}."] if off else []
+            unit = unit_of(p["unit"], name)
+            value = write_value(p["value"], unit, tuple(p["ci95"]))
+            sheet = write_number(p["sheet"] * unit.factor)
+            off.append(f"{spaced(name)} {value} (data sheet {sheet})")
+    return [plain(f"The ripple indicates of the pump: {join_words(off)}.")] if off else []
 
 
 def load_sentences(load: dict | None) -> list[str]:
@@ -50,12 +52,6 @@ def sensor_sentences(sensors: Mapping[str, dict]) -> list[str]:
         for name, one in sensors.items()
     ]
     return [f"Gains of the sensors: {join_words(said)}."] if said else []
-
-
-def plain_number(value: float) -> str:
-    """Three digits, without a power of ten up to a million: 3000, not 3e+03."""
-    text = f"{value:.3g}"
-    return f"{float(text):.0f}" if "e+" in text and abs(value) < LARGEST_PLAIN else text
 
 
 def spaced(name: str) -> str:

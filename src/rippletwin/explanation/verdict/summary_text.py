@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from rippletwin.calibration.laplace import UNCONVERGED_GAIN
+from rippletwin.case.quantities import plain, unit_of, write_value
 from rippletwin.explanation.checks.alarms import largest_pull
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders
 from rippletwin.explanation.localise.source_free_fits import compare_evidence
@@ -12,8 +14,7 @@ from rippletwin.explanation.verdict.decision import equivalent_places
 from rippletwin.explanation.verdict.explanation import Explanation
 from rippletwin.explanation.verdict.number_text import (
     load_sentences,
-    parameter_sentence,
-    plain_number,
+    parameters_sentence,
     pump_sentences,
     sensor_sentences,
     spaced,
@@ -23,8 +24,8 @@ from rippletwin.explanation.verdict.places import element_and_extent, join_words
 SAME_PRESSURE = 0.05  # relative; mean pressures closer than this count as one
 SOURCE_FREE_SHARE = 0.2  # of the evidence that must remain if the source is unknown
 RIPPLE_ERROR_RATIO = 3.0
-"""Misfit over model error from which nearly all of the misfit is an error of the pump's ripple: the
-rest, a tenth in power, is the model error."""
+"""Misfit with the nominal ripple over model error from which nearly all of it is an error of the
+ripple: the rest, a tenth in power, is the model error."""
 OPENINGS = {
     "consistent": "The recordings agree with the twin within the tolerances of the data sheet.",
     "calibration_only": "No physics is missing, but nominal values of the line are outside their "
@@ -67,6 +68,7 @@ def summary_text(e: Explanation, result: dict, entries: Sequence[dict]) -> str:
     sentences += _remainder(result["remainder"])
     if entries and any(o.source == "nominal" for o in e.observations):
         sentences += _ripple_error(result["fit"])
+    sentences += _unfinished_fit(result["fit"])
     sentences += pump_sentences(result["pump"])
     sentences += load_sentences(result["load"])
     sentences += sensor_sentences(result["sensors"])
@@ -84,19 +86,20 @@ def _named(e: Explanation, result: dict, entries: Sequence[dict]) -> list[str]:
     certain = [x for x in named if _level(levels, x) == "established"]
     names = [_effect_and_place(e, entry) for entry in certain]
     sentences = [
-        f"The twin lacks {join_words(names)}. This is established. With the effects listed, the "
-        f"misfit on held-out data goes from {before:.1%} to {after:.1%} of the measured ripple."
+        f"The twin lacks {join_words(names)}. This is established. With the effects listed and the "
+        f"pump's flow ripple corrected, the misfit on held-out data goes from {before:.1%} to "
+        f"{after:.1%} of the measured ripple."
     ]
-    for entry in certain:
-        sentences += [parameter_sentence(name, p) for name, p in entry["parameters"].items()]
+    for name, entry in zip(names, certain):
+        if entry["parameters"]:
+            sentences.append(parameters_sentence(name, entry["parameters"]))
         if entry["effect"].certain:
             sentences.append(
                 f"{spaced(entry['effect'].name).capitalize()} is always present, so it is included "
                 "unless the data contradict it."
             )
-    sentences = list(dict.fromkeys(sentences))  # two effects may act through one parameter
     sentences += _lesser(e, [x for x in named if x not in certain], levels)
-    sentences += _data_sheet_rivals(e)
+    sentences += _data_sheet_rivals(e, result["fit"])
     sentences += liquid_like_air(
         [entry["effect"].name for entry in certain], [o.load_pressure for o in e.observations]
     )
@@ -138,7 +141,7 @@ def _unexplained(e: Explanation, result: dict, entries: Sequence[dict]) -> list[
         names = join_words([_effect_and_place(e, entry) for entry in named])
         sentences.append(f"In the library {names} comes nearest.")
         sentences += _lesser(e, named, levels)
-        sentences += _data_sheet_rivals(e)
+        sentences += _data_sheet_rivals(e, result["fit"])
     return sentences
 
 
@@ -171,13 +174,24 @@ def _remainder(remainder: dict | None) -> list[str]:
 
 
 def _ripple_error(fit: dict) -> list[str]:
-    """That most of the misfit is an error of the pump's ripple, where it is."""
-    misfit, model_error = fit["after"]["in_sample"], fit["model_error"]["after"]
+    """How wrong the pump's nominal ripple is, where it is more wrong than the line."""
+    misfit, model_error = fit["nominal_ripple"]["in_sample"], fit["model_error"]["after"]
     if misfit < RIPPLE_ERROR_RATIO * model_error:
         return []
     return [
-        f"With the pump's nominal ripple the twin misses {misfit:.0%} of the reading. Nearly all "
-        "of that is an error of the ripple, and not of the line."
+        f"With the pump's nominal flow ripple the corrected line misses {misfit:.0%} of the "
+        f"reading, with the corrected ripple {fit['after']['in_sample']:.1%}."
+    ]
+
+
+def _unfinished_fit(fit: dict) -> list[str]:
+    """That the fit has not come to a stationary point, where that could change the verdict."""
+    gain = fit["expected_gain"]["after"]
+    if gain <= UNCONVERGED_GAIN:
+        return []
+    return [
+        f"The fit did not converge: one more step promises {gain:.1f} of log posterior. Its "
+        "numbers and the verdict are uncertain."
     ]
 
 
@@ -185,12 +199,17 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _data_sheet_rivals(e: Explanation) -> list[str]:
-    """Fits without an effect that only the data sheet rejects."""
+def _data_sheet_rivals(e: Explanation, fit: dict) -> list[str]:
+    """Fits without an effect that only the data sheet rejects.
+
+    Their misfits have the nominal ripple: where it is wrong they compare nothing.
+    """
+    if _ripple_error(fit):
+        return []
     return [
-        f"Without {spaced(s.effect)} the line would fit to {s.misfit:.1%} with {s.parameter} at "
-        f"{plain_number(s.value)} {s.unit}. That is {s.pull:.0f} standard deviations from the data "
-        "sheet, and only the data sheet rejects it."
+        f"Without {spaced(s.effect)} ({s.place}) the line would fit to {s.misfit:.1%} with "
+        f"{s.parameter} at {plain(write_value(s.value, unit_of(s.unit, s.parameter)))}. That is "
+        f"{s.pull:.0f} standard deviations from the data sheet, and only the data sheet rejects it."
         for s in e.prior_sensitivity
         if s.rivals and s.pull > PULL_ALARM
     ]

@@ -251,8 +251,9 @@ def _stand_in(e: Explanation, entries: list[dict], index: int) -> dict:
 def _fit_scores(e: Explanation) -> dict:
     """Misfits and model errors without effects ("before") and with them ("after").
 
-    The misfits before are the best that a calibration without effects reaches. The model error
-    before is that of the base.
+    The misfits before are the best that a calibration without effects reaches. Those after are of
+    the corrected line with the corrected flow ripple of the pump, and beside them those with the
+    nominal ripple. The model error before is that of the base.
     """
 
     def scores(which):
@@ -263,9 +264,14 @@ def _fit_scores(e: Explanation) -> dict:
     return {
         "before": scores(e.validation.without_effects),
         "after": scores(e.validation.after),
+        "nominal_ripple": scores(e.validation.nominal_ripple),
         "model_error": {
             "before": float(e.search.base.model_error),
             "after": float(e.decision.accepted.model_error),
+        },
+        "expected_gain": {
+            "before": float(e.search.base.expected_gain),
+            "after": float(e.decision.accepted.expected_gain),
         },
         "left_out": list(e.validation.left_out),
         "parameters_agree_within_sd": float(e.validation.disagreement),

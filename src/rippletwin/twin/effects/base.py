@@ -190,6 +190,12 @@ def segment_at(lengths: np.ndarray, position) -> int:
     return int(min(np.searchsorted(ends, np.ravel(position)[0]), len(ends) - 1))
 
 
+def characteristic_admittance(rig: Rig) -> float:
+    """A/(rho a) of the first segment, m3/(Pa s): a leak well below it cannot be seen."""
+    segment = rig.line[0]
+    return 0.25 * np.pi * segment.diameter**2 / (rig.fluid.density * segment.wave_speed)
+
+
 def on_line(network, position):
     """`position` (m), clipped to the line, which a fit may have made a little shorter.
 

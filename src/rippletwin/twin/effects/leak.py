@@ -11,6 +11,7 @@ from rippletwin.line.frequency_domain.line_network import Insert
 from rippletwin.line.time_domain.line_elements import Element
 from rippletwin.twin.effects.base import (
     Effect,
+    characteristic_admittance,
     on_line,
     position_parameter,
     position_place,
@@ -57,13 +58,10 @@ def _apply(network, state, values, place):
 
 
 def _parameters(rig, place):
-    segment = rig.line[0]
-    characteristic = (
-        0.25 * np.pi * segment.diameter**2 / (rig.fluid.density * segment.wave_speed)
-    )  # 1/Zc: a leak well below it cannot be seen
+    unit = characteristic_admittance(rig)
     return (
         position_parameter(rig),
-        Parameter("conductance", "m3/(Pa s)", lognormal(0.1 * characteristic, 1.2)),
+        Parameter("conductance", "m3/(Pa s)", lognormal(0.1 * unit, 1.2)),
         Parameter("pressure_exponent", "1", uniform(0.0, 0.5)),
     )
 

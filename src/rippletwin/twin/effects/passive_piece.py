@@ -7,7 +7,8 @@ takes the stretch away and puts the piece there: with chain matrices T
     M = T_before^-1 T_piece T_after^-1 = [[1 + Z Y2, Z], [..., 1 + Z Y1]]
 
 and Y1, Z, Y2 is its pi section, exact at every frequency. A sensor inside the piece would read what
-the line it replaces would have there.
+the line it replaces would have there. The piece may leak at its middle; what leaks on average is
+left to the load.
 """
 
 from __future__ import annotations
@@ -18,7 +19,15 @@ import numpy as np
 
 from rippletwin.line.frequency_domain.line_network import Insert
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
-from rippletwin.twin.effects.base import Effect, position_parameter, position_place, segment_at
+from rippletwin.line.time_domain.line_elements import Element
+from rippletwin.twin.effects.base import (
+    Effect,
+    characteristic_admittance,
+    on_line,
+    position_parameter,
+    position_place,
+    segment_at,
+)
 from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal
 
@@ -47,7 +56,7 @@ def _immittances(network, state, values, place) -> tuple[np.ndarray, np.ndarray]
 
 
 def _describe(values) -> str:
-    """The piece in words."""
+    """The piece in words; its leak is told by its parameter."""
     wide, fast = values["diameter_ratio"], values["wave_speed_ratio"]
     bore, wall = "wider" if wide > 1.0 else "narrower", "stiffer" if fast > 1.0 else "softer"
     kind = bore if abs(np.log(wide)) > abs(np.log(fast)) else wall
@@ -97,7 +106,9 @@ def _apply(network, state, values, place):
     x, length = _extent(network.length, values)
     before = _stretch(network, x - 0.5 * length, x)
     after = _stretch(network, x, x + 0.5 * length)
-    piece = _chain(*_immittances(network, state, values, place), length)
+    half = _chain(*_immittances(network, state, values, place), 0.5 * length)
+    leak = 1.0, 0.0, values["conductance"], 1.0
+    piece = _product(_product(half, leak), half)
     a, b, _, d = _product(_product(_without(before), piece), _without(after))
     network.inserts += [
         Insert(x, "shunt", (d - 1.0) / b),
@@ -125,6 +136,20 @@ def _apply_in_time(line, state, values, place):
         before.append(replace(pipe, length=min(end, low) - start))
         after.append(replace(pipe, length=end - max(start, high)))
     line.pipes = [pipe for pipe in (*before, piece, *after) if pipe.length > 0.0]
+    line.inserts.append(Element(on_line(line, middle), "shunt", (values["conductance"],)))
+
+
+def _parameters(rig, place):
+    unit = characteristic_admittance(rig)
+    return (
+        position_parameter(rig),
+        Parameter("length", "m", lognormal(0.2, 0.6), (-1.0, 1.0)),
+        Parameter("diameter_ratio", "1", lognormal(1.0, 0.6), (-1.0, 0.0, 1.2)),
+        Parameter("wave_speed_ratio", "1", lognormal(0.75, 0.35), (-1.0, 1.0)),
+        Parameter("compliance_ratio", "1", lognormal(0.03, 1.5)),
+        Parameter("retardation_time", "s", lognormal(1e-4, 1.3)),
+        Parameter("conductance", "m3/(Pa s)", lognormal(0.01 * unit, 2.0)),
+    )
 
 
 EFFECT = Effect(
@@ -132,16 +157,9 @@ EFFECT = Effect(
     element="position",
     medium="any",
     equation="a stretch of the line has Z' of b times its diameter and (b/c)^2 times its "
-    "Y' + kappa/(1 + s tau) A s/(rho a^2)",
+    "Y' + kappa/(1 + s tau) A s/(rho a^2), and q1 - q2 = G p at its middle",
     source="Wylie & Streeter 1993, Fluid Transients in Systems, ch. 12 (transfer matrices)",
-    parameters=lambda rig, place: (
-        position_parameter(rig),
-        Parameter("length", "m", lognormal(0.2, 0.6), (-1.0, 1.0)),
-        Parameter("diameter_ratio", "1", lognormal(1.0, 0.6), (-1.0, 0.0, 1.2)),
-        Parameter("wave_speed_ratio", "1", lognormal(0.75, 0.35), (-1.0, 1.0)),
-        Parameter("compliance_ratio", "1", lognormal(0.03, 1.5)),
-        Parameter("retardation_time", "s", lognormal(1e-4, 1.3)),
-    ),
+    parameters=_parameters,
     places=position_place,
     apply=_apply,
     apply_in_time=_apply_in_time,

@@ -6,7 +6,7 @@ import numpy as np
 
 from rippletwin.line.frequency_domain.line_network import Insert
 from rippletwin.line.time_domain.line_elements import Element, inertance
-from rippletwin.twin.effects.base import Effect, Place
+from rippletwin.twin.effects.base import Effect, Place, characteristic_admittance
 from rippletwin.twin.effects.lumped_elements import volume_compliance
 from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal
@@ -37,9 +37,10 @@ def _compliance(state, values, place):
 def _parameters(rig, place):
     first = rig.line[0]
     area = 0.25 * np.pi * first.diameter**2
-    characteristic = area / (rig.fluid.density * first.wave_speed)
     volume = Parameter("volume", "m3", lognormal(1e-4 * (first.diameter / 0.02) ** 3, 1.2))
-    leakage = Parameter("conductance", "m3/(Pa s)", lognormal(0.01 * characteristic, 1.5))
+    leakage = Parameter(
+        "conductance", "m3/(Pa s)", lognormal(0.01 * characteristic_admittance(rig), 1.5)
+    )
     passage = Parameter("inertance", "Pa s2/m3", lognormal(0.1 * rig.fluid.density / area, 1.0))
     own = {"leakage": (leakage,), "volume": (volume, leakage)}
     return own.get(place.form, (volume, leakage, passage))

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from rippletwin.figures import quantities as q
+from rippletwin.case import quantities as q
 
 
 @pytest.mark.parametrize(
@@ -55,3 +55,4 @@ def test_a_probability_is_said_in_words_where_its_digits_mean_nothing():
     assert q.write_probability(2e-5) == "about one in 100\u00a0000"
     assert q.write_probability(0.3) == "30 %"
     assert (q.write_certainty(1.0), q.write_certainty(0.0)) == ("> 99.9 %", "< 0.1 %")
+    assert (q.write_certainty(0.9954), q.write_certainty(0.97)) == ("99.5 %", "97 %")

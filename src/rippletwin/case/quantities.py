@@ -120,6 +120,8 @@ def write_certainty(p: float) -> str:
     """A probability in per cent that never claims to be certain."""
     if p > 0.999:
         return "> 99.9 %"
+    if p > 0.99:
+        return f"{100.0 * p:.1f} %"
     return "< 0.1 %" if p < 0.001 else write_share(p)
 
 
@@ -130,6 +132,11 @@ def write_probability(p: float) -> str:
     if p < 1e-3:
         return f"about one in {10 ** round(-math.log10(p)):,}".replace(",", "\u00a0")
     return f"{write_number(100 * p, significant=2)} %"
+
+
+def plain(text: str) -> str:
+    """Text for a terminal: spaces at which a line may break, and the minus of a keyboard."""
+    return text.replace("\u00a0", " ").replace(MINUS, "-")
 
 
 def _step(unit: Unit, ends: tuple[float, float] | None) -> float | None:

@@ -1,0 +1,41 @@
+"""The pump's flow ripple as recordings correct it.
+
+The nominal flow ripple of a data sheet's pump is wrong by several per cent at best, and by half
+where relief grooves or free air are not stated. The error model of a fit (`posterior`) has an error
+of the source at every frequency. Its most likely value, given what the sensors read, corrects the
+ripple of each recording.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rippletwin.calibration.fit import Fit
+from rippletwin.calibration.posterior import Posterior
+from rippletwin.calibration.shaft_angles import best_turn
+from rippletwin.twin.corrected_ripple import CorrectedRipple
+
+
+def correct_ripple(fit: Fit, observations: Sequence) -> CorrectedRipple:
+    """The corrected flow ripple of the observations that have a nominal one.
+
+    fit   of these observations with the error model of explaining; with an unknown source nothing
+          is corrected
+    """
+    posterior = Posterior(fit.twin, observations, None, fit.source_free)
+    prediction = posterior.predict(fit.twin.theta)
+    posterior.estimate_errors(prediction, fit.twin.theta)
+    source = posterior.most_likely_source(prediction)
+    orders: dict[str, np.ndarray] = {}
+    ratios: dict[str, np.ndarray] = {}
+    turns: dict[str, float] = {}
+    for o, part in zip(posterior.observations, posterior.forward.slices):
+        if o.source == "nominal" and not fit.source_free:
+            orders[o.label], ratios[o.label] = np.asarray(o.orders, int), source[part]
+            first = next(iter(ratios))
+            common, a, b = np.intersect1d(orders[first], orders[o.label], return_indices=True)
+            weighted = posterior.power[part][b] * np.conj(ratios[o.label][b]) * ratios[first][a]
+            turns[o.label] = best_turn(weighted, common)[0]
+    return CorrectedRipple(orders, ratios, turns)
