@@ -25,6 +25,7 @@ NAMES = (
     "images",
     "training",
     "workflow",
+    "explaining",
     "starting",
     "growth",
 )

@@ -12,6 +12,7 @@ import pytest
 from paths import ROOT
 from speed import (
     calibration,
+    explaining,
     growth,
     images,
     line_frequency_domain,
@@ -183,7 +184,8 @@ def test_a_benchmark_runs_on_tiny_sizes(benchmark, monkeypatch):
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    "benchmark", [line_frequency_domain, calibration, images, training, starting]
+    "benchmark",
+    [line_frequency_domain, calibration, explaining, images, training, starting],
 )
 def test_a_longer_benchmark_runs_on_tiny_sizes(benchmark, monkeypatch):
     """The same for those that take half a minute; training and starting in their processes."""
