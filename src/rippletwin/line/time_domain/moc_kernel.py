@@ -15,6 +15,9 @@ VALVE = -1  # row of the load's valve among the filters
 VALVE_PASSES = 3  # of its opening, which hardly changes within a step
 NEW_RATE_SHARE = 0.501  # of the new rate in the mean over a step; 1/2 would keep a jump for ever
 
+# Written into the function that calls them: passing tuples of arrays takes longer than the work.
+INLINED = njit(cache=True, error_model="numpy", inline="always")
+
 # Functions of one pipe take views that start at its first node: the compiler then knows that no
 # index wraps, and vectorises.
 
@@ -92,7 +95,7 @@ def _update_stored(pressure, stored, soft, give, lag):
         lag[i] -= stored[2, i] + rate
 
 
-@njit(cache=True, error_model="numpy")
+@INLINED
 def _is_rigid(k, pipes):
     """Whether pipe k stores by its elastic wall alone. Then only its waves are kept."""
     return pipes.parameters[k, 3] == 0.0 and not pipes.laws[k, 0] > 0.0
@@ -180,7 +183,7 @@ def _orifice_drop(excess, b, coefficient):
     return np.sign(excess) * x * x
 
 
-@njit(cache=True, error_model="numpy")
+@INLINED
 def _solve_junction(supply, slope, first, stop, junctions, state, ends, kept, joint, load):
     """Pressures at a junction whose rungs are `first` to `stop`, in order from the pump.
 
@@ -236,7 +239,7 @@ def _solve_junction(supply, slope, first, stop, junctions, state, ends, kept, jo
     return p, far
 
 
-@njit(cache=True, error_model="numpy")
+@INLINED
 def _solve_inside(k, pipes, state, waves, leaving, known, lag, give, ends):
     """New state between the ends of pipe k, and in `ends` what the pipe brings to its junctions:
     q = +-(supply - slope p). Of a rigid pipe also the waves `leaving` its interior nodes."""
@@ -299,7 +302,7 @@ def _solve_inside(k, pipes, state, waves, leaving, known, lag, give, ends):
     ends[1, k, 1] = (1.0 + theta * give[last]) / b_long
 
 
-@njit(cache=True, error_model="numpy")
+@INLINED
 def _solve_ends(k, pipes, state, leaving, known, lag, give, ends, joint):
     """New state at the ends of pipe k from the pressures at its junctions, and the waves `leaving`
     its nodes; those of a rigid pipe's interior nodes are there already."""
