@@ -16,6 +16,7 @@ from rippletwin.report.content import WorkflowPart, make_page
 from rippletwin.report.page import render, write_report
 from rippletwin.report.results import read_results
 from rippletwin.report.tables import Cell, Table
+from rippletwin.report.verdict_words import remaining_sentences
 from rippletwin.report.workflow_tables import describe_dataset
 
 VOID = {"meta", "br", "img", "link", "input", "hr"}
@@ -208,6 +209,18 @@ def test_every_verdict_is_one_plain_sentence(tmp_path, verdict, changed, said):
     page = make_page(read_results(write_results(tmp_path, verdict=verdict, **changed)))
     assert said in page.sentence and "_" not in page.headline + page.sentence
     assert page.following
+
+
+def test_a_corrected_flow_ripple_is_told(tmp_path):
+    """A small error that needs a corrected ripple of the pump is not claimed for the line alone."""
+    folder = write_results(tmp_path)
+    path = folder / "explained" / "verdict.json"
+    verdict = json.loads(path.read_text())
+    verdict["fit"]["nominal_ripple"] = {"held_out": 0.345}
+    said = " ".join(remaining_sentences(verdict))
+    assert "with the ripple of its data sheet the error is 34 %" in said
+    verdict["fit"]["nominal_ripple"] = dict(verdict["fit"]["after"])
+    assert "data sheet" not in " ".join(remaining_sentences(verdict))
 
 
 def test_what_is_missing_is_said_with_the_command_that_makes_it(tmp_path):

@@ -119,6 +119,12 @@ def remaining_sentences(verdict: Mapping) -> list[str]:
     if errors is not None:
         after = write_share(errors[1])
         sentences.append(f"Data that the twin has not seen are predicted with an error of {after}.")
+    nominal = ((verdict.get("fit") or {}).get("nominal_ripple") or {}).get("held_out")
+    if errors is not None and nominal is not None and write_share(nominal) != after:
+        sentences.append(
+            "For that the pump's flow ripple is corrected too; with the ripple of its data sheet "
+            f"the error is {write_share(nominal)}."
+        )
     if remainder:
         sentences.append(_left(remainder))
         if remainder.get("bands_hz"):

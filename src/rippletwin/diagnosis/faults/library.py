@@ -56,7 +56,7 @@ def find_fault(asked: str | Path) -> Fault | None:
 
 def read_fault(path: str | Path) -> Fault:
     """The `FAULT` of a user's Python file; raises InputError where there is none."""
-    return read_object(path, "FAULT", Fault, "--faults", ", ".join(FAULTS))
+    return read_object(path, "FAULT", Fault, "fault", ", ".join(FAULTS))
 
 
 def states_of(chosen: Sequence[Fault]) -> tuple[tuple[Fault, ...], ...]:
