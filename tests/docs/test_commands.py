@@ -28,7 +28,10 @@ PROGRAMS = (
     "rippletwin", "virtualrig", "snakemake", "python", "python3", "make", "pip", "apptainer",
 )  # fmt: skip
 COPIED = ("workflow", "config", "src", "resources", "profiles", "benchmarks", "docs", "tests")
-COPIED_FILES = ("Snakefile", "Makefile", "pyproject.toml", "environment.txt", "README.md")
+COPIED_FILES = (
+    "Snakefile", "Makefile", "pyproject.toml", "environment.txt", "environment-bench.txt",
+    "environment-bench-numpy1.txt", "README.md",
+)  # fmt: skip
 SCHEDULED = "it takes from minutes to hours; the smoke run of `make test` runs the same rules"
 NETWORK = "it downloads packages"
 CLUSTER = "it needs a cluster or a container engine"
@@ -38,6 +41,7 @@ NOT_RUN = {
     "make run": (SCHEDULED, "make --dry-run run"),
     "make smoke": (SCHEDULED, "make --dry-run smoke"),
     "make lint": ("it makes an environment", "make --dry-run lint"),
+    "make bench": ("it makes an environment", "make --dry-run bench"),
     "make docs-site": ("it makes an environment", "make --dry-run docs-site"),
     "make test": ("it runs this test", "make --dry-run test"),
     "make test-long": ("it runs this test", "make --dry-run test-long"),

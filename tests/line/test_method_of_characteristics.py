@@ -18,6 +18,7 @@ from paper_line import (
     samples,
 )
 from paper_rig import SENSORS
+from rippletwin.line.time_domain.grid import Grid
 from rippletwin.line.time_domain.line_elements import (
     End,
     Pipe,
@@ -85,6 +86,31 @@ def test_joukowsky():
     assert np.all(second[t < arrival[1] - 1e-4] == 0)
     closed = moc.pressure[2, (t > arrival[2] + 1e-4) & (t < 0.0199)]
     assert np.allclose(closed, 2 * rise, rtol=1e-12)
+
+
+@pytest.mark.parametrize("friction", ["steady", "unsteady"])
+def test_a_period_may_have_an_odd_number_of_steps(friction):
+    """What one period of an odd number of steps leaves behind is what the next begins with: two
+    periods are the first and the second half of one period that is twice as long (the same steps
+    in another order of calls)."""
+    steps, positions = 601, [0.0, 3.3, 8.0]
+    rng = np.random.default_rng(2)
+    flow = MEAN_FLOW * (1 + 0.01 * rng.standard_normal(steps))
+
+    def run(flow, period, periods):
+        line = TimeDomainLine(
+            PIPES, flow, period, ORIFICE, friction=friction, positions=positions, **OIL
+        )
+        grid = Grid(line)
+        nodes = np.array([grid.locate(x)[1] for x in positions])
+        return [grid.advance(nodes) for _ in range(periods)], grid
+
+    (_, second), short = run(flow, PERIOD, 2)
+    (whole,), long = run(np.tile(flow, 2), 2 * PERIOD, 1)
+    for one, both in zip(second, whole):
+        assert np.allclose(one, both[:, steps:], rtol=1e-12)
+    for name in ("pressure", "flow", "forward", "backward"):
+        assert np.allclose(getattr(short, name), getattr(long, name), rtol=1e-12)
 
 
 def test_steady_flow_loses_hagen_poiseuille():

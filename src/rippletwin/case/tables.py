@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from rippletwin.case.model import FlowRipple
 from rippletwin.case.readers.file_checks import DOUBLE, check_readable, check_size
@@ -30,6 +29,8 @@ def read_table(path: Path, columns: list[str]) -> np.ndarray:
     A table without a header, of numbers only, is taken column by column. Separator and decimal sign
     are found out. Raises InputError where a column is absent or a number is not finite.
     """
+    import pandas as pd  # takes a third of a second, which a case without tables does not need
+
     check_readable(path)
     check_size(path, "file", path.stat().st_size // DOUBLE, MAX_TABLE_GIB)
     form = find_format(path, columns)

@@ -14,6 +14,8 @@ outside the band is dropped, not clamped to the edge rows.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -47,18 +49,22 @@ def sst_images(windows: np.ndarray, sampling_rate_hz: float, settings: SstSettin
     Raises ValueError where the band does not fit the sampling rate.
     """
     windows = np.asarray(windows)
-    frequency = frequency_axis(settings)
-    rows = _resize(len(frequency), settings.size)
-    columns = np.ascontiguousarray(_resize(COLUMNS, settings.size).T)
     images = np.empty((*windows.shape[:-1], settings.size, settings.size), dtype=np.float32)
     flat = images.reshape(-1, settings.size, settings.size)
     signals = windows.reshape(-1, windows.shape[-1])
     step = 64  # signals at a time, whose spectrograms fit into the cache
     for start in range(0, len(signals), step):
         part = synchrosqueeze(signals[start : start + step], sampling_rate_hz, settings)
-        picture = np.exp(np.float32(settings.k * settings.scale) * np.abs(part))
-        flat[start : start + step] = rows @ (picture @ columns)
+        flat[start : start + step] = transform_images(part, settings)
     return images
+
+
+def transform_images(transform: np.ndarray, settings: SstSettings) -> np.ndarray:
+    """exp(k S) of a transform (n, rows, COLUMNS) as images (n, size, size) float32."""
+    rows = _resize(transform.shape[-2], settings.size)
+    columns = np.ascontiguousarray(_resize(COLUMNS, settings.size).T)
+    picture = np.exp(np.float32(settings.k * settings.scale) * np.abs(transform))
+    return rows @ (picture @ columns)
 
 
 def amplitude_scale(windows: np.ndarray, sampling_rate_hz: float, settings: SstSettings) -> float:
@@ -83,38 +89,61 @@ def synchrosqueeze(
 
     signals = np.asarray(signals)
     points = signals.shape[-1]
-    frequency = frequency_axis(settings)
-    centre, lines = _wavelets(settings), np.arange(points // 2 + 1) * sampling_rate_hz / points
+    bank = _filter_bank(points, float(sampling_rate_hz), settings)
+    spectrum = scipy.fft.rfft(signals, axis=-1)[:, : len(bank.lines)] * (2 / points)
+    rows = len(bank.edges) - 1
+    out = np.zeros((len(signals), rows, COLUMNS), dtype=np.complex64)
+    folded = np.empty((2, len(bank.weights), COLUMNS), dtype=np.complex64)
+    for signal, image in zip(spectrum.astype(np.complex64), out):
+        _fold(signal, bank.weights, bank.first, bank.last, bank.lines, folded)
+        # torch's inverse FFT (MKL) is three times as fast as scipy's at this length
+        coefficients = torch.fft.ifft(torch.from_numpy(folded), norm="forward").numpy()
+        _reassign(coefficients[0], coefficients[1], bank.edges, image)
+    return out
+
+
+class _FilterBank(NamedTuple):
+    """Wavelets of a band in the frequency domain, for windows of one length.
+
+    lines         (L,) Hz, of the spectrum, up to the last that a wavelet sees
+    weights       (A, L) responses over the sum of responses that a tone meets
+    first, last   (A,) the lines that each wavelet sees
+    edges         (rows + 1,) Hz, between the rows
+    """
+
+    lines: np.ndarray
+    weights: np.ndarray
+    first: np.ndarray
+    last: np.ndarray
+    edges: np.ndarray
+
+
+@lru_cache(maxsize=4)  # the same for all windows of a dataset
+def _filter_bank(points: int, sampling_rate_hz: float, settings: SstSettings) -> _FilterBank:
+    frequency, centre = frequency_axis(settings), _wavelets(settings)
     if centre[-1] >= sampling_rate_hz / 2:
         raise ValueError(
             f"max_frequency_hz {settings.max_frequency_hz:g} needs a sampling rate above "
             f"{2 * centre[-1]:g} Hz, got {sampling_rate_hz:g}"
         )
+    lines = np.arange(points // 2 + 1) * sampling_rate_hz / points
     # Morse wavelet in the frequency domain, peak one at its centre frequency
-    ratio = (lines[1:] / centre[:, None]).astype(float)
+    ratio = lines[1:] / centre[:, None]
     response = np.exp(BETA * np.log(ratio) + BETA / GAMMA * (1 - ratio**GAMMA))
     response = np.pad(response, ((0, 0), (1, 0)))  # no wavelet sees the mean
     seen = response > MIN_RESPONSE
     first, last = seen.argmax(1), seen.shape[1] - seen[:, ::-1].argmax(1)
     used = last.max()
-
-    spectrum = scipy.fft.rfft(signals, axis=-1)[:, :used] * (2 / points)
     # sum of the responses over wavelets: what one tone collects (an integral over log scale)
     step = np.log(centre[1] / centre[0])
     peak_frequency = (BETA / GAMMA) ** (1 / GAMMA)
     collected = (
         np.exp(BETA / GAMMA) * peak_frequency**-BETA * gamma_function(BETA / GAMMA) / GAMMA / step
     )
-    edges = (frequency[0] * np.exp(step * (np.arange(len(frequency) + 1) - 0.5))).astype(np.float32)
-    weights = (response[:, :used] / collected).astype(np.float32)
-    out = np.zeros((len(signals), len(frequency), COLUMNS), dtype=np.complex64)
-    folded = np.empty((2, len(centre), COLUMNS), dtype=np.complex64)
-    for signal, image in zip(spectrum.astype(np.complex64), out):
-        _fold(signal, weights, first, last, lines[:used].astype(np.float32), folded)
-        # torch's inverse FFT (MKL) is three times as fast as scipy's at this length
-        coefficients = torch.fft.ifft(torch.from_numpy(folded), norm="forward").numpy()
-        _reassign(coefficients[0], coefficients[1], edges, image)
-    return out
+    edges = frequency[0] * np.exp(step * (np.arange(len(frequency) + 1) - 0.5))
+    weights = response[:, :used] / collected
+    lines, weights, edges = (a.astype(np.float32) for a in (lines[:used], weights, edges))
+    return _FilterBank(lines, weights, first, last, edges)
 
 
 def frequency_axis(settings: SstSettings) -> np.ndarray:

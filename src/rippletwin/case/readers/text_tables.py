@@ -14,12 +14,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
-import pandas as pd
 
 from rippletwin.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 HEAD_BYTES = 65536
 HEAD_LINES = 200  # lines in which the header and the first rows are looked for
@@ -156,6 +158,8 @@ def _check_rows(path: Path, lines: list[str], form: TextFormat) -> None:
 
 def floats(column: pd.Series, form: TextFormat) -> np.ndarray:
     """A column of a table as floats; what is no number is NaN."""
+    import pandas as pd
+
     if form.decimal != "." and not pd.api.types.is_numeric_dtype(column):
         column = column.astype(str).str.replace(form.decimal, ".", regex=False)
     return pd.to_numeric(column, errors="coerce").to_numpy(float)

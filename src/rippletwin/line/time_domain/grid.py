@@ -109,7 +109,10 @@ class Grid:
             )
             recursions.append(weighting_functions.recursion(rate * self.dt))
         self.parameters = np.array(rows)
-        self.decays, self.gains, self.bends = np.array(recursions).transpose(1, 0, 2).copy()
+        # y_k <- e y_k + g dq - h dq_last is kept as z_k = e y_k - h dq after each step, so that
+        # y_k = z_k + g dq and z_k <- e z_k + (e g - h) dq: one change of the flow is enough
+        self.decays, self.gains, bends = np.array(recursions).transpose(1, 0, 2).copy()
+        self.pushes = self.decays * self.gains - bends
 
     def _set_load(self):
         """`load` for the kernel, see `JunctionArrays`."""
@@ -175,7 +178,7 @@ class Grid:
         for power, c in enumerate(self.laws[:, 1:].T):
             self.stored[0] += np.repeat(c, sizes) * x ** (power + 1)
         self.memory = np.zeros((len(weighting_functions.FRICTION_RATES), count))
-        self.change, self.last_change = np.zeros(count), np.zeros(count)
+        self.change = np.zeros(count)
         zc = np.repeat(self.parameters[:, 0], sizes)
         loss = np.repeat(self.parameters[:, 1], sizes) * self.flow
         self.forward = self.pressure + zc * self.flow - loss

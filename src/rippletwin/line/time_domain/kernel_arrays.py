@@ -19,7 +19,7 @@ class PipeArrays(NamedTuple):
     thetas      (P,) length of its last cell in steps, [2, 3)
     taps        (P, 4) weights of the last four waves that enter it
     parameters  (P, 4) Zc and r/2, Pa s/m3; u/2, Pa s/m3; sum_k share_k phi_k of the wall
-    decays, gains, bends   (P, T) recursion of unsteady friction
+    decays, gains, pushes  (P, T) recursion of unsteady friction: see `Grid`
     keep, follow, share    (P, K) recursion of a yielding wall: b <- keep b + follow p
     laws        (P, 1 + L) P in Pa and rho a^2 c_k of the nonlinear compliance; P = 0 without one
     """
@@ -31,7 +31,7 @@ class PipeArrays(NamedTuple):
     parameters: np.ndarray
     decays: np.ndarray
     gains: np.ndarray
-    bends: np.ndarray
+    pushes: np.ndarray
     keep: np.ndarray
     follow: np.ndarray
     share: np.ndarray
@@ -66,7 +66,7 @@ class StateArrays(NamedTuple):
     stored              (3, n) of the nonlinear compliance, times rho a^2: share stored, half a step
                         times its rate, and what it adds to the wall's lag
     memory              (T, n) states of unsteady friction
-    change, last_change (n,) of the flow over the last step and the one before
+    change              (n,) of the flow over the last step, where friction has a memory
     history             (P, 2, 4) last four waves into the long cell, towards the load and the pump
     filter_states       (R + 1, 2)
     """
@@ -80,6 +80,5 @@ class StateArrays(NamedTuple):
     stored: np.ndarray
     memory: np.ndarray
     change: np.ndarray
-    last_change: np.ndarray
     history: np.ndarray
     filter_states: np.ndarray

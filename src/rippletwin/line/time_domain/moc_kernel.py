@@ -15,25 +15,40 @@ VALVE = -1  # row of the load's valve among the filters
 VALVE_PASSES = 3  # of its opening, which hardly changes within a step
 NEW_RATE_SHARE = 0.501  # of the new rate in the mean over a step; 1/2 would keep a jump for ever
 
+# Written into the function that calls them: passing tuples of arrays takes longer than the work.
+INLINED = njit(cache=True, error_model="numpy", inline="always")
+
 # Functions of one pipe take views that start at its first node: the compiler then knows that no
 # index wraps, and vectorises.
 
 
 @njit(cache=True, error_model="numpy")
-def _update_friction(half_u, decay, gain, bend, flow, change, last_change, memory, known):
-    """Friction's memory y_k over the last step; `known` = half_u (sum e y - G q - H dq)."""
-    total_gain, total_bend = gain.sum(), bend.sum()
+def _update_friction(half_u, decay, gain, push, flow, change, memory, first, known):
+    """Friction's memory z_k after the last step; `known` = half_u (sum_k z_k - G q).
+
+    The pipe's part of `memory` is at its nodes from `first` on. Rows are cut out one by one: of a
+    cut through all rows the compiler would not know that a row is contiguous.
+    """
+    stop = first + len(flow)
+    total_gain = gain.sum()
     for i in range(len(flow)):
-        known[i] = -total_gain * flow[i] - total_bend * change[i]
-    for m in range(len(decay)):
-        e, g, h, y = decay[m], gain[m], bend[m], memory[m]
-        for i in range(len(flow)):
-            new = e * y[i] + g * change[i] - h * last_change[i]
-            y[i] = new
-            known[i] += e * new
+        known[i] = -total_gain * flow[i]
+    for m in range(0, len(decay), 2):
+        _add_two_terms(
+            decay[m], push[m], decay[m + 1], push[m + 1], change,
+            memory[m, first:stop], memory[m + 1, first:stop], known,
+        )  # fmt: skip
     for i in range(len(flow)):
         known[i] *= half_u
-        last_change[i] = change[i]
+
+
+@njit(cache=True, error_model="numpy")
+def _add_two_terms(e_1, d_1, e_2, d_2, change, z_1, z_2, known):
+    """z <- e z + d dq of two terms, added to `known`."""
+    for i in range(len(known)):
+        new_1, new_2 = e_1 * z_1[i] + d_1 * change[i], e_2 * z_2[i] + d_2 * change[i]
+        z_1[i], z_2[i] = new_1, new_2
+        known[i] += new_1 + new_2
 
 
 @njit(cache=True, error_model="numpy")
@@ -80,14 +95,51 @@ def _update_stored(pressure, stored, soft, give, lag):
         lag[i] -= stored[2, i] + rate
 
 
+@INLINED
+def _is_rigid(k, pipes):
+    """Whether pipe k stores by its elastic wall alone. Then only its waves are kept."""
+    return pipes.parameters[k, 3] == 0.0 and not pipes.laws[k, 0] > 0.0
+
+
 @njit(cache=True, error_model="numpy")
-def _solve_rigid_nodes(b, pressure, flow, change, forward, backward, known):
-    """Interior nodes between two ordinary cells."""
-    over = 0.5 / b
-    for i in range(1, len(flow) - 2):
-        up, down = forward[i - 1] - known[i], backward[i + 1] + known[i]
-        pressure[i] = 0.5 * (up + down)
-        new = over * (up - down)
+def _pass_waves(share, forward, backward, next_forward, next_backward):
+    """The waves that leave interior nodes of a rigid pipe, before what friction remembers.
+
+    They are p +- c q of p = (up + down)/2, q = (up - down)/(2 b) with c = `share` b. Pressure and
+    flow are not kept, for they follow from the waves: see `_read_flow`.
+    """
+    most, least = 0.5 * (1.0 + share), 0.5 * (1.0 - share)
+    for i in range(1, len(forward) - 2):
+        up, down = forward[i - 1], backward[i + 1]
+        next_forward[i] = most * up + least * down
+        next_backward[i] = least * up + most * down
+
+
+# A loop over more than five arrays is not vectorised, so these are loops of their own.
+
+
+@njit(cache=True, error_model="numpy")
+def _lose_before(known, forward, backward):
+    """Take off what friction remembers at the end of the cells that lead to interior nodes."""
+    for i in range(1, len(known) - 2):
+        forward[i - 1] -= known[i]
+        backward[i + 1] += known[i]
+
+
+@njit(cache=True, error_model="numpy")
+def _lose_after(known, forward, backward):
+    """The same at the beginning of the cells that lead away from them."""
+    for i in range(1, len(known) - 2):
+        forward[i] -= known[i]
+        backward[i] += known[i]
+
+
+@njit(cache=True, error_model="numpy")
+def _read_flow(carried, forward, backward, known, flow, change):
+    """Flow of a rigid pipe's interior nodes from the waves that leave them, and its change."""
+    over = 1.0 / carried
+    for i in range(1, len(known) - 2):
+        new = over * (0.5 * (forward[i] - backward[i]) + known[i])
         change[i] = new - flow[i]
         flow[i] = new
 
@@ -105,19 +157,13 @@ def _solve_yielding_nodes(b, give, lag, pressure, flow, change, forward, backwar
 
 
 @njit(cache=True, error_model="numpy")
-def _update_waves(carried, yields, give, lag, pressure, flow, known, forward, backward):
-    """Waves that leave every node, less half the losses of an ordinary cell."""
-    if not yields:
-        for i in range(len(flow)):
-            wave = carried * flow[i] - known[i]
-            forward[i] = pressure[i] + wave
-            backward[i] = pressure[i] - wave
-    else:
-        for i in range(len(flow)):
-            wave = carried * flow[i] - known[i]
-            still = pressure[i] - (give[i] * pressure[i] - lag[i])
-            forward[i] = still + wave
-            backward[i] = still - wave
+def _update_waves(carried, give, lag, pressure, flow, known, forward, backward):
+    """Waves that leave every node of a yielding pipe, less half the losses of an ordinary cell."""
+    for i in range(len(flow)):
+        wave = carried * flow[i] - known[i]
+        still = pressure[i] - (give[i] * pressure[i] - lag[i])
+        forward[i] = still + wave
+        backward[i] = still - wave
 
 
 @njit(cache=True, error_model="numpy")
@@ -137,7 +183,7 @@ def _orifice_drop(excess, b, coefficient):
     return np.sign(excess) * x * x
 
 
-@njit(cache=True, error_model="numpy")
+@INLINED
 def _solve_junction(supply, slope, first, stop, junctions, state, ends, kept, joint, load):
     """Pressures at a junction whose rungs are `first` to `stop`, in order from the pump.
 
@@ -193,10 +239,10 @@ def _solve_junction(supply, slope, first, stop, junctions, state, ends, kept, jo
     return p, far
 
 
-@njit(cache=True, error_model="numpy")
-def _solve_inside(k, pipes, state, known, lag, give, ends):
+@INLINED
+def _solve_inside(k, pipes, state, waves, leaving, known, lag, give, ends):
     """New state between the ends of pipe k, and in `ends` what the pipe brings to its junctions:
-    q = +-(supply - slope p)."""
+    q = +-(supply - slope p). Of a rigid pipe also the waves `leaving` its interior nodes."""
     first, last = pipes.offsets[k], pipes.offsets[k + 1] - 1
     near, theta = last - 1, pipes.thetas[k]
     zc, half_r, half_u, soft = pipes.parameters[k]
@@ -204,17 +250,22 @@ def _solve_inside(k, pipes, state, known, lag, give, ends):
     b, b_long = zc + half_r + half_u * gain, zc + theta * (half_r + half_u * gain)
     here = slice(first, last + 1)
     pressure, flow, change = state.pressure, state.flow, state.change
-    forward, backward = state.forward, state.backward
+    forward, backward = waves
     if half_u > 0.0:
         _update_friction(
-            half_u, pipes.decays[k], pipes.gains[k], pipes.bends[k], flow[here], change[here],
-            state.last_change[here], state.memory[:, here], known[here],
+            half_u, pipes.decays[k], pipes.gains[k], pipes.pushes[k], flow[here], change[here],
+            state.memory, first, known[here],
         )  # fmt: skip
-    now = pressure[here], flow[here], change[here]
-    waves = forward[here], backward[here], known[here]
     nonlinear = pipes.laws[k, 0] > 0.0
-    if soft == 0.0 and not nonlinear:
-        _solve_rigid_nodes(b, *now, *waves)
+    if _is_rigid(k, pipes):
+        carried = zc - half_r - half_u * gain
+        before, after = (forward[here], backward[here]), (leaving[0][here], leaving[1][here])
+        if half_u > 0.0:
+            _lose_before(known[here], *before)
+        _pass_waves(carried / b, *before, *after)
+        if half_u > 0.0:
+            _lose_after(known[here], *after)
+            _read_flow(carried, *after, known[here], flow[here], change[here])
     else:
         _update_wall(
             pipes.keep[k], pipes.follow[k], pipes.share[k], pressure[here],
@@ -225,7 +276,10 @@ def _solve_inside(k, pipes, state, known, lag, give, ends):
                 pipes.laws[k], state.steady[here], pressure[here], state.stored[:, here], soft,
                 give[here], lag[here],
             )  # fmt: skip
-        _solve_yielding_nodes(b, give[here], lag[here], *now, *waves)
+        _solve_yielding_nodes(
+            b, give[here], lag[here], pressure[here], flow[here], change[here], forward[here],
+            backward[here], known[here],
+        )  # fmt: skip
 
     # Waves through the last cell, theta steps old.
     to_end = to_near = 0.0
@@ -248,10 +302,10 @@ def _solve_inside(k, pipes, state, known, lag, give, ends):
     ends[1, k, 1] = (1.0 + theta * give[last]) / b_long
 
 
-@njit(cache=True, error_model="numpy")
-def _solve_ends(k, pipes, state, known, lag, give, ends, joint):
-    """New state at the ends of pipe k from the pressures at its junctions, and the waves that leave
-    its nodes."""
+@INLINED
+def _solve_ends(k, pipes, state, leaving, known, lag, give, ends, joint):
+    """New state at the ends of pipe k from the pressures at its junctions, and the waves `leaving`
+    its nodes; those of a rigid pipe's interior nodes are there already."""
     first, last = pipes.offsets[k], pipes.offsets[k + 1] - 1
     near, theta = last - 1, pipes.thetas[k]
     zc, half_r, half_u, soft = pipes.parameters[k]
@@ -269,10 +323,15 @@ def _solve_ends(k, pipes, state, known, lag, give, ends, joint):
     nonlinear = pipes.laws[k, 0] > 0.0
     if nonlinear:
         _update_stored(pressure[here], state.stored[:, here], soft, give[here], lag[here])
-    _update_waves(
-        zc - total, soft != 0.0 or nonlinear, give[here], lag[here], pressure[here], flow[here],
-        known[here], state.forward[here], state.backward[here],
-    )  # fmt: skip
+    if not _is_rigid(k, pipes):
+        _update_waves(
+            zc - total, give[here], lag[here], pressure[here], flow[here], known[here],
+            leaving[0][here], leaving[1][here],
+        )  # fmt: skip
+    else:
+        for i in (first, near, last):
+            wave = (zc - total) * flow[i] - known[i]
+            leaving[0][i], leaving[1][i] = pressure[i] + wave, pressure[i] - wave
     for age in range(3, 0, -1):
         history[k, 0, age] = history[k, 0, age - 1]
         history[k, 1, age] = history[k, 1, age - 1]
@@ -293,16 +352,24 @@ def advance(source, nodes, pipes, junctions, state):
     count, main, steps = len(pipes.thetas), pipes.main, len(source)
     law, coefficient, outside, constant, conductance = junctions.load
     seen_p, seen_q = np.empty((len(nodes), steps)), np.empty((len(nodes), steps))
-    # (u/2)(sum e_k y_k - G q - H dq): friction of the past at the new point
+    # (u/2)(sum z_k - G q): friction of the past at the new point
     known, lag, give = np.zeros((3, len(state.pressure)))
     for k in range(count):
         give[pipes.offsets[k] : pipes.offsets[k + 1]] = pipes.parameters[k, 3]
     ends = np.zeros((2, count, 2))  # supply and slope that a pipe brings to the joint at each end
     joint = np.empty((count, 2))
+    waves = state.forward, state.backward
+    leaving = np.empty_like(state.forward), np.empty_like(state.backward)
     supply, slope, kept = np.empty(2), np.empty(2), np.empty((len(junctions.kinds), 2))
+    carried = np.zeros(count)  # c of the waves p +- (c q - known) in rigid pipes
+    for k in range(count):
+        if _is_rigid(k, pipes):
+            zc, half_r, half_u, _ = pipes.parameters[k]
+            carried[k] = zc - half_r - half_u * pipes.gains[k].sum()
+    homes = np.searchsorted(pipes.offsets, nodes, side="right") - 1  # the pipes of `nodes`
     for n in range(steps):
         for k in range(count):
-            _solve_inside(k, pipes, state, known, lag, give, ends)
+            _solve_inside(k, pipes, state, waves, leaving, known, lag, give, ends)
         for j in range(main + 1):
             supply[:], slope[:] = 0.0, 0.0
             if j == 0:
@@ -325,7 +392,20 @@ def advance(source, nodes, pipes, junctions, state):
         for k in range(main, count):
             joint[k, 1] = ends[0, k, 1] / ends[1, k, 1]  # a branch's closed end
         for k in range(count):
-            _solve_ends(k, pipes, state, known, lag, give, ends, joint)
+            _solve_ends(k, pipes, state, leaving, known, lag, give, ends, joint)
+        waves, leaving = leaving, waves
         for j in range(len(nodes)):
-            seen_p[j, n], seen_q[j, n] = state.pressure[nodes[j]], state.flow[nodes[j]]
+            i, k = nodes[j], homes[j]
+            seen_p[j, n], seen_q[j, n] = state.pressure[i], state.flow[i]
+            if carried[k] > 0.0:
+                seen_p[j, n] = 0.5 * (waves[0][i] + waves[1][i])
+                seen_q[j, n] = (0.5 * (waves[0][i] - waves[1][i]) + known[i]) / carried[k]
+    if steps % 2:  # the waves that left last are not in the state's arrays
+        state.forward[:], state.backward[:] = waves
+    for k in range(count):
+        if carried[k] > 0.0:
+            here = slice(pipes.offsets[k], pipes.offsets[k + 1])
+            state.pressure[here] = 0.5 * (state.forward[here] + state.backward[here])
+            state.flow[here] = 0.5 * (state.forward[here] - state.backward[here]) + known[here]
+            state.flow[here] /= carried[k]
     return seen_p, seen_q

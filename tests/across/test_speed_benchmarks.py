@@ -1,0 +1,201 @@
+"""The machinery of `make bench` works on tiny sizes; no time is tested."""
+
+from __future__ import annotations
+
+import ast
+import json
+import re
+
+import numpy as np
+import pytest
+
+from paths import ROOT
+from speed import (
+    calibration,
+    explaining,
+    growth,
+    images,
+    line_frequency_domain,
+    line_time_domain,
+    machine,
+    starting,
+    training,
+    workflow,
+)
+from speed.page import advantage, write
+from speed.result import Claim, Result, Table
+from speed.timing import alternate, median_ratio
+
+PEERS_ALONE = {"rthym_moc", "ptsnet", "tsnet", "openwind"}
+"""Import names of the programs that only benchmarks and tests may import."""
+
+
+def record(result: Result) -> dict:
+    """What a benchmark's process writes."""
+    return {
+        "name": "made",
+        "machine": machine.describe(),
+        "peers": {"other": "1.2"},
+        "result": json.loads(json.dumps(result.to_json())),
+    }
+
+
+def test_tasks_are_measured_in_turns_and_long_enough():
+    """With a clock that each task advances by its own time: the times are those, in turns, and a
+    short task is repeated within a measurement."""
+    now, order = [0.0], []
+
+    def task(name, seconds):
+        def run():
+            now[0] += seconds
+            order.append(name)
+
+        return run
+
+    tasks = {"short": task("short", 0.005), "long": task("long", 0.5)}
+    times = alternate(tasks, 3, clock=lambda: now[0])
+    assert times["short"] == pytest.approx(np.full(3, 0.005))
+    assert times["long"] == pytest.approx(np.full(3, 0.5))
+    assert median_ratio(times["long"], times["short"]) == pytest.approx(100.0)
+    a_round = ["short"] * (order[4:].index("long")) + ["long"]
+    assert len(a_round) == 5 and order[4:] == a_round * 3
+
+
+def test_a_slow_moment_of_the_machine_does_not_move_the_ratio():
+    """All tasks of one round take ten times as long: the median of ratios within rounds stays."""
+    busy = np.array([1.0, 1.0, 10.0, 1.0, 1.0])
+    assert median_ratio(6.0 * busy, 2.0 * busy) == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    ("claim", "met"),
+    [
+        (Claim("a", 2.0, 1.5), True),
+        (Claim("a", 1.0, 1.5), False),
+        (Claim("a", 0.2, 0.5, "s", at_least=False), True),
+        (Claim("a", 0.9, 0.5, "s", at_least=False), False),
+        (Claim("a", None, 0.5), None),
+        (Claim("a", 1.0, None), None),
+    ],
+)
+def test_a_claim_knows_whether_it_is_met(claim, met):
+    """Either way round, and undecided without a number or a target."""
+    assert claim.met is met
+    if met is not None:
+        assert (advantage(claim) >= 1) is met
+
+
+def test_the_page_says_plainly_what_is_missed(tmp_path):
+    """A page made of records has a row for each claim with a target, with what is missed and what
+    was not measured, the peers' versions and the instructions that the processor has not."""
+    claims = [
+        Claim("fast thing", 3.0, 2.0),
+        Claim("slow thing", 0.7, 0.5, "s", at_least=False),
+        Claim("other thing", None, 5.0),
+    ]
+    table = Table("Times", ["who", "time"], [["we", "1 s"]])
+    result = Result(1, "Made", ["Something is compared."], claims, [table], ["It is bound."])
+    page, picture = tmp_path / "page.md", tmp_path / "figures" / "benchmarks.svg"
+    write([record(result)], page, picture)
+    text = page.read_text()
+    assert "1 of 3 targets are missed" in text
+    assert re.search(r"\| fast thing \| at least 2 times \| 3 times \| yes", text)
+    assert re.search(r"\| slow thing \| at most 0.5 s \| 0.7 s \| \*\*no\*\*", text)
+    assert re.search(r"\| other thing \| .* \| not measured \| not measured", text)
+    assert "other 1.2" in text and "The bound: It is bound." in text and "| we | 1 s |" in text
+    lacking = [name for name, there in machine.describe()["instructions"].items() if not there]
+    assert all(name in text for name in lacking)
+    assert "<svg" in picture.read_text()
+    assert Result.from_json(record(result)["result"]) == result
+
+
+def test_the_page_of_the_docs_is_that_of_the_results(tmp_path):
+    """docs/benchmarks.md is what the kept results give; else run `python benchmarks/bench.py
+    --page-only`."""
+    kept = sorted((ROOT / "benchmarks" / "results").glob("*.json"))
+    assert kept
+    write([json.loads(path.read_text()) for path in kept], tmp_path / "p.md", tmp_path / "p.svg")
+    assert (tmp_path / "p.md").read_text() == (ROOT / "docs" / "benchmarks.md").read_text()
+
+
+def test_the_peers_are_no_requirement_of_the_tool():
+    """Nothing of src/ imports a program that is measured beside the tool (openwind is under the
+    GPL), environment.txt has none of them, and each is pinned for `make bench`."""
+    for path in (ROOT / "src").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            names += [n.name for n in node.names] if isinstance(node, ast.Import) else []
+            assert not PEERS_ALONE & {name.split(".")[0] for name in names}, path
+
+    def pins(name):
+        lines = (ROOT / name).read_text().lower().splitlines()
+        return {line.split("==")[0] for line in lines if "==" in line}
+
+    own = pins("environment.txt")
+    bench = pins("environment-bench.txt") | pins("environment-bench-numpy1.txt")
+    alone = {name.replace("_", "-") for name in PEERS_ALONE}
+    assert not alone & own and alone <= bench
+    assert set(machine.PEERS) <= own | bench
+
+
+def test_rises_are_compared_away_from_the_fronts():
+    """Two square waves one step apart differ nowhere; one of another height does."""
+    cells, count = 50, 400
+    wave = np.where(np.arange(count) // (2 * cells) % 2 == 0, 1.0, -1.0)
+    late = np.roll(wave, 1)
+    assert line_time_domain.difference(wave, late, cells) == 0.0
+    assert line_time_domain.difference(wave, 1.1 * wave, cells) == pytest.approx(0.1)
+
+
+def test_operations_of_a_network_are_those_counted_by_hand():
+    """CNN2D (3x3@1) on 8 pixels: 64 maps of 2 x 9 taps at 64 places, then 64 x 9 taps at 16; the
+    first layer has no gradient of its input."""
+    from rippletwin.learning.networks import build
+
+    torch = pytest.importorskip("torch")
+    first, second = 2 * 64 * 18 * 64, 2 * 64 * 576 * 16
+    step, forward = training.operations(build("cnn2d_3_1", 2), torch.zeros(1, 2, 8, 8))
+    assert forward == first + second
+    assert step == 2 * first + 3 * second
+
+
+def test_plain_networks_are_the_same_networks():
+    """As many parameters as the tool's, in one and two dimensions, with residual blocks."""
+    from rippletwin.learning.architectures import ARCHITECTURES
+    from rippletwin.learning.networks import build
+    from speed.training_loops import plain_network
+
+    for name in ("cnn1d_341_100", "cnn2d_7_2", "resnet18_1d", "resnet18_2d"):
+        plain, own = plain_network(ARCHITECTURES[name], 2), build(name, 2)
+        assert sum(p.numel() for p in plain.parameters()) == sum(
+            p.numel() for p in own.parameters()
+        )
+
+
+@pytest.mark.parametrize("benchmark", [line_time_domain, growth, workflow])
+def test_a_benchmark_runs_on_tiny_sizes(benchmark, monkeypatch):
+    """Its result has claims and texts, and can be written as JSON."""
+    monkeypatch.delenv(line_time_domain.NETWORK_PYTHON, raising=False)
+    monkeypatch.delenv(workflow.RUN, raising=False)
+    result = benchmark.run(quick=True)
+    assert result.claims and result.what
+    assert Result.from_json(json.loads(json.dumps(result.to_json()))) == result
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "benchmark",
+    [line_frequency_domain, calibration, explaining, images, training, starting],
+)
+def test_a_longer_benchmark_runs_on_tiny_sizes(benchmark, monkeypatch):
+    """The same for those that take half a minute; training and starting in their processes."""
+    paths = [str(ROOT / "benchmarks"), str(ROOT / "src")]
+    monkeypatch.setenv("PYTHONPATH", ":".join(paths))
+    result = benchmark.run(quick=True)
+    assert result.claims and result.what
+    assert Result.from_json(json.loads(json.dumps(result.to_json()))) == result
+
+
+def test_rates_of_the_machine_are_positive():
+    """Copying and multiplying give finite rates, of the same order in two calls."""
+    assert machine.copy_rate(2**14, rounds=1) > 0 and machine.product_rate(rounds=1) > 0
