@@ -7,7 +7,7 @@ export OMP_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 export NUMBA_NUM_THREADS = 1
 
-.PHONY: run smoke test test-long lint docs-site bench clean
+.PHONY: run smoke test test-long lint docs-site bench pins audit clean
 
 run: .venv/ready
 	$(BIN)/snakemake --cores $(CORES)
@@ -48,5 +48,23 @@ $(BENCH)/ready: environment.txt environment-bench.txt environment-bench-numpy1.t
 	$(BIN)/python -m pip install --quiet --requirement environment.txt
 	touch $@
 
+# The newest version of every package that pyproject.toml allows, as the new environment.txt.
+pins:
+	rm -rf .venv-pins
+	$(PYTHON) -m venv .venv-pins
+	.venv-pins/bin/python -m pip install --quiet ".[dev]"
+	echo "# Every package of the environment, pinned; the last line installs the project itself." > .venv-pins/pins
+	.venv-pins/bin/python -m pip freeze --exclude rippletwin >> .venv-pins/pins
+	echo "-e ." >> .venv-pins/pins
+	mv .venv-pins/pins environment.txt
+	rm -rf .venv-pins
+
+# Known vulnerabilities of the pinned packages; asks the package index.
+audit:
+	$(PYTHON) -m venv .venv-audit
+	.venv-audit/bin/python -m pip install --quiet pip-audit
+	grep -v "^-e" environment.txt > .venv-audit/pins
+	.venv-audit/bin/pip-audit --requirement .venv-audit/pins --no-deps --disable-pip
+
 clean:
-	rm -rf .venv $(BENCH) .snakemake .site results
+	rm -rf .venv .venv-* .snakemake .site results

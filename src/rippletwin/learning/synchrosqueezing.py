@@ -142,10 +142,8 @@ def _filter_bank(points: int, sampling_rate_hz: float, settings: SstSettings) ->
     )
     edges = frequency[0] * np.exp(step * (np.arange(len(frequency) + 1) - 0.5))
     weights = response[:, :used] / collected
-    return _FilterBank(
-        *(a.astype(np.float32) for a in (lines[:used], weights)), first, last,
-        edges.astype(np.float32),
-    )  # fmt: skip
+    lines, weights, edges = (a.astype(np.float32) for a in (lines[:used], weights, edges))
+    return _FilterBank(lines, weights, first, last, edges)
 
 
 def frequency_axis(settings: SstSettings) -> np.ndarray:

@@ -148,7 +148,7 @@ def _parameters(rig, place):
         Parameter("wave_speed_ratio", "1", lognormal(0.75, 0.35), (-1.0, 1.0)),
         Parameter("compliance_ratio", "1", lognormal(0.03, 1.5)),
         Parameter("retardation_time", "s", lognormal(1e-4, 1.3)),
-        Parameter("conductance", "m3/(Pa s)", lognormal(0.01 * unit, 2.0)),
+        Parameter("conductance", "m3/(Pa s)", lognormal(0.01 * unit, 1.5)),
     )
 
 
