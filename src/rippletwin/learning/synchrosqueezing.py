@@ -142,8 +142,10 @@ def _filter_bank(points: int, sampling_rate_hz: float, settings: SstSettings) ->
     )
     edges = frequency[0] * np.exp(step * (np.arange(len(frequency) + 1) - 0.5))
     weights = response[:, :used] / collected
-    lines, weights, edges = (a.astype(np.float32) for a in (lines[:used], weights, edges))
-    return _FilterBank(lines, weights, first, last, edges)
+    single = np.float32
+    return _FilterBank(
+        lines[:used].astype(single), weights.astype(single), first, last, edges.astype(single)
+    )
 
 
 def frequency_axis(settings: SstSettings) -> np.ndarray:
