@@ -1,5 +1,7 @@
 """The stepwise search: what it accepts, what it rejects, and what it reaches."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,12 @@ from rippletwin.calibration.misfit import relative_misfit
 from rippletwin.calibration.posterior import MIN_MODEL_ERROR
 from rippletwin.explanation.checks.cross_validation import cross_validate
 from rippletwin.explanation.fit_jobs import Workers
-from rippletwin.explanation.search.stepwise_search import resume_search, search_effects
+from rippletwin.explanation.search.stepwise_search import (
+    Search,
+    _search_stepwise,
+    resume_search,
+    search_effects,
+)
 from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
@@ -81,3 +88,31 @@ def test_the_search_names_the_effect_and_it_holds_on_held_out_points(small_libra
     assert resumed.log_bayes_factor(resumed.best) == pytest.approx(
         search.log_bayes_factor(search.best), abs=0.5
     )
+
+
+def test_the_search_ends_where_what_is_added_is_dropped_again(monkeypatch):
+    """Each effect that is added makes the other needless, so that the search could go from one to
+    the other for ever: it visits no hypothesis twice, and ends at the better one."""
+    module = "rippletwin.explanation.search.stepwise_search"
+
+    def fit(*hypothesis, evidence):
+        return SimpleNamespace(hypothesis=hypothesis, evidence=evidence, label=str(hypothesis))
+
+    hose, gain = fit(HOSE, evidence=100.0), fit(GAIN, evidence=101.0)
+    revised = {(HOSE, GAIN): gain, (GAIN, HOSE): hose}
+    rounds = []
+
+    def extend(workers, best, candidates, progress):
+        rounds.append(best.label)
+        assert len(rounds) < 10
+        other = HOSE if best is gain else GAIN
+        return [fit(*best.hypothesis, other, evidence=best.evidence + 20.0)]
+
+    monkeypatch.setattr(f"{module}.fit_extensions", extend)
+    monkeypatch.setattr(f"{module}._revise", lambda workers, best, _: revised[best.hypothesis])
+    monkeypatch.setattr(f"{module}.exchange_effects", lambda workers, best, _: best)
+    monkeypatch.setattr(f"{module}.move_to_best_position", lambda workers, best: (best, []))
+    monkeypatch.setattr(f"{module}.fit_substitutes", lambda *_: [])
+    found = _search_stepwise(None, Search(fit(evidence=0.0), [], hose), [], None)
+    assert found.best is gain
+    assert rounds == [hose.label, gain.label]

@@ -136,7 +136,7 @@ def _search_stepwise(
     extensions = single_effect_fits
     if not any(f.hypothesis[:-1] == best.hypothesis for f in extensions):
         extensions = fit_extensions(workers, best, candidates, progress)
-    visited = {best.label}
+    visited = {frozenset(best.hypothesis)}
     while True:
         extended = _accepted_extension(best, extensions)
         if extended is None and best.label == settled:
@@ -146,14 +146,20 @@ def _search_stepwise(
             moved, other_positions = move_to_best_position(workers, exchanged)
             if exchanged is not best:
                 moved = _revise(workers, moved, candidates)
-            if moved is best or (exchanged is not best and moved.label in visited):
+            was_there = frozenset(moved.hypothesis) in visited
+            if moved is best or (exchanged is not best and was_there):
                 break  # a simpler effect is preferred to a slightly better one: no way round
             best = moved
         else:
+            revised = _revise(workers, extended, candidates)
+            if frozenset(revised.hypothesis) in visited:
+                # What it adds is dropped or simplified away again: the next one.
+                extensions = [f for f in extensions if f is not extended]
+                continue
             if extensions is not single_effect_fits:
                 rivals = [*rivals, *extensions]
-            best = _revise(workers, extended, candidates)
-        visited.add(best.label)
+            best = revised
+        visited.add(frozenset(best.hypothesis))
         extensions = fit_extensions(workers, best, candidates, progress)
     substitutes = fit_substitutes(workers, best, candidates)
     if substitutes and substitutes[0].evidence > best.evidence + MIN_IMPROVEMENT:
