@@ -52,12 +52,12 @@ def score_case(
     true, named = truth["effects"], named_effects(verdict)
     nuisance = truth.get("nuisance", [])
     classes = [set(names) for names in [*verdict["equivalents"], *truth["classes"]]]
-    claims = assign_claims(true, named, classes)
+    claims = assign_claims(true, named, classes, truth["length"])
     found = [(effect, claim) for effect, claim in zip(true, claims) if claim is not None]
     rest = [claim for claim in named if not any(claim is each for each in claims)]
     there = [
         claim
-        for effect, claim in zip(nuisance, assign_claims(nuisance, rest, []))
+        for effect, claim in zip(nuisance, assign_claims(nuisance, rest, [], truth["length"]))
         if claim is not None and is_place_right(effect, claim, truth["length"])
     ]
     right = [any(claim is each for each in [*claims, *there]) for claim in named]
@@ -125,20 +125,20 @@ def same_or_equivalent(name: str, other: str, classes: Sequence[set]) -> bool:
 
 
 def assign_claims(
-    true: Sequence[dict], named: Sequence[dict], classes: Sequence[set]
+    true: Sequence[dict], named: Sequence[dict], classes: Sequence[set], length: float
 ) -> list[dict | None]:
     """For each true effect the named effect that counts for it, or None.
 
     A named effect counts for one true effect at most, also where its class holds two. The
     assignment finds as many true effects as possible; among those the most by their own names, and
-    then the most at their own elements.
+    then the most at their own places. `length` is the line's, m.
     """
     gain = np.zeros((len(true), len(named)))
     for k, effect in enumerate(true):
         for n, claim in enumerate(named):
             if same_or_equivalent(claim["name"], effect["name"], classes):
                 same_name = claim["name"] == effect["name"]
-                gain[k, n] = 1e4 + 1e2 * same_name + (claim["element"] == effect["element"])
+                gain[k, n] = 1e4 + 1e2 * same_name + is_place_right(effect, claim, length)
     assigned = [None] * len(true)
     for k, n in zip(*linear_sum_assignment(gain, maximize=True)):
         if gain[k, n] > 0:

@@ -82,11 +82,27 @@ def test_an_effect_named_twice_where_there_is_one_is_wrong_once():
 def test_assignment_finds_many_effects_before_own_names():
     """Of two true effects A and B with claims A and C, where C can only stand for A, the claim A
     goes to B, which finds both."""
-    true = [{"name": name, "element": "line"} for name in "AB"]
-    named = [{"name": name, "element": "line"} for name in "AC"]
-    assert assign_claims(true, named, [{"A", "B"}, {"A", "C"}]) == [named[1], named[0]]
-    assert assign_claims(true, named, []) == [named[0], None]
-    assert assign_claims([], named, []) == [] and assign_claims(true, [], []) == [None, None]
+    true = [{"name": name, "element": "line", "position": None} for name in "AB"]
+    named = [{"name": name, "element": "line", "parameters": {}} for name in "AC"]
+    classes = [{"A", "B"}, {"A", "C"}]
+    assert assign_claims(true, named, classes, 5.0) == [named[1], named[0]]
+    assert assign_claims(true, named, [], 5.0) == [named[0], None]
+    assert assign_claims([], named, [], 5.0) == []
+    assert assign_claims(true, [], [], 5.0) == [None, None]
+
+
+def test_of_alike_effects_the_one_at_the_claimed_place_is_found():
+    """Three cavities are there and one is named, at the third one's place: that one is found."""
+    volumes = [
+        {"name": "line_volume", "element": "position", "position": x, "position_nominal": x}
+        for x in (0.3, 3.0, 5.3)
+    ]
+    named = {
+        "name": "line_volume",
+        "element": "position",
+        "parameters": {"position": {"ci95": [5.2, 5.29]}},
+    }
+    assert assign_claims(volumes, [named], [], 6.4) == [None, None, named]
 
 
 def test_no_effect_and_effects_outside_the_library():
