@@ -12,7 +12,7 @@ from speed.result import Claim, Result, Table
 
 INTRODUCTION = """# Benchmarks
 
-<!-- Written by `python benchmarks/bench.py`; do not edit. -->
+<!-- Written by benchmarks/bench.py; do not edit. -->
 
 How fast the tool is, beside other programs that solve the same. The command that measures writes
 this page and its figure:

@@ -36,7 +36,9 @@ def test_a_state_scales_the_wave_speeds_of_its_recording_alone(observed):
         index = twin.index[f"wave_speed[{k}]"]
         p = twin.parameters[index]
         faster[index] = p.prior.coordinate(factor * p.value(theta[index]))
-    assert np.allclose(second, twin.predict(data, faster)[1], rtol=1e-9)
+    # To the tolerance to which the orifice is solved.
+    other = twin.predict(data, faster)[1]
+    assert np.linalg.norm(second - other) < 1e-9 * np.linalg.norm(other)
 
 
 def test_its_derivative_is_the_difference_quotient(observed):

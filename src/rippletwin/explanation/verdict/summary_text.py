@@ -204,7 +204,7 @@ def _data_sheet_rivals(e: Explanation, fit: dict) -> list[str]:
 
     Their misfits have the nominal ripple: where it is wrong they compare nothing.
     """
-    if _ripple_error(fit):
+    if any(o.source == "nominal" for o in e.observations) and _ripple_error(fit):
         return []
     return [
         f"Without {spaced(s.effect)} ({s.place}) the line would fit to {s.misfit:.1%} with "
