@@ -148,9 +148,10 @@ def test_a_wrong_ripple_is_told_apart_from_a_wrong_line():
     """With the nominal ripple a misfit of 40 % beside a model error of 1 % is the ripple's, and
     both misfits are told; one of 2 % is not."""
     fit = {"model_error": {"after": 0.01}, "after": {"in_sample": 0.02}}
-    (sentence,) = _ripple_error(fit | {"nominal_ripple": {"in_sample": 0.4}})
+    e = SimpleNamespace(observations=[SimpleNamespace(source="nominal")])
+    (sentence,) = _ripple_error(e, fit | {"nominal_ripple": {"in_sample": 0.4}})
     assert "misses 40% of the reading" in sentence and "2.0%" in sentence
-    assert _ripple_error(fit | {"nominal_ripple": {"in_sample": 0.02}}) == []
+    assert _ripple_error(e, fit | {"nominal_ripple": {"in_sample": 0.02}}) == []
 
 
 def test_an_unknown_load_and_uncalibrated_sensors_are_told():

@@ -15,7 +15,6 @@ import numpy as np
 
 from rippletwin.calibration.fit import posterior_at_fit
 from rippletwin.calibration.misfit import predict_with_ripple
-from rippletwin.calibration.ripple_correction import correct_ripple
 from rippletwin.explanation.checks.profile_intervals import effect_intervals
 from rippletwin.explanation.localise.missing_immittance import missing_immittance
 from rippletwin.explanation.localise.residual_bands import residual_map
@@ -146,8 +145,7 @@ def _points(e: Explanation) -> list[Point]:
         posterior = posterior_at_fit(fit, e.observations)
         values = posterior.best_source(posterior.predict(fit.twin.theta))
         if name == "corrected":
-            ripple = correct_ripple(fit, e.observations)
-            values = predict_with_ripple(posterior, values, ripple)
+            values = predict_with_ripple(posterior, values, e.ripple)
         curves[name] = [values[:, part] for part in posterior.forward.slices]
         curves["measured"] = [posterior.values[:, part] for part in posterior.forward.slices]
         maps[f"residual_{name}"] = residual_map(fit, e.observations)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.ripple_correction import correct_ripple
@@ -17,6 +18,7 @@ from rippletwin.explanation.localise.shaft_orders import ShaftOrders
 from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
 from rippletwin.explanation.verdict.decision import Decision
+from rippletwin.twin.corrected_ripple import CorrectedRipple
 from rippletwin.twin.twin import Twin
 
 
@@ -73,5 +75,9 @@ class Explanation:
     @property
     def twin(self) -> Twin:
         """The corrected twin, which later stages use."""
-        accepted = self.decision.accepted
-        return accepted.twin.with_(ripple=correct_ripple(accepted, self.observations))
+        return self.decision.accepted.twin.with_(ripple=self.ripple)
+
+    @cached_property
+    def ripple(self) -> CorrectedRipple:
+        """The pump's flow ripple as the accepted fit corrects it."""
+        return correct_ripple(self.decision.accepted, self.observations)

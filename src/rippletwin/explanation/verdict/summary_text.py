@@ -66,8 +66,8 @@ def summary_text(e: Explanation, result: dict, entries: Sequence[dict]) -> str:
             sentences.append("Its place or form is not determined: see equivalents.")
         sentences += _source_free(e)
     sentences += _remainder(result["remainder"])
-    if entries and any(o.source == "nominal" for o in e.observations):
-        sentences += _ripple_error(result["fit"])
+    if entries:
+        sentences += _ripple_error(e, result["fit"])
     sentences += _unfinished_fit(result["fit"])
     sentences += pump_sentences(result["pump"])
     sentences += load_sentences(result["load"])
@@ -173,8 +173,11 @@ def _remainder(remainder: dict | None) -> list[str]:
     return sentences
 
 
-def _ripple_error(fit: dict) -> list[str]:
-    """How wrong the pump's nominal ripple is, where it is more wrong than the line."""
+def _ripple_error(e: Explanation, fit: dict) -> list[str]:
+    """How wrong the pump's nominal ripple is, where there is one and it is more wrong than the
+    line."""
+    if not any(o.source == "nominal" for o in e.observations):
+        return []
     misfit, model_error = fit["nominal_ripple"]["in_sample"], fit["model_error"]["after"]
     if misfit < RIPPLE_ERROR_RATIO * model_error:
         return []
@@ -204,7 +207,7 @@ def _data_sheet_rivals(e: Explanation, fit: dict) -> list[str]:
 
     Their misfits have the nominal ripple: where it is wrong they compare nothing.
     """
-    if any(o.source == "nominal" for o in e.observations) and _ripple_error(fit):
+    if _ripple_error(e, fit):
         return []
     return [
         f"Without {spaced(s.effect)} ({s.place}) the line would fit to {s.misfit:.1%} with "
