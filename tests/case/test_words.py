@@ -48,6 +48,7 @@ def test_phrases_say_the_element_where_the_name_does_not():
         "viscoelastic wall of segment 2",
         "unsteady friction",
     ]
+    assert name_effect("source_impedance", "source (leakage)") == "leakage at the pump"
     assert name_hypothesis("") == ["nothing missing"]
     assert name_parameter("wave_speed[2]") == "wave speed of segment 2"
     assert name_parameter("position[p1]") == "position of sensor p1"

@@ -112,7 +112,7 @@ def test_the_pump_is_mentioned_if_it_differs_from_the_data_sheet():
     modulus = {"value": 1.21e9, "sheet": 1.25e9, "ci95": [1.15e9, 1.27e9], "unit": "Pa"}
     timing = {"value": 0.5, "sheet": 0.0, "ci95": [0.4, 0.6], "unit": "deg"}
     pump = {"bulk_modulus": modulus, "port_timing": timing}
-    assert "other numbers: lag of the port timing 0.50° (data sheet 0°)." in summarise(
+    assert "from the data sheet: lag of the port timing 0.50° (data sheet 0°)." in summarise(
         "consistent", pump=pump
     )
     timing["ci95"] = [-0.1, 1.1]
@@ -256,7 +256,7 @@ def test_a_rival_of_the_data_sheet_is_told_in_words():
     """A length in metres and a load in per cent of its nominal; neither as `length[2]`, nor as a
     number without a unit before a full stop."""
     said = explained()[-1]
-    assert "speaks for impedance of the pump (volume)" in said
+    assert "speaks for volume at the pump: " in said
     assert "would fit to 0.30 % if the length of segment 2 were 1.60 m instead of 1.8 m." in said
     assert "if the relative resistance of the load were 39.5 % instead of 100 %." in said
 

@@ -23,12 +23,14 @@ AT_OTHER = {
     "load_dynamics": "dynamics of the load",
     "end_radiation": "radiation from the open end",
     "end_reflection": "reflection at the anechoic end",
-    "source_impedance": "impedance of the pump",
+    "source_impedance": "volume or leakage at the pump",
     "piston_spread": "spread of the pistons",
     "speed_fluctuation": "fluctuation of the speed",
     "passive_network": "network without a name",
     "passive_piece": "piece of another pipe",
 }
+WORDS_AFTER_FORM = {"source_impedance": "at the pump"}
+"""Effects that their form names: "volume at the pump"."""
 IMPLIED_PLACES = ("line", "position", "load", "source")
 """Elements that an effect's name says already, or that say no place."""
 PLACES = ("between ", "in ", "at ")  # beginnings of what says a place already
@@ -71,6 +73,8 @@ def name_effect(name: str, element: str | None = None) -> str:
         element = numbered.group(1)
         words += f" number {numbered.group(2)}"
     place, form = re.fullmatch(r"(.*?)(?: \((.*)\))?", element, re.DOTALL).groups()
+    if form and name in WORDS_AFTER_FORM:
+        return f"{form} {WORDS_AFTER_FORM[name]}"
     if place.startswith(PLACES):
         words += f" {name_place(place)}"
     elif place not in IMPLIED_PLACES:

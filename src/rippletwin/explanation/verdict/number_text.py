@@ -33,7 +33,11 @@ def pump_sentences(parameters: dict) -> list[str]:
             value = write_value(p["value"], unit, tuple(p["ci95"]))
             sheet = write_stated(p["sheet"], unit)
             off.append(f"{name_parameter(name)} {value} (data sheet {sheet})")
-    return [plain(f"By the ripple the pump has other numbers: {join_words(off)}.")] if off else []
+    return (
+        [plain(f"By its ripple the pump differs from the data sheet: {join_words(off)}.")]
+        if off
+        else []
+    )
 
 
 def load_sentences(load: dict | None) -> list[str]:
