@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from rippletwin import store
 from rippletwin.calibration.calibrate import Calibration
 from rippletwin.calibration.misfit import Misfit
 from rippletwin.case.quantities import unit_of, write_number, write_stated, write_value
@@ -199,14 +199,11 @@ def compute_ripples(
 def save(calibration: Calibration, folder: str | Path) -> None:
     """Write twin.json and report.md into `folder`, each whole or not at all."""
     folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
     for name, text in (
         ("twin.json", json.dumps(to_dict(calibration), indent=1) + "\n"),
         ("report.md", to_markdown(calibration)),
     ):
-        scratch = folder / f".{name}.new"
-        scratch.write_text(text)
-        os.replace(scratch, folder / name)
+        store.write_text(folder / name, text)
 
 
 def _root(weights: np.ndarray, covariance: np.ndarray) -> float:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rippletwin import store
 from rippletwin.calibration.fit import posterior_at_fit
 from rippletwin.calibration.misfit import predict_with_ripple
 from rippletwin.case.words import name_effect, name_hypothesis
@@ -219,7 +220,7 @@ def _missing(e: Explanation) -> list[Missing]:
 def save(numbers: ExplainedNumbers, folder: str | Path) -> Path:
     """Write the numbers into `folder`, which must have a folder `figures`; returns the path."""
     path = Path(folder) / FILE
-    path.write_text(json.dumps(_plain(numbers), allow_nan=False) + "\n")
+    store.write_text(path, json.dumps(_plain(numbers), allow_nan=False) + "\n")
     return path
 
 
