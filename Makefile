@@ -7,7 +7,7 @@ export OMP_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 export NUMBA_NUM_THREADS = 1
 
-.PHONY: run smoke test test-long lint docs-site bench pins audit clean
+.PHONY: run smoke test test-long coverage lint docs-site bench pins audit clean
 
 run: .venv/ready
 	$(BIN)/snakemake --cores $(CORES)
@@ -21,6 +21,11 @@ test: .venv/ready lint
 
 test-long: .venv/ready
 	$(BIN)/python -m pytest -n $(CORES)
+
+# Lines and branches that the fast tests run; TESTS=tests/case names one room.
+coverage: .venv/ready
+	mkdir -p .coverage
+	$(BIN)/python -m pytest -n $(CORES) -m "not long" --cov --cov-report=term --cov-report=html:.coverage/html $(TESTS)
 
 lint: .venv/ready
 	$(BIN)/ruff check .
@@ -67,4 +72,4 @@ audit:
 	.venv-audit/bin/pip-audit --requirement .venv-audit/pins --no-deps --disable-pip
 
 clean:
-	rm -rf .venv .venv-* .snakemake .site results
+	rm -rf .venv .venv-* .snakemake .site .coverage results

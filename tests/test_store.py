@@ -1,10 +1,17 @@
 """Stores hold what was saved, whole or not at all."""
 
+import errno
+import resource
+import subprocess
+import sys
+
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
 from rippletwin import store
+from rippletwin.cli import main, program
 
 
 def dataset(value):
@@ -51,3 +58,50 @@ def test_a_failed_save_leaves_the_old_store_and_nothing_else(tmp_path):
 def test_a_store_that_is_not_there(tmp_path):
     with pytest.raises(FileNotFoundError):
         store.load(tmp_path / "nowhere.zarr")
+
+
+def test_a_failed_writer_leaves_the_old_file_and_nothing_else(tmp_path):
+    """A table, a text and what any writer writes: an error half-way, and the old file is there."""
+    path = tmp_path / "deep" / "a.csv"
+    store.write_table(path, pd.DataFrame({"a": [1, 2]}))
+    with pytest.raises(RuntimeError), store.whole(path) as scratch:
+        scratch.write_text("half")
+        assert scratch.suffix == ".csv"
+        raise RuntimeError
+    assert path.read_text() == "a\n1\n2\n"
+    assert [entry.name for entry in path.parent.iterdir()] == ["a.csv"]
+
+
+FULL = """
+import resource, sys
+from rippletwin import store
+resource.setrlimit(resource.RLIMIT_FSIZE, (4096, resource.RLIM_INFINITY))
+store.write_text(sys.argv[1], "x" * 100_000)
+"""
+
+
+@pytest.mark.skipif(not hasattr(resource, "RLIMIT_FSIZE"), reason="no limit of a file's size here")
+def test_a_disk_without_room_loses_nothing(tmp_path):
+    """A limit of a file's size stands in for a full disk: the write stops half-way with an error of
+    the system. The old file is whole, and nothing else is left."""
+    path = tmp_path / "verdict.json"
+    store.write_text(path, "old")
+    done = subprocess.run(
+        [sys.executable, "-c", FULL, path], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1 and "OSError: [Errno 27]" in done.stderr
+    assert path.read_text() == "old" and [e.name for e in tmp_path.iterdir()] == ["verdict.json"]
+
+
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EROFS])
+def test_a_command_that_cannot_write_says_so_in_a_line(monkeypatch, capsys, code):
+    """The file, the reason and the remedy; exit code 2 and no traceback."""
+
+    def fail(argv):
+        raise OSError(code, "why", "out/verdict.json")
+
+    monkeypatch.setattr(program, "_run", fail)
+    assert main([]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("rippletwin: out/verdict.json: not written: why. ")
+    assert said.count("\n") == 1 and "run it again; what was finished is kept" in said

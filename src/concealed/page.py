@@ -180,7 +180,10 @@ def _failures(rows: list[dict]) -> list[str]:
         ),
         "The verdicts' sentences:",
         "",
-        *(f"* **Case {row['case']}** (`{row['verdict']}`): {row['sentence']}" for row, _ in failed),
+        *(
+            f"* **Case {row['case']}** (`{row['verdict']}`): {' '.join(row['sentence'].split())}"
+            for row, _ in failed
+        ),
         "",
     ]  # fmt: skip
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from diagnosis_trial import detection
 from diagnosis_trial.summary import ANSWERS, SINGLE, STATES, columns_of, confusion_matrix
-from rippletwin.figures.words import name_state
+from rippletwin.case.words import name_state
 from rippletwin.report.content import Figure, Population, draw_figures
 from rippletwin.report.matrix_picture import draw_matrix
 from rippletwin.report.svg import Chart, Series

@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterable
+
+CANNOT_WRITE = {
+    errno.ENOSPC: "Make room on the disk",
+    errno.EDQUOT: "Make room in your quota",
+    errno.EFBIG: "Allow larger files",
+    errno.EROFS: "Name a folder that can be written",
+    errno.EACCES: "Name a folder that you may write",
+}
+"""Why a file cannot be written -> what to do."""
 
 MAX_SHOWN = 300  # characters of one part of a message
 
@@ -62,6 +72,17 @@ def raise_any(errors: Iterable[InputError]) -> None:
         raise InputErrors(errors)
     if errors:
         raise errors[0]
+
+
+def describe_write_error(error: BaseException) -> str | None:
+    """What to do where a file could not be written; None for any other error."""
+    if not isinstance(error, OSError) or error.errno not in CANNOT_WRITE:
+        return None
+    where = f"{printable(error.filename)}: " if error.filename else ""
+    return (
+        f"{where}not written: {error.strerror}. {CANNOT_WRITE[error.errno]} and run it again; "
+        "what was finished is kept"
+    )
 
 
 def printable(text: object, length: int = MAX_SHOWN) -> str:

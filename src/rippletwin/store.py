@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
 
 
@@ -46,15 +49,31 @@ def load(path: str | Path) -> xr.Dataset:
     return xr.open_zarr(path, chunks=None, consolidated=False)
 
 
-def write_text(path: str | Path, text: str) -> Path:
-    """Write a text file (UTF-8), whole or not at all, replacing what is there; its folder is made
-    where needed. Returns its path."""
+@contextmanager
+def whole(path: str | Path) -> Iterator[Path]:
+    """The name under which to write a file that is then moved to `path`, whole or not at all.
+
+    It is beside `path`, with its suffix. Where the writing fails, what was at `path` is still
+    there, and nothing else. The folder is made where needed.
+    """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{os.getpid()}.new")
+    scratch = path.with_name(f".{os.getpid()}.{path.name}")
     try:
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
+        yield scratch
+        os.replace(scratch, path)
     finally:
-        temporary.unlink(missing_ok=True)
-    return path
+        scratch.unlink(missing_ok=True)
+
+
+def write_text(path: str | Path, text: str) -> Path:
+    """Write a text file (UTF-8), whole or not at all; returns its path."""
+    with whole(path) as scratch:
+        scratch.write_text(text, encoding="utf-8")
+    return Path(path)
+
+
+def write_table(path: str | Path, table: pd.DataFrame) -> None:
+    """Write a table as CSV without its index, whole or not at all."""
+    with whole(path) as scratch:
+        table.to_csv(scratch, index=False)

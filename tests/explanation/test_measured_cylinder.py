@@ -63,7 +63,7 @@ def test_the_known_acoustics_are_named(explained):
     assert score_fit(best, [unseen]).misfit < 0.10
     (thermal,) = (w for w in result["without"] if w["effect"] == "thermal_boundary_layer")
     assert thermal["rivals"] and thermal["parameter"] == "diameter[1]" and thermal["pull"] > 10
-    assert "only the data sheet rejects it" in result["sentence"]
+    assert "Only the data sheet speaks for" in result["sentence"]
 
 
 def test_each_effect_improves_the_prediction_of_run_2_without_any_fit(explained):

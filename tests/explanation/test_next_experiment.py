@@ -100,7 +100,9 @@ def test_a_rival_with_another_pump_is_expected_to_lose(uncertain_pump):
         theta[fit.twin.index[name]] += 3.0
     rival = replace(fit, twin=fit.twin.with_(theta=theta))
     _, rig, observation = next(
-        c for c in candidate_recordings(fit.twin, observations) if c[0].startswith("record at")
+        c
+        for c in candidate_recordings(fit.twin, observations)
+        if c[0].startswith("another operating point")
     )
     assert expected_loss(fit, rival, rig, observation) > 1.0
     assert expected_loss(fit, fit, rig, observation) < 1e-6
@@ -113,7 +115,7 @@ def test_the_scaled_ripple_keeps_everything_but_its_size(uncertain_pump):
     old = replace(observations[0].flow_ripple, modulation=0.003 + 0.001j)
     observations = [replace(observations[0], flow_ripple=old)]
     for recording, _, o in candidate_recordings(fit.twin, observations):
-        if recording.startswith("record at"):
+        if recording.startswith("another operating point"):
             scale = o.speed_hz / observations[0].speed_hz
             np.testing.assert_allclose(o.flow_ripple.flow, scale * old.flow)
             assert o.flow_ripple.modulation == old.modulation

@@ -81,7 +81,7 @@ def test_shaft_effects_are_not_established_where_nothing_else_is(explanation, ve
     assert result["verdict"] == verdict
     assert [effect["support"] for effect in result["effects"]] == supports
     assert result["mismatch"]["where"]["element"] != "source"
-    is_mentioned = "indicate a speed fluctuation" in result["sentence"]
+    is_mentioned = "They indicate a speed fluctuation" in result["sentence"]
     assert is_mentioned is (verdict == "unexplained")
 
 

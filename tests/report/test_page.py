@@ -102,7 +102,7 @@ def test_the_page_says_what_the_results_say(parsed):
     """Against the made results, converted by hand."""
     for words in (
         "Missing physics found and named",
-        "viscoelastic wall of segment 2 and gain of sensor p1",
+        "viscoelastic wall of segment 2 and gain error of sensor p1",
         "falls from 75 % to 2.2 %",
         "less than one in a million",
         "9.79 to 10.23",
@@ -175,14 +175,16 @@ def test_support_and_remainder_are_shown_where_the_verdict_has_them(tmp_path):
     remainder = {
         "misfit": 0.03, "model_error": 0.01, "element": "between p1 and p2",
         "position_m": [1.0, 2.0], "bands_hz": [[900.0, 1500.0]], "conditions": [0],
-        "law": "flat and real, like a leak or a resistance", "stand_in": None,
+        "law": "a leak or a resistance (flat and real)", "stand_in": None,
     }  # fmt: skip
     folder = write_results(tmp_path, effects=effects, remainder=remainder)
     page = make_page(read_results(folder))
     assert page.sentence.endswith("of the ripple between p1 and p2 (1.00 to 2.00 m from the pump).")
     words = Parsed(render(page)).words
     for said in (
-        "unsteady friction (established); leak (suggested)",
+        "what its data sheet does not say: unsteady friction. ",
+        "Suggested only: leak.",
+        "It behaves like a leak or a resistance (flat and real).",
         "What remains is 3.0 % of the ripple between p1 and p2 (1.00 to 2.00 m from the pump).",
         "It stands out at 900 to 1500 Hz.",
         "what remains, between p1 and p2, 1.00 to 2.00 m",

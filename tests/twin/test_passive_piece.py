@@ -89,8 +89,8 @@ def test_both_domains_have_the_same_piece(position):
 def test_it_is_told_in_words():
     """A hose and a chamber are told by what differs most from the line, with their numbers."""
     assert PIECE[0].describe(HOSE) == (
-        "like 0.30 m of a softer pipe: 1.2 times the diameter and 0.5 times the wave speed of the "
-        "line"
+        "0.30 m of a softer pipe, with 1.20 times the diameter and 0.50 times the wave speed of "
+        "the line"
     )
     chamber = {name: np.float64(value) for name, value in CHAMBER.items()}
-    assert "wider pipe: 2 times the diameter" in PIECE[0].describe(chamber)
+    assert "wider pipe, with 2.00 times the diameter" in PIECE[0].describe(chamber)

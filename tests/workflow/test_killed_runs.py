@@ -6,6 +6,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -111,3 +112,30 @@ def test_a_killed_run_ends_as_an_undisturbed_one(undisturbed, tmp_path, kills):
         if killed >= kills:
             return
     pytest.fail(f"{killed} kills in {MAX_RUNS} runs")
+
+
+def test_a_second_run_in_a_folder_is_refused(tmp_path):
+    """While one run holds a folder another ends at once with a clear word; the first goes on."""
+    folder = copy_repository(tmp_path / "run")
+    overlay = ("--configfile", "config/smoke.yaml", "small.yaml")
+    environment = os.environ | {"PYTHONPATH": str(folder / "src")}
+    first = subprocess.Popen(
+        [*COMMAND, *overlay], cwd=folder, env=environment, start_new_session=True,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    try:
+        locks = folder / ".snakemake" / "locks"
+        while not (locks.is_dir() and any(locks.iterdir())):
+            assert first.poll() is None
+            time.sleep(0.1)
+        # without --quiet, which hides what is wrong
+        second = subprocess.run(
+            [*COMMAND[:-2], *overlay], cwd=folder, env=environment, capture_output=True, text=True,
+            check=False,
+        )  # fmt: skip
+        assert second.returncode != 0
+        assert "cannot be locked" in second.stderr + second.stdout
+        assert first.poll() is None
+    finally:
+        os.killpg(first.pid, signal.SIGKILL)
+        first.wait()

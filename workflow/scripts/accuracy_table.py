@@ -6,6 +6,7 @@ from pathlib import Path
 import pandas as pd
 
 from job import open_log
+from rippletwin import store
 from rippletwin.learning.accuracy import result_row, score
 from rippletwin.learning.architectures import CLASSES
 from rippletwin.learning.tables import accuracy_table
@@ -27,7 +28,7 @@ for (dataset, architecture), predictions, histories in zip(
         scored = score(windows.truth.to_numpy(), predicted, params.signals[dataset], severity)
         rows.append(result_row(architecture, dataset, seed, scored, endings[seed]))
 results = pd.DataFrame(rows)
-results.to_csv(snakemake.output.table, index=False)
+store.write_table(snakemake.output.table, results)
 paper = pd.read_csv(paths.paper)
 page = f"""# Diagnostic accuracy on recordings, per cent
 
@@ -42,5 +43,5 @@ networks learnt a range of severities.
 {accuracy_table(results, paper.iloc[:0], params.columns, "accuracy_either")}
 {int(results.converged.sum())} of {len(results)} trainings met the convergence rule.
 """
-Path(snakemake.output.page).write_text(page)
+store.write_text(snakemake.output.page, page)
 report_progress(f"{len(results)} trainings, {int(results.converged.sum())} of them converged")

@@ -1,7 +1,5 @@
 """Alignment of every network beside its accuracy, and how the one ranks the other."""
 
-from pathlib import Path
-
 import pandas as pd
 
 from job import open_log
@@ -19,7 +17,7 @@ for (dataset, architecture), path in zip(
     shares.append(cell.assign(dataset=dataset, architecture=architecture, domain=domain))
 table = alignment_table(pd.concat(shares), pd.read_csv(snakemake.input.table))
 ranks = rank_table(table)
-table.to_csv(snakemake.output.table, index=False)
-ranks.to_csv(snakemake.output.ranks, index=False)
-Path(snakemake.output.page).write_text(ranking_markdown(table, ranks))
+store.write_table(snakemake.output.table, table)
+store.write_table(snakemake.output.ranks, ranks)
+store.write_text(snakemake.output.page, ranking_markdown(table, ranks))
 report_progress(f"{len(table)} networks, {len(ranks)} rank correlations")

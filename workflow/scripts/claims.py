@@ -5,6 +5,7 @@ from pathlib import Path
 import pandas as pd
 
 from job import open_log
+from rippletwin import store
 from rippletwin.case.load import load_case
 from rippletwin.figures import attention
 from rippletwin.figures.style import save
@@ -20,9 +21,9 @@ compared = paper_claims.comparisons(cells)
 judged = paper_claims.judge_claims(
     compared, cells, snakemake.params.samples_per_revolution / pistons
 )
-judged.to_csv(paths.table, index=False)
-compared.to_csv(paths.comparisons, index=False)
-Path(paths.page).write_text(paper_claims.claims_markdown(judged, compared))
+store.write_table(paths.table, judged)
+store.write_table(paths.comparisons, compared)
+store.write_text(paths.page, paper_claims.claims_markdown(judged, compared))
 
 groups = {
     claim.split(":")[0]: (

@@ -41,7 +41,7 @@ settings = SstSettings(**snakemake.params.sst)
 settings = replace(settings, scale=amplitude_scale(next(iter(windows.values())), rate, settings))
 table = compare_images(windows, simulated, rate, settings)
 table.insert(1, "recorded", [pairs[state][0] for state in table.state])
-table.to_csv(snakemake.output.table, index=False)
+store.write_table(snakemake.output.table, table)
 
 large = replace(settings, size=PIXELS)
 alike = table.set_index(["state", "source"]).similarity

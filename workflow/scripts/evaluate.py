@@ -30,5 +30,5 @@ for seed, network in enumerate(
     table.insert(0, "window", kept)
     table.insert(0, "seed", seed)
     tables.append(table)
-pd.concat(tables).to_csv(snakemake.output[0], index=False)
+store.write_table(snakemake.output[0], pd.concat(tables))
 report_progress(f"{len(kept)} windows, {len(tables)} seeds")

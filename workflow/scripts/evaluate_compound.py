@@ -24,5 +24,5 @@ for seed, network in enumerate(
     tables.append(
         pd.DataFrame({"seed": seed, "recording": faults, "predicted": np.array(CLASSES)[predicted]})
     )
-pd.concat(tables).to_csv(snakemake.output[0], index=False)
+store.write_table(snakemake.output[0], pd.concat(tables))
 report_progress(f"{len(x)} windows, {len(tables)} seeds")

@@ -6,7 +6,7 @@ import sys
 import traceback
 from collections.abc import Callable
 
-from rippletwin.errors import InputError
+from rippletwin.errors import InputError, describe_write_error
 
 
 def open_log(snakemake) -> Callable[[str], None]:
@@ -25,11 +25,8 @@ def open_log(snakemake) -> Callable[[str], None]:
 
     def fail(kind, error, trace):
         traceback.print_exception(kind, error, trace, file=log)
-        print(
-            f"{name}: {error if issubclass(kind, InputError) else repr(error)}",
-            file=terminal,
-            flush=True,
-        )
+        told = error if issubclass(kind, InputError) else describe_write_error(error) or repr(error)
+        print(f"{name}: {told}", file=terminal, flush=True)
 
     sys.excepthook = fail
     return report_progress

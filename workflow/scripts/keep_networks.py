@@ -48,5 +48,5 @@ windows = recorded.isel(window=tested)
 _, p_values = kept.answers(windows.signal.values)
 told = {"recording": windows.recording.values, "truth": windows.state.values}
 rows = pd.DataFrame(told | {"unlike": (p_values <= PROMISED_RATE).mean(axis=0)})
-rows.groupby(list(told)).unlike.mean().reset_index().to_csv(snakemake.output.rates, index=False)
+store.write_table(snakemake.output.rates, rows.groupby(list(told)).unlike.mean().reset_index())
 report_progress(f"unlike: {rows.unlike[rows.truth == 'H'].mean():.1%} of the healthy windows")

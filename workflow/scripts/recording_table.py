@@ -16,7 +16,7 @@ rows = pd.concat(
     for (dataset, architecture), path in zip(params.cells, paths.predictions, strict=True)
 )
 named = rows.assign(recording=rows.recording.map(dict(enumerate(names))))
-named.to_csv(snakemake.output.table, index=False)
+store.write_table(snakemake.output.table, named)
 page = "# Accuracy over recordings\n\nNo recording is of known state.\n"
 if len(rows):
     page = f"""# Accuracy over recordings
@@ -32,5 +32,5 @@ the recordings that are right by all seeds' windows together, and the share's ex
 Windows that are right, per cent over networks and seeds; in brackets those called C2.
 
 {severity_table(rows, params.datasets, names)}"""
-Path(snakemake.output.page).write_text(page)
+store.write_text(snakemake.output.page, page)
 report_progress(f"{rows.recording.nunique()} recordings")

@@ -6,6 +6,7 @@ from pathlib import Path
 from concealed.figures import draw_figures
 from concealed.page import report_page
 from job import open_log
+from rippletwin import store
 
 report_progress = open_log(snakemake)
 rows = json.loads(Path(snakemake.input.rows).read_text())
@@ -16,5 +17,5 @@ origin = {
     "checks": json.loads(Path(snakemake.input.numerics[0]).read_text()),
 }
 draw_figures(rows, snakemake.output.figures)
-Path(snakemake.output.page).write_text(report_page(rows, origin))
+store.write_text(snakemake.output.page, report_page(rows, origin))
 report_progress(f"{snakemake.output.page} written")

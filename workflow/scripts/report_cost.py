@@ -6,6 +6,7 @@ from pathlib import Path
 import pandas as pd
 
 from job import open_log
+from rippletwin import store
 from rippletwin.learning.tables import cost_table
 from rippletwin.twin.twin_file import load_twin
 
@@ -14,7 +15,8 @@ results = pd.read_csv(snakemake.input.table)
 verdict = json.loads(Path(snakemake.input.verdict).read_text())
 effects = load_twin(snakemake.input.twin, snakemake.input.effects).effects
 taken_in = [f"{effect.name.replace('_', ' ')} ({place})" for effect, place in effects]
-Path(snakemake.output[0]).write_text(
+store.write_text(
+    snakemake.output[0],
     f"""# What the left-out physics cost
 
 The verdict of `explain` is `{verdict["verdict"]}`; the corrected twin, that of the columns with a
@@ -28,6 +30,6 @@ twin, with the corrected one, and the difference, which is the cost.
 {cost_table(results, snakemake.params.pairs)}
 ## Either severity of a cylinder fault counts as right
 
-{cost_table(results, snakemake.params.pairs, "accuracy_either")}"""
+{cost_table(results, snakemake.params.pairs, "accuracy_either")}""",
 )
 report_progress(f"{len(taken_in)} effects taken in")

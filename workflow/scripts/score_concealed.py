@@ -6,6 +6,7 @@ from pathlib import Path
 from concealed.commitments import sha256_of_files
 from concealed.score import score_case
 from job import open_log
+from rippletwin import store
 from virtualrig.seal import open_seal_file
 
 report_progress = open_log(snakemake)
@@ -23,5 +24,5 @@ for case, (seal, key, *results) in enumerate(
     verdict, baselines, oracle = (json.loads(Path(path).read_text()) for path in results)
     row = score_case(open_seal_file(seal, key), verdict, baselines, oracle["oracle_log_evidence"])
     rows.append({"case": case} | row)
-Path(snakemake.output.rows).write_text(json.dumps(rows, indent=1) + "\n")
+store.write_text(snakemake.output.rows, json.dumps(rows, indent=1) + "\n")
 report_progress(f"{len(rows)} cases scored")

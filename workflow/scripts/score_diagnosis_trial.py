@@ -6,6 +6,7 @@ from pathlib import Path
 from concealed.commitments import sha256_of_files
 from diagnosis_trial.score import score_rig
 from job import open_log
+from rippletwin import store
 from virtualrig.seal import open_seal_file
 
 report_progress = open_log(snakemake)
@@ -22,5 +23,5 @@ for rig, (seal, key, *results) in enumerate(
 ):
     diagnosis, run = (json.loads(Path(path).read_text()) for path in results)
     rows += score_rig(rig, open_seal_file(seal, key), diagnosis, run)
-Path(snakemake.output.rows).write_text(json.dumps(rows, indent=1) + "\n")
+store.write_text(snakemake.output.rows, json.dumps(rows, indent=1) + "\n")
 report_progress(f"{len(rows)} recordings scored")

@@ -50,6 +50,7 @@ for seed in range(params.seeds):
         f"seed {seed + 1} of {params.seeds}: {history.epochs} epochs, {history.reason}, "
         f"validation accuracy {history.validation_accuracy[history.best_epoch]:.1%}"
     )
-torch.save(weights, snakemake.output.weights)
-with open(snakemake.output.history, "w") as file:
-    json.dump(histories, file, indent=1)
+# Through an open file: by name, torch writes the name into the file.
+with store.whole(snakemake.output.weights) as scratch, scratch.open("wb") as file:
+    torch.save(weights, file)
+store.write_text(snakemake.output.history, json.dumps(histories, indent=1))

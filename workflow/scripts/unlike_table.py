@@ -22,13 +22,14 @@ table.columns = [names[k] for k in table.columns]
 head = ["Network", *table.columns]
 lines = [head, ["---"] * len(head)]
 lines += [[network, *(f"{share:.0f}" for share in row)] for network, *row in table.itertuples()]
-Path(snakemake.output.page).write_text(
+store.write_text(
+    snakemake.output.page,
     f"""# Windows that are unlike everything simulated
 
 Share of the windows of each recording that networks call unlike, per cent over seeds. Of simulated
 windows {100 * PROMISED_RATE:.0f} % are called so; this is promised by their conformal p-values.
 
 """
-    + "".join("| " + " | ".join(line) + " |\n" for line in lines)
+    + "".join("| " + " | ".join(line) + " |\n" for line in lines),
 )
 report_progress(f"{len(table)} networks")

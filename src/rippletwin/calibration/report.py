@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from rippletwin import store
 from rippletwin.calibration.calibrate import Calibration
 from rippletwin.calibration.misfit import Misfit
+from rippletwin.case.quantities import unit_of, write_number, write_stated, write_value
+from rippletwin.case.words import name_parameter
 from rippletwin.twin import twin_file
 from rippletwin.twin.unknown_load import LoadCurve
 
@@ -84,7 +86,8 @@ def to_dict(calibration: Calibration) -> dict:
 
 
 def to_markdown(calibration: Calibration) -> str:
-    """The report.md of a calibration: misfits, warnings, segments and parameters."""
+    """The report.md of a calibration: misfits, warnings, segments and parameters, in units of a
+    test bench."""
     before, after = calibration.before, calibration.after
     lines = [
         "# Calibration",
@@ -106,13 +109,14 @@ def to_markdown(calibration: Calibration) -> str:
         "",
         "## Segments",
         "",
-        "| segment | delay, ms | sd | impedance, MPa s/m3 | sd |",
+        "| segment | delay, ms | sd | impedance, bar per L/min | sd |",
         "|---|---|---|---|---|",
     ]
+    impedance = unit_of("Pa s/m3").factor
     for row in segment_table(calibration):
         lines.append(
             f"| {row['segment']} | {1e3 * row['delay']:.4f} | {1e3 * row['delay_sd']:.2g} "
-            f"| {1e-6 * row['impedance']:.5g} | {1e-6 * row['impedance_sd']:.2g} |"
+            f"| {impedance * row['impedance']:.4g} | {impedance * row['impedance_sd']:.2g} |"
         )
     if calibration.load is not None:
         lines += _load_table(calibration.load)
@@ -123,15 +127,17 @@ def to_markdown(calibration: Calibration) -> str:
         "Pull: distance from the data sheet in its standard deviations. Known: posterior over",
         "prior standard deviation; near 1 the data say nothing.",
         "",
-        "| parameter | unit | data sheet | calibrated | sd | pull | known |",
-        "|---|---|---|---|---|---|---|",
+        "| parameter | data sheet | calibrated | sd | pull | known |",
+        "|---|---|---|---|---|---|",
     ]
     for row in parameter_table(calibration):
         pull = "" if row["pull"] is None else f"{row['pull']:+.2f}"
         known = "" if row["known"] is None else f"{row['known']:.2f}"
+        unit, sd = unit_of(row["unit"], row["name"]), row["sd"]
+        value = write_value(row["value"], unit, (row["value"] - sd, row["value"] + sd))
         lines.append(
-            f"| {row['name']} | {row['unit']} | {row['nominal']:.5g} | {row['value']:.5g} "
-            f"| {row['sd']:.2g} | {pull} | {known} |"
+            f"| {name_parameter(row['name'])} | {write_stated(row['nominal'], unit)} | {value} "
+            f"| {write_number(sd * unit.factor, significant=2)} | {pull} | {known} |"
         )
     lines += [
         "",
@@ -193,14 +199,11 @@ def compute_ripples(
 def save(calibration: Calibration, folder: str | Path) -> None:
     """Write twin.json and report.md into `folder`, each whole or not at all."""
     folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
     for name, text in (
         ("twin.json", json.dumps(to_dict(calibration), indent=1) + "\n"),
         ("report.md", to_markdown(calibration)),
     ):
-        scratch = folder / f".{name}.new"
-        scratch.write_text(text)
-        os.replace(scratch, folder / name)
+        store.write_text(folder / name, text)
 
 
 def _root(weights: np.ndarray, covariance: np.ndarray) -> float:

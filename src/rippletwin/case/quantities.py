@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 SIGNIFICANT = 3  # digits of a value without an interval
 MOST_DIGITS = 6
+STATED_DIGITS = 4  # of a value of the data sheet, at most
 MINUS = "\u2212"
 SUPERSCRIPTS = str.maketrans("-0123456789", "\u207b⁰¹²³⁴⁵⁶⁷⁸⁹")
 MIN_PLAIN, MAX_PLAIN = 1e-4, 1e6
@@ -50,6 +51,8 @@ BY_NAME = {
     "gain_error": Unit(100.0, "%"),
     "amplitude": Unit(100.0, "%"),
     "load": Unit(100.0, "%"),
+    "air_fraction": Unit(100.0, "%"),
+    "delay": Unit(1e6, "µs"),
 }
 """Parameters that are read in another unit than others of their dimension."""
 
@@ -101,6 +104,14 @@ def write_quantity(value: float, unit: Unit, ends: tuple[float, float] | None = 
 def write_value(value: float, unit: Unit, ends: tuple[float, float] | None = None) -> str:
     """A value in SI units with its unit; the digits are those that its interval leaves."""
     return write_number(value * unit.factor, _step(unit, ends)) + _suffix(unit)
+
+
+def write_stated(value: float, unit: Unit) -> str:
+    """A value of the data sheet in SI units with its unit, and with the digits that were given."""
+    text = write_number(value * unit.factor, significant=STATED_DIGITS)
+    if "." in text and "×" not in text:
+        text = text.rstrip("0").rstrip(".")
+    return text + _suffix(unit)
 
 
 def write_interval(ends: tuple[float, float], unit: Unit) -> str:

@@ -29,7 +29,7 @@ from rippletwin.cli import (
     simulate,
 )
 from rippletwin.cli.exit_codes import BAD_INPUT, CLOSED_PIPE, INTERRUPTED
-from rippletwin.errors import InputError
+from rippletwin.errors import InputError, describe_write_error
 
 HELP_WIDTH = 100  # columns at most
 COMMANDS = {
@@ -84,6 +84,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         # What is left in the buffer has no reader: it goes nowhere when the interpreter ends.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return CLOSED_PIPE
+    except OSError as error:  # the disk is full, or the folder read-only
+        if (problem := describe_write_error(error)) is None:
+            raise
+        print(f"rippletwin: {problem}", file=sys.stderr)
+        return BAD_INPUT
 
 
 def _run(argv: list[str]) -> int:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from rippletwin import store
 from rippletwin.diagnosis.diagnosis import Diagnosis
 from rippletwin.diagnosis.faults.library import state_name
 
@@ -79,7 +80,7 @@ def gather(d: Diagnosis) -> DiagnosedNumbers:
 def save(numbers: Sequence[DiagnosedNumbers], folder: str | Path) -> Path:
     """Write the numbers into `folder`, which must have a folder `figures`; returns the path."""
     path = Path(folder) / FILE
-    path.write_text(json.dumps([asdict(each) for each in numbers], allow_nan=False) + "\n")
+    store.write_text(path, json.dumps([asdict(each) for each in numbers], allow_nan=False) + "\n")
     return path
 
 

@@ -13,15 +13,16 @@ from pathlib import Path
 
 import numpy as np
 
+from rippletwin import store
 from rippletwin.calibration.fit import posterior_at_fit
 from rippletwin.calibration.misfit import predict_with_ripple
+from rippletwin.case.words import name_effect, name_hypothesis
 from rippletwin.explanation.checks.profile_intervals import effect_intervals
 from rippletwin.explanation.localise.missing_immittance import missing_immittance
 from rippletwin.explanation.localise.residual_bands import residual_map
 from rippletwin.explanation.localise.source_free_fits import compare_evidence
 from rippletwin.explanation.verdict.explanation import Explanation
 from rippletwin.explanation.verdict.places import element_and_extent
-from rippletwin.figures.words import name_effect, name_hypothesis
 from rippletwin.twin.unknown_load import LoadCurve, load_curve
 
 FILE = "figures/explain.json"
@@ -219,7 +220,7 @@ def _missing(e: Explanation) -> list[Missing]:
 def save(numbers: ExplainedNumbers, folder: str | Path) -> Path:
     """Write the numbers into `folder`, which must have a folder `figures`; returns the path."""
     path = Path(folder) / FILE
-    path.write_text(json.dumps(_plain(numbers), allow_nan=False) + "\n")
+    store.write_text(path, json.dumps(_plain(numbers), allow_nan=False) + "\n")
     return path
 
 

@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from rippletwin.case.quantities import unit_of, write_certainty, write_quantity
+from rippletwin.case.words import name_state
 from rippletwin.diagnosis import diagnosed_numbers
 from rippletwin.diagnosis.diagnosed_numbers import DiagnosedNumbers
 from rippletwin.figures import style
-from rippletwin.figures.words import name_state
 
 AREA = unit_of("m2")
 LINES = ("-", "--", "-.")

@@ -13,6 +13,8 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 from matplotlib.rcsetup import cycler
 
+from rippletwin import store
+
 MEASURED, NOMINAL, CALIBRATED, CORRECTED = "#000000", "#E69F00", "#0072B2", "#009E73"
 ALARM, NEUTRAL = "#D55E00", "#8C8C8C"
 CYCLE = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000000")
@@ -56,7 +58,7 @@ def legend_below(fig: Figure, ax) -> None:
 def save(fig: Figure, *paths) -> None:
     """Write a figure to each of `paths`; the suffix (.png, .svg) is the format."""
     for path in map(Path, paths):
-        path.parent.mkdir(parents=True, exist_ok=True)
         metadata = {"Date": None} if path.suffix == ".svg" else None
-        fig.savefig(path, metadata=metadata)
+        with store.whole(path) as scratch:
+            fig.savefig(scratch, metadata=metadata)
         fig.set_layout_engine("none")  # it is laid out: once takes as long as drawing

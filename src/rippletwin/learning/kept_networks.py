@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from rippletwin import store
 from rippletwin.errors import InputError
 from rippletwin.learning.architectures import CLASSES
 from rippletwin.learning.conformal import Conformal
@@ -59,7 +60,9 @@ class KeptNetworks:
             {name: torch.as_tensor(values) for name, values in asdict(each).items()}
             for each in self.conformal
         ]
-        torch.save(data, path)
+        # Through an open file: by name, torch writes the name into the file.
+        with store.whole(path) as scratch, scratch.open("wb") as file:
+            torch.save(data, file)
 
 
 def load_networks(path: str | Path) -> KeptNetworks:

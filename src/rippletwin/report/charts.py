@@ -9,10 +9,10 @@ import numpy as np
 
 from rippletwin.case.model import Recording, Rig
 from rippletwin.case.quantities import write_share
+from rippletwin.case.words import name_state
 from rippletwin.diagnosis.diagnosed_numbers import DiagnosedNumbers
 from rippletwin.figures.explained_numbers import ExplainedNumbers, Point
 from rippletwin.figures.explained_ripple import curve, curves_of, title_of
-from rippletwin.figures.words import name_state
 from rippletwin.harmonics import peak_amplitudes
 from rippletwin.report.svg import Chart, Series
 from rippletwin.spectra.observation import revolutions_of

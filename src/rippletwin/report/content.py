@@ -12,9 +12,9 @@ from markupsafe import Markup
 from rippletwin import __version__
 from rippletwin.case.model import Rig
 from rippletwin.case.quantities import write_certainty, write_share
+from rippletwin.case.words import name_element, name_place, name_state
 from rippletwin.figures.explained_numbers import LinePlace, Places
 from rippletwin.figures.line_drawing import describe_free, shown_places
-from rippletwin.figures.words import name_element, name_place, name_state
 from rippletwin.report import charts, verdict_words
 from rippletwin.report.line_picture import MarkedPlace, draw_line
 from rippletwin.report.results import Results

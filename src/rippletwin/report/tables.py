@@ -17,7 +17,7 @@ from rippletwin.case.quantities import (
     write_quantity,
     write_value,
 )
-from rippletwin.figures.words import name_effect, name_parameter, name_state
+from rippletwin.case.words import name_effect, name_parameter, name_state
 from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.twin import Twin
 

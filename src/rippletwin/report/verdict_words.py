@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from rippletwin.case.quantities import write_probability, write_share
-from rippletwin.figures.words import join_words, name_effect, name_place
+from rippletwin.case.words import join_words, name_effects, name_equivalents, name_place
 
 TITLES = {
     "consistent": "The twin accounts for the recordings",
@@ -16,7 +16,7 @@ TITLES = {
     "bad_data": "The recordings contradict themselves",
 }
 POINT = 5e-3  # m: a shorter interval is a point
-SUPPORTS = ("established", "supported", "suggested")
+LESSER = ("supported", "suggested")
 
 
 def verdict_title(verdict: Mapping) -> str:
@@ -25,7 +25,7 @@ def verdict_title(verdict: Mapping) -> str:
 
 
 def verdict_sentence(verdict: Mapping) -> str:
-    """The verdict in one plain sentence, and one more on what remains."""
+    """The verdict in one plain sentence, and others on what is uncertain and what remains."""
     kind, effects = verdict["verdict"], verdict.get("effects") or []
     if kind == "consistent":
         return (
@@ -40,24 +40,25 @@ def verdict_sentence(verdict: Mapping) -> str:
         )
     if kind == "bad_data":
         return verdict.get("sentence", "").strip() or "Repeat the recordings."
-    if kind == "ambiguous":
-        names = [name_effect(e["name"], e.get("element")) for e in effects]
-        others = sorted({each for group in verdict.get("equivalents", ()) for each in group})
-        rivals = join_words([name_effect(*each.split(" at ", 1)) for each in others])
-        said = join_words(names) or "an effect"
-        return (
-            f"The rig has what its data sheet does not say: {said}, or an equivalent of it "
-            f"({rivals}); these recordings cannot tell which."
-        )
     if kind == "unexplained" or not effects:
         suggested = f"; what the recordings suggest is {_effects(effects)}" if effects else ""
         return (
             f"Something is missing {_where(verdict)}, and no effect of the library explains it"
             f"{suggested}."
         )
-    left = f" {_left(verdict['remainder'])}" if verdict.get("remainder") else ""
-    said = f"{_effects(effects)}{_change(verdict)}"
-    return f"The rig has what its data sheet does not say: {said}.{left}"
+    certain = [e for e in effects if e.get("support", "established") == "established"]
+    said = _effects(certain) or "an effect"
+    sentences = [f"The rig has what its data sheet does not say: {said}{_change(verdict)}."]
+    if kind == "ambiguous":
+        rivals = name_equivalents(verdict.get("equivalents", ()))
+        sentences.append(f"These recordings cannot tell apart: {rivals}.")
+    for level in LESSER:
+        lesser = [e for e in effects if e.get("support") == level]
+        if lesser:
+            sentences.append(f"{level.capitalize()} only: {_effects(lesser)}.")
+    if kind == "named" and verdict.get("remainder"):
+        sentences.append(_left(verdict["remainder"]))
+    return " ".join(sentences)
 
 
 def _left(remainder: Mapping) -> str:
@@ -72,15 +73,7 @@ def _left(remainder: Mapping) -> str:
 
 
 def _effects(effects: Sequence[Mapping]) -> str:
-    """Effects in words, grouped by how well they are supported where that is known."""
-    groups: dict[str, list[str]] = {}
-    for effect in effects:
-        words = name_effect(effect["name"], effect.get("element"))
-        groups.setdefault(effect.get("support", ""), []).append(words)
-    if set(groups) <= {"", "established"}:
-        return join_words([words for group in groups.values() for words in group])
-    ordered = sorted(groups, key=lambda s: SUPPORTS.index(s) if s in SUPPORTS else -1)
-    return "; ".join(f"{join_words(groups[s])}{f' ({s})' if s else ''}" for s in ordered)
+    return name_effects((effect["name"], effect.get("element")) for effect in effects)
 
 
 def _where(verdict: Mapping) -> str:
@@ -130,7 +123,7 @@ def remaining_sentences(verdict: Mapping) -> list[str]:
         if remainder.get("bands_hz"):
             sentences.append(f"It stands out at {_bands(remainder['bands_hz'])}.")
         if remainder.get("law"):
-            sentences.append(f"It is {remainder['law']}.")
+            sentences.append(f"It behaves like {remainder['law']}.")
         if remainder.get("stand_in"):
             sentences.append("A passive network stands in for it in the corrected twin.")
     elif "remainder" in verdict:

@@ -13,6 +13,7 @@ from itertools import combinations
 
 import numpy as np
 
+from rippletwin.case.quantities import BAR, write_value
 from rippletwin.explanation.checks.alarms import (
     DRIFT_SIGNIFICANCE,
     aligned_difference,
@@ -129,9 +130,9 @@ def find_growing_mean_pressure(o) -> str:
     if np.diff(mean)[k] < MAX_PRESSURE_GROWTH * scale:
         return ""
     a, b = (o.sensors[order[i]].name for i in (k, k + 1))
+    before, behind = (write_value(float(mean[i]), BAR) for i in (k, k + 1))
     return (
-        f"the mean pressure grows downstream in {o.label}, from {mean[k]:.3g} Pa at {a} to "
-        f"{mean[k + 1]:.3g} Pa at {b}"
+        f"the mean pressure grows downstream in {o.label}, from {before} at {a} to {behind} at {b}"
     )
 
 

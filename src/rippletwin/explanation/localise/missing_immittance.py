@@ -218,18 +218,18 @@ def _interpolate_networks(
 def describe_law(
     frequency_hz: np.ndarray, immittance: np.ndarray, weight: np.ndarray | None = None
 ) -> str:
-    """The simple law that an immittance (F,) follows, in words.
+    """What an immittance (F,) behaves like, in words: a noun, with its simple law in brackets.
 
     `weight` (F,) is 1/sqrt(w) by default.
     """
     w = 2 * np.pi * np.asarray(frequency_hz)
     weight = 1.0 / np.sqrt(w) if weight is None else np.asarray(weight)
-    time_constant_law = "proportional to jw/(1 + jw tau), like a relaxing compliance"
+    time_constant_law = "a relaxing compliance (proportional to jw/(1 + jw tau))"
     shapes_by_law: dict[str, list[np.ndarray]] = {
-        "flat and real, like a leak or a resistance": [np.ones_like(w) + 0j],
-        "proportional to jw, like a compliance or an inertance": [1j * w],
-        "proportional to 1/jw, like a series inertance or compliance": [1 / (1j * w)],
-        "proportional to (1 + j) sqrt(w), like a boundary layer": [(1 + 1j) * np.sqrt(w)],
+        "a leak or a resistance (flat and real)": [np.ones_like(w) + 0j],
+        "a compliance or an inertance (proportional to jw)": [1j * w],
+        "an inertance or a compliance in series (proportional to 1/jw)": [1 / (1j * w)],
+        "a boundary layer (proportional to (1 + j) sqrt(w))": [(1 + 1j) * np.sqrt(w)],
         time_constant_law: [1j * w / (1 + 1j * w * tau) for tau in RETARDATION_TIMES],
     }
     residuals = {
@@ -242,11 +242,11 @@ def describe_law(
         return best
     real = weight * immittance.real
     if np.sum(real[real < 0]) < -0.5 * np.sum(np.abs(real)):
-        return "negative real part: not passive, so of the source or a sensor"
+        return "a source or a sensor, for it is not passive (negative real part)"
     sign = np.sign(immittance.imag[np.argsort(w)])
     if np.any(np.diff(sign) != 0):
-        return "imaginary part through zero, like a resonator"
-    return "no simple law"
+        return "a resonator (imaginary part through zero)"
+    return "none of the simple laws"
 
 
 def _power_left(immittance: np.ndarray, shape: np.ndarray, weight: np.ndarray) -> float:

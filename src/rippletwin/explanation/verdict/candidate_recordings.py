@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from rippletwin.case.model import FlowRipple, Load, Rig, Sensor
+from rippletwin.case.quantities import BAR, plain, write_value
 from rippletwin.spectra.observation import Observation
 from rippletwin.twin.twin import Twin
 
@@ -32,7 +33,7 @@ def candidate_recordings(twin: Twin, observations: Sequence) -> list[tuple[str, 
     periodic = [o for o in observations if o.kind == "periodic"]
     if periodic:
         candidates += _operating_points(twin, periodic)
-        recording = "record under random excitation"
+        recording = "random excitation"
         candidates.append((recording, rig, _random_recording(twin, periodic[0])))
     else:
         candidates += _other_ends(twin, observations)
@@ -49,9 +50,9 @@ def further_sensors(twin: Twin, observations: Sequence) -> list:
         if min(abs(x - s.position) for s in rig.sensors) < 0.5 * rig.length / SENSOR_POSITIONS:
             continue
         extended = replace(rig, sensors=(*rig.sensors, Sensor("next", float(x))))
-        recording = f"record with one more sensor {x:.2f} m from the pump"
+        recording = f"one more sensor {x:.2f} m from the pump"
         if o.load_pressure and o.speed_hz:
-            recording += f" at {60 * o.speed_hz:.0f} r/min and {o.load_pressure / 1e6:.3g} MPa"
+            recording += f", at {60 * o.speed_hz:.0f} r/min and {_pressure(o.load_pressure)}"
         candidates.append((recording, extended, _with_sensors_of(o, extended)))
     return candidates
 
@@ -87,9 +88,9 @@ def _operating_points(twin: Twin, periodic: Sequence[Observation]) -> list:
             nearest = min(periodic, key=lambda o: _distance(o, rpm / 60, load))
             if _distance(nearest, rpm / 60, load) < SAME_POINT_DISTANCE:
                 continue
-            recording = f"record at {rpm:.0f} r/min"
+            recording = f"another operating point, {rpm:.0f} r/min"
             if load:
-                recording += f" and {load / 1e6:.3g} MPa"
+                recording += f" and {_pressure(load)}"
             observation = _at_operating_point(twin, nearest, rpm / 60, load)
             candidates.append((recording, twin.rig, observation))
     return candidates
@@ -152,10 +153,14 @@ def _other_ends(twin: Twin, observations: Sequence) -> list:
         return []
     observation = replace(observations[0], label=NEW_LABEL)
     return [
-        (f"record with the line's end {kind}", replace(twin.rig, load=Load(kind)), observation)
+        (f"the line with its end {kind}", replace(twin.rig, load=Load(kind)), observation)
         for kind in ("open", "closed", "anechoic")
         if twin.rig.load.kind != kind
     ]
+
+
+def _pressure(pressure: float) -> str:
+    return plain(write_value(pressure, BAR))
 
 
 def _distance(o: Observation, speed_hz: float, load: float | None) -> float:

@@ -47,13 +47,10 @@ class Proposal:
     def __str__(self) -> str:
         if self.loss < EQUIVALENT_LOG_BAYES_FACTOR:
             return (
-                "none of the recordings considered is expected to discriminate between them; the "
-                f"best, to {self.recording}, brings {self.loss:.1f} in log evidence"
+                "none of those considered is expected to tell them apart; the best is "
+                f"{self.recording} ({self.loss:.1f} of log evidence)"
             )
-        return (
-            f"{self.recording}: expected to discriminate between them by {self.loss:.0f} in log "
-            "evidence"
-        )
+        return f"{self.recording}; it should tell them apart ({self.loss:.0f} of log evidence)"
 
 
 def propose_recording(

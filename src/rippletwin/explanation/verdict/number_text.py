@@ -6,18 +6,21 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rippletwin.case.quantities import plain, unit_of, write_interval, write_number, write_value
-from rippletwin.explanation.verdict.places import join_words
+from rippletwin.case.quantities import plain, unit_of, write_interval, write_stated, write_value
+from rippletwin.case.words import join_words, name_parameter
 
 
 def parameters_sentence(effect: str, parameters: Mapping[str, dict]) -> str:
-    """Values and 95 % intervals of the parameters of an effect, which is told with its place; in
-    units of a test bench."""
+    """Values and 95 % intervals, in brackets, of the parameters of an effect, which is told with
+    its place; in units of a test bench."""
     told = []
     for name, parameter in parameters.items():
         unit, ends = unit_of(parameter["unit"], name), tuple(parameter["ci95"])
         value = write_value(parameter["value"], unit, ends)
-        told.append(f"{spaced(name)} {value} (95 % interval {write_interval(ends, unit)})")
+        words = f"{name_parameter(name)} "
+        if len(parameters) == 1 and words in effect:  # "delay of sensor p1: delay" says it twice
+            words = ""
+        told.append(f"{words}{value} ({write_interval(ends, unit)})")
     return plain(f"{effect[:1].upper()}{effect[1:]}: {join_words(told)}.")
 
 
@@ -28,9 +31,13 @@ def pump_sentences(parameters: dict) -> list[str]:
         if not p["ci95"][0] <= p["sheet"] <= p["ci95"][1]:
             unit = unit_of(p["unit"], name)
             value = write_value(p["value"], unit, tuple(p["ci95"]))
-            sheet = write_number(p["sheet"] * unit.factor)
-            off.append(f"{spaced(name)} {value} (data sheet {sheet})")
-    return [plain(f"The ripple indicates of the pump: {join_words(off)}.")] if off else []
+            sheet = write_stated(p["sheet"], unit)
+            off.append(f"{name_parameter(name)} {value} (data sheet {sheet})")
+    return (
+        [plain(f"By its ripple the pump differs from the data sheet: {join_words(off)}.")]
+        if off
+        else []
+    )
 
 
 def load_sentences(load: dict | None) -> list[str]:
@@ -48,12 +55,7 @@ def load_sentences(load: dict | None) -> list[str]:
 def sensor_sentences(sensors: Mapping[str, dict]) -> list[str]:
     """Gains and phases of uncalibrated sensors."""
     said = [
-        f"{name} {one['gain']['value']:.3f} (phase {np.rad2deg(one['phase']['value']):+.1f} deg)"
+        f"{name} {one['gain']['value']:.3f} (phase {np.rad2deg(one['phase']['value']):+.1f}°)"
         for name, one in sensors.items()
     ]
     return [f"Gains of the sensors: {join_words(said)}."] if said else []
-
-
-def spaced(name: str) -> str:
-    """An identifier with spaces between its words."""
-    return name.replace("_", " ")

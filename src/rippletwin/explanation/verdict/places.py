@@ -56,7 +56,7 @@ def stretch_between_sensors(rig, low: float, high: float) -> str:
     return f"between {left[-1]} and {right[0]}"
 
 
-def join_words(words: Sequence[str]) -> str:
-    """Words as in a sentence: "a, b and c"."""
-    words = list(words)
-    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]
+def extent_in_words(ends: Sequence[float]) -> str:
+    """An interval of the line in words, from the pump."""
+    low, high = (f"{end:.2f}" for end in ends)
+    return f"{low} to {high} m from the pump" if low != high else f"{low} m from the pump"

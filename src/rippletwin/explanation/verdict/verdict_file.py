@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rippletwin import store
 from rippletwin.explanation.checks.alarms import evidence_p_value
 from rippletwin.explanation.checks.profile_intervals import (
     effect_intervals,
@@ -294,12 +294,7 @@ def write_verdict(explanation: Explanation, folder: str | Path) -> dict:
 
 def _write_json(path: Path, data: dict) -> None:
     text = json.dumps(data, indent=1, default=_plain, allow_nan=False)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        temporary.write_text(text + "\n")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    store.write_text(path, text + "\n")
 
 
 def _plain(value):

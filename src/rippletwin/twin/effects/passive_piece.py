@@ -61,8 +61,8 @@ def _describe(values) -> str:
     bore, wall = "wider" if wide > 1.0 else "narrower", "stiffer" if fast > 1.0 else "softer"
     kind = bore if abs(np.log(wide)) > abs(np.log(fast)) else wall
     return (
-        f"like {values['length']:.2f} m of a {kind} pipe: {wide:.2g} times the diameter and "
-        f"{fast:.2g} times the wave speed of the line"
+        f"{values['length']:.2f} m of a {kind} pipe, with {wide:.2f} times the diameter and "
+        f"{fast:.2f} times the wave speed of the line"
     )
 
 

@@ -3,7 +3,13 @@
 import pytest
 
 from paper_rig import paper_rig
-from rippletwin.figures.words import name_effect, name_element, name_hypothesis, name_parameter
+from rippletwin.case.words import (
+    name_effect,
+    name_effects,
+    name_element,
+    name_hypothesis,
+    name_parameter,
+)
 from rippletwin.twin.effects.library import EFFECTS, candidates
 from rippletwin.twin.twin import Twin
 
@@ -20,7 +26,7 @@ def test_every_effect_at_every_place_is_a_phrase():
 @pytest.mark.parametrize("effect", sorted(EFFECTS))
 def test_every_effect_has_words_of_its_own(effect):
     """An effect that is added needs a line in `words`: underscores alone are no phrase."""
-    from rippletwin.figures import words
+    from rippletwin.case import words
 
     assert effect in {*words.AT_SENSOR, *words.AT_OTHER}
 
@@ -36,12 +42,13 @@ def test_every_parameter_of_a_twin_is_a_phrase():
 
 def test_phrases_say_the_element_where_the_name_does_not():
     """Exact words, as they stand in figures."""
-    assert name_effect("sensor_gain", "sensor p1") == "gain of sensor p1"
+    assert name_effect("sensor_gain", "sensor p1") == "gain error of sensor p1"
     assert name_effect("load_dynamics", "load (spool)") == "dynamics of the load (spool)"
     assert name_hypothesis("viscoelastic_wall, segment 2 + unsteady_friction, line") == [
         "viscoelastic wall of segment 2",
         "unsteady friction",
     ]
+    assert name_effect("source_impedance", "source (leakage)") == "leakage at the pump"
     assert name_hypothesis("") == ["nothing missing"]
     assert name_parameter("wave_speed[2]") == "wave speed of segment 2"
     assert name_parameter("position[p1]") == "position of sensor p1"
@@ -49,3 +56,23 @@ def test_phrases_say_the_element_where_the_name_does_not():
     assert name_parameter("state[cold oil]") == "wave speed during cold oil, relative"
     assert name_parameter("reflection[3]") == "Schur parameter 3 of the load"
     assert name_element("between pump and p1") == "between the pump and p1"
+    assert name_element("between p1 and load") == "between p1 and the load"
+
+
+def test_places_of_an_effect_are_told_as_places():
+    """A distance, a stretch, and one of several at free positions."""
+    assert name_effect("leak", "1.20 m") == "leak 1.20 m from the pump"
+    assert name_effect("leak", "between pump and p1") == "leak between the pump and p1"
+    assert name_effect("leak", "position 2") == "leak number 2"
+    assert name_effect("sensor_gain") == "gain error of a sensor"
+
+
+def test_effects_of_one_name_are_told_together():
+    """Sensors and segments in their order; semicolons where an "and" is inside."""
+    delays = [("sensor_delay", "sensor p2"), ("sensor_delay", "sensor p1")]
+    assert name_effects(delays) == "delay of sensors p1 and p2"
+    assert name_effects([*delays, ("leak", "position")]) == "delay of sensors p1 and p2; leak"
+    assert (
+        name_effects([("leak", "position"), ("entrained_air", "line")]) == "leak and entrained air"
+    )
+    assert name_effects([]) == ""

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 AT_SENSOR = {
-    "sensor_gain": "gain",
+    "sensor_gain": "gain error",
     "sensor_delay": "delay",
     "sensor_dynamics": "resonance",
 }
@@ -23,26 +23,29 @@ AT_OTHER = {
     "load_dynamics": "dynamics of the load",
     "end_radiation": "radiation from the open end",
     "end_reflection": "reflection at the anechoic end",
-    "source_impedance": "impedance of the pump",
+    "source_impedance": "volume or leakage at the pump",
     "piston_spread": "spread of the pistons",
     "speed_fluctuation": "fluctuation of the speed",
     "passive_network": "network without a name",
     "passive_piece": "piece of another pipe",
 }
+WORDS_AFTER_FORM = {"source_impedance": "at the pump"}
+"""Effects that their form names: "volume at the pump"."""
 IMPLIED_PLACES = ("line", "position", "load", "source")
 """Elements that an effect's name says already, or that say no place."""
+PLACES = ("between ", "in ", "at ")  # beginnings of what says a place already
 
 PARAMETERS = {
-    "load": "resistance of the load, relative",
+    "load": "relative resistance of the load",
     "position": "distance from the pump",
     "compliance_ratio": "additional compliance of the wall",
     "retardation_time": "retardation time of the wall",
     "conductance": "leakage conductance",
-    "gas_fraction": "free gas, by volume",
-    "gain_error": "error of the gain",
+    "gas_fraction": "free gas by volume",
+    "gain_error": "gain error",
     "viscosity": "kinematic viscosity",
-    "port_timing": "port timing, late",
-    "end_correction": "end correction, of the radius",
+    "port_timing": "lag of the port timing",
+    "end_correction": "end correction in radii",
 }
 STATES = {
     "healthy": "healthy",
@@ -54,17 +57,57 @@ NOTHING = "nothing missing"
 
 
 def name_effect(name: str, element: str | None = None) -> str:
-    """An effect at its element in words: "gain of sensor p1", "viscoelastic wall of segment 2".
+    """An effect at its element in words: "delay of sensor p1", "viscoelastic wall of segment 2".
 
-    `element` may end in the form of the effect in brackets: "load (spool)".
+    `element` may be a distance ("1.20 m") or a place ("in segment 2"). It may end in the form of
+    the effect in brackets, and in the number of one of several at free positions: "load (spool)",
+    "position (shunt) 2".
     """
     words = AT_SENSOR.get(name) or AT_OTHER.get(name) or name.replace("_", " ")
     if not element:
-        return words
-    place, form = re.fullmatch(r"(.*?)(?: \((.*)\))?", element).groups()
-    if place not in IMPLIED_PLACES:
-        words = f"{words} of {place}"
+        return f"{words} of a sensor" if name in AT_SENSOR else words
+    if re.fullmatch(r"[\d.]+ m", element):
+        return f"{words} {element} from the pump"
+    numbered = re.fullmatch(r"(position.*) (\d+)", element)
+    if numbered:
+        element = numbered.group(1)
+        words += f" number {numbered.group(2)}"
+    place, form = re.fullmatch(r"(.*?)(?: \((.*)\))?", element, re.DOTALL).groups()
+    if form and name in WORDS_AFTER_FORM:
+        return f"{form} {WORDS_AFTER_FORM[name]}"
+    if place.startswith(PLACES):
+        words += f" {name_place(place)}"
+    elif place not in IMPLIED_PLACES:
+        words += f" of {place}"
     return f"{words} ({form})" if form else words
+
+
+def name_effects(effects: Iterable[tuple[str, str | None]]) -> str:
+    """Effects (name, element) as in a sentence, those of one name together.
+
+    "unsteady friction and resonance of sensors p1 and p2"; "" for none.
+    """
+    elements: dict[str, list[str | None]] = {}
+    for name, element in effects:
+        elements.setdefault(name, []).append(element)
+    groups = []
+    for name, each in elements.items():
+        kinds = [re.fullmatch(r"(sensor|segment) (.+)", e or "", re.DOTALL) for e in each]
+        if len(each) > 1 and all(kinds):
+            own = join_words(sorted(kind.group(2) for kind in kinds))
+            words = name_effect(name, each[0]).removesuffix(f" of {each[0]}")
+            groups.append(f"{words} of {kinds[0].group(1)}s {own}")
+        else:
+            groups += [name_effect(name, element) for element in each]
+    is_nested = len(groups) > 1 and any(" and " in group for group in groups)
+    return "; ".join(groups) if is_nested else join_words(groups)
+
+
+def name_equivalents(classes: Iterable[Sequence[str]]) -> str:
+    """The `equivalents` of a verdict, lists of "name" or "name at place", in words."""
+    return "; ".join(
+        join_words([name_effect(*label.split(" at ", 1)) for label in labels]) for labels in classes
+    )
 
 
 def name_hypothesis(label: str) -> list[str]:
@@ -94,14 +137,15 @@ def name_element(element: str) -> str:
     stem, _, kind = element.partition(", ")
     words = {"source": "the pump", "load": "the load", "line": "the whole line"}.get(stem, stem)
     words = words.replace("position", "one place")
-    words = words.replace("between pump", "between the pump").replace("and load", "and the load")
+    if words.startswith("between "):
+        words = re.sub(r"\b(pump|load)$|(?<=^between )pump\b", r"the \g<0>", words)
     return f"{words} ({kind})" if kind else words
 
 
 def name_place(element: str) -> str:
     """Where an element is, in words: "at the pump", "in segment 2", "between p1 and p2"."""
     words = name_element(element)
-    if words.startswith("between"):
+    if words.startswith(PLACES):
         return words
     return f"in {words}" if words.startswith(("segment", "the whole")) else f"at {words}"
 
