@@ -35,11 +35,12 @@ n is the mean square over the sensors of what an orifice's products of harmonics
 prediction. They are wrong by lambda, several times more than the harmonics themselves, and come
 from the load and not along h.
 
-The covariance is that of the prediction: with the data in its place a shrinking model would fit
-anything. The log determinant is that of the data: with the prediction in its place a shrinking
-model would gain. Explaining adds a least delta and the choice to be source-free: sigma is infinite,
-which projects amplitude and phase of the source out at every frequency. All observations stand side
-by side.
+The covariance is that of the prediction, in the sum of squares and in the log determinant. With the
+data in its place in the first a shrinking model would fit anything. With the data in its place in
+the second the likeliest prediction would be too large, by the factor 1 + sigma^2 where the source's
+error is all there is. Explaining adds a least delta and the choice to be source-free: sigma is
+infinite, which projects amplitude and phase of the source out at every frequency. All observations
+stand side by side.
 """
 
 from __future__ import annotations
@@ -62,12 +63,19 @@ wanders while harmonics are averaged, the orifice's exponent is not exactly 1/2,
 """
 
 MODEL_ERRORS = np.geomspace(MIN_MODEL_ERROR, 1.5, 9)
-SOURCE_SDS = np.array([0.01, 0.03, 0.1, 0.3, 1.0])
-"""Values of sigma. No pump model has a harmonic to better than 1 %. Relief grooves and free air
-that a data sheet does not state change a ripple by 20 to 80 % (docs/explanation/pump.md)."""
-SMOOTH_SDS = np.array([0.01, 0.03, 0.1, 0.3])  # values of tau
+SOURCE_SDS = np.array([0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0])
+"""Values of sigma. Relief grooves and free air that a data sheet does not state change a ripple by
+20 to 80 % (docs/explanation/pump.md). The least is below what any pump model reaches: a sigma that
+is larger than the truth would make the likeliest prediction too small."""
+SMOOTH_SDS = np.array([0.003, 0.01, 0.03, 0.1, 0.3])  # values of tau
+FIRST_SOURCE_SD = 0.03  # before any residual is known
+FINER_ERRORS = 7  # values between two neighbours of a grid
 SIZE_SD, SIZE_SD_OF_PUMP = 0.03, 0.01  # s, and s where the pump's numbers are parameters
 PRODUCT_ERROR = 0.2  # lambda
+
+DETERMINANT_OFFSET = 50.0
+"""A frequency, added to the log determinant to make it half a square. It is above what a free
+source takes away, and leaves the curvature to the other residuals."""
 
 
 class Posterior:
@@ -92,10 +100,8 @@ class Posterior:
         self.observations = [select_below(o, max_frequency_hz) for o in observations]
         self.forward = DifferentiableForward(twin, self.observations)
         self.source_free = source_free
-        self.model_error, self.source_sd, self.smooth_sd = 0.1, float(SOURCE_SDS[1]), 0.0
+        self.model_error, self.source_sd, self.smooth_sd = 0.1, FIRST_SOURCE_SD, 0.0
         self.max_model_error, self._products = np.inf, 0.0
-        self._known_for: tuple | None = None
-        self._known_determinant = 0.0
         self.prior = np.array([not p.flat for p in twin.parameters])
         data = [to_predicted_quantity(o, twin.rig) for o in self.observations]
         self._noise = NoiseBasis(np.concatenate([o.covariance for o in data]))
@@ -163,22 +169,13 @@ class Posterior:
         covariance then is that of the first.
         """
         whitening = self._whitening(prediction[(0,) * (prediction.ndim - 2)])
-        r = whitening.apply(self._rotated - self._rotate(prediction))
-        return r, self.log_determinant()
+        return whitening.apply(self._rotated - self._rotate(prediction)), whitening.log_determinant
 
-    def log_determinant(self) -> float:
-        """Log determinant of the covariance at the present errors, evaluated at the data.
-
-        At the prediction, a uniformly too small prediction would be rewarded: the error of the
-        ripple's size would absorb all of what it lacks.
-        """
-        errors = self.model_error, self.source_sd, self.smooth_sd, np.sum(self._products)
-        if errors != self._known_for:
-            self._known_for, self._known_determinant = (
-                errors,
-                self._whitening(self.values).log_determinant,
-            )
-        return self._known_determinant
+    def constant_log_determinant(self) -> float:
+        """What of the log determinant does not depend on the prediction; it is in no residual of
+        `linearise`."""
+        offset = DETERMINANT_OFFSET * len(self.power)
+        return float(np.sum(np.log(self._variance(self.model_error)))) - offset
 
     def _variance(self, model_error) -> np.ndarray:
         """Variance (..., S, F) of the readings without the share of the source."""
@@ -226,34 +223,41 @@ class Posterior:
         if linear is not None:
             self._products = PRODUCT_ERROR**2 * np.mean(np.abs(prediction - linear) ** 2, axis=0)
         h = self._rotate(prediction)
-        model_errors = MODEL_ERRORS
         any_nominal = len(self._smooth.frequencies) > 0
-        sds = SOURCE_SDS if any_nominal else SOURCE_SDS[:1]
-        taus = SMOOTH_SDS if any_nominal else np.zeros(1)
+        grids = [
+            SMOOTH_SDS if any_nominal else np.zeros(1),
+            SOURCE_SDS if any_nominal else SOURCE_SDS[:1],
+            MODEL_ERRORS,
+        ]
+        errors = [self.smooth_sd, self.source_sd, self.model_error]
         if near:
-            model_errors = _neighbours(model_errors, self.model_error)
-            sds, taus = _neighbours(sds, self.source_sd), _neighbours(taus, self.smooth_sd)
-        for _ in range(2):
-            cost = error_costs(
-                self._rotated - h,
-                h,
-                self._noise.variances + self._products,
-                self.power,
-                self._source_scale,
-                self._smooth.frequencies,
-                self._smooth.basis,
-                model_errors,
-                sds,
-                self._smooth.sds(taus),
-                scale,
-            )
-            smooth, source, best = np.unravel_index(np.argmin(cost), cost.shape)
-            self.model_error = float(model_errors[best])
-            self.source_sd, self.smooth_sd = float(sds[source]), float(taus[smooth])
-            low, high = max(int(best) - 1, 0), min(int(best) + 1, len(model_errors) - 1)
-            model_errors = np.geomspace(model_errors[low], model_errors[high], 7)
-            sds, taus = sds[source : source + 1], taus[smooth : smooth + 1]
+            grids = [_neighbours(grid, value) for grid, value in zip(grids, errors)]
+        best = self._likeliest_errors(h, grids, scale)
+        errors = [float(grid[k]) for grid, k in zip(grids, best)]
+        for axis in (2, 1, 0):  # then each alone, between its neighbours on the grid
+            finer = [np.array([value]) for value in errors]
+            finer[axis] = _between_neighbours(grids[axis], best[axis])
+            errors[axis] = float(finer[axis][self._likeliest_errors(h, finer, scale)[axis]])
+        self.smooth_sd, self.source_sd, self.model_error = errors
         self.model_error = min(self.model_error, self.max_model_error)
+
+    def _likeliest_errors(self, h: np.ndarray, grids: Sequence, scale: float) -> tuple[int, ...]:
+        """Indices of the likeliest tau, sigma and delta of three `grids`."""
+        taus, sds, model_errors = grids
+        cost = error_costs(
+            self._rotated - h,
+            h,
+            self._noise.variances + self._products,
+            self.power,
+            self._source_scale,
+            self._smooth.frequencies,
+            self._smooth.basis,
+            model_errors,
+            sds,
+            self._smooth.sds(taus),
+            scale,
+        )
+        return tuple(int(k) for k in np.unravel_index(np.argmin(cost), cost.shape))
 
     @property
     def needs_full_jacobian(self) -> bool:
@@ -268,8 +272,9 @@ class Posterior:
     def linearise(self, theta: np.ndarray, prediction: np.ndarray, besides=None):
         """Residual r (N,) and its Jacobian J (N, P) at the present errors.
 
-        The first 2 S F residuals are the whitened ones, of unit variance. theta follows where it
-        has a prior. The gradient of the `objective` is J^T r.
+        The first 2 S F residuals are the whitened ones, of unit variance. The next is that of the
+        log determinant. theta follows where it has a prior. The gradient of the `objective` is
+        J^T r, and half the square sum is the objective without `constant_log_determinant`.
 
         besides   (B, S, F) further directions of the prediction, B more columns of the Jacobian
         """
@@ -290,15 +295,23 @@ class Posterior:
     def whiten_slopes(
         self, prediction: np.ndarray, slopes: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Whitened residual (2 S F,) and its derivatives (B, 2 S F) at the present errors, given
-        those (B, S, F) of the prediction."""
+        """Residual (2 S F + 1,) and its derivatives (B, 2 S F + 1) at the present errors, given
+        those (B, S, F) of the prediction.
+
+        The last residual is sqrt(2 L + const), L the part of the log determinant that depends on
+        the prediction: half its square is L.
+        """
         whitening = self._whitening(prediction)
         whitened = whitening.apply(self._rotated - self._rotate(prediction))
         # The sum of squares is the least over the error of the source. Its gradient therefore is
         # that with the source fixed at its most likely value, which multiplies every derivative.
-        slopes = slopes * self._source(prediction, whitening, whitened)
-        columns = -as_real(whitening.apply(self._rotate(slopes))).reshape(len(slopes), -1)
-        return as_real(whitened).ravel(), columns
+        moved = slopes * self._source(prediction, whitening, whitened)
+        columns = -as_real(whitening.apply(self._rotate(moved))).reshape(len(slopes), -1)
+        offset = DETERMINANT_OFFSET * len(self.power)
+        last = np.sqrt(2.0 * (whitening.source_log_determinant + offset))
+        last_column = whitening.determinant_slopes(self._rotate(slopes)) / last
+        residual = np.append(as_real(whitened).ravel(), last)
+        return residual, np.column_stack([columns, last_column])
 
     def best_source(self, prediction: np.ndarray) -> np.ndarray:
         """The prediction with every free source at its most likely amplitude, (S, F)."""
@@ -335,3 +348,10 @@ def _neighbours(grid: np.ndarray, value: float) -> np.ndarray:
     """The values of an ascending grid next to `value`: the nearest, one below and one above."""
     nearest = int(np.argmin(np.abs(np.log(np.maximum(grid, 1e-9) / max(value, 1e-9)))))
     return grid[max(nearest - 1, 0) : nearest + 2]
+
+
+def _between_neighbours(grid: np.ndarray, k: int) -> np.ndarray:
+    """Finer values of an ascending grid between the neighbours of its entry `k`."""
+    if len(grid) == 1:
+        return grid
+    return np.geomspace(grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)], FINER_ERRORS)

@@ -72,14 +72,18 @@ class SmoothCorrections:
         self._expanded, self._at_mode = zip(*(self._expand(e, slopes) for e in self._errors))
 
     def _expand(self, model_error: float, slopes: np.ndarray) -> tuple[tuple, float]:
-        """Residual at theta = 0, scaled Jacobian (P, N) and log determinant at a model error; and
-        half the square sum at the mode."""
+        """Residual at theta = 0, scaled Jacobian (P, N) and constant part of the log determinant at
+        a model error; and half the square sum at the mode."""
         prior = self._posterior.prior
         self._posterior.model_error = float(model_error)
         r, jacobian = self._posterior.whiten_slopes(self._prediction, slopes)
         start = np.where(prior, self.theta, 0.0)
         scale = np.where(prior, 1.0, FLAT_SD)[:, None]
-        expanded = r - start @ jacobian, jacobian * scale, self._posterior.log_determinant()
+        expanded = (
+            r - start @ jacobian,
+            jacobian * scale,
+            self._posterior.constant_log_determinant(),
+        )
         return expanded, 0.5 * float(r @ r + start @ start)
 
     def log_evidence(self, element: tuple = (NONE, None)) -> float:
@@ -168,7 +172,9 @@ class SmoothCorrections:
             prediction = self._observe(network, element, share * correction, here)
             if not posterior.is_valid(prediction):
                 continue
-            square = np.sum(np.abs(posterior.whitened(prediction)[0]) ** 2)
+            r, log_determinant = posterior.whitened(prediction)
+            square = np.sum(np.abs(r) ** 2) + log_determinant
+            square -= posterior.constant_log_determinant()
             square += 0.5 * np.sum((start + share * (unit[:count] - start)) ** 2)
             square += 0.5 * np.sum((share * unit[count:]) ** 2)
             least = min(least, float(square))

@@ -23,7 +23,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from rippletwin.calibration.posterior import MIN_MODEL_ERROR, SMOOTH_SDS, SOURCE_SDS, Posterior
+from rippletwin.calibration.posterior import FIRST_SOURCE_SD, MIN_MODEL_ERROR, Posterior
 from rippletwin.case.model import Rig
 from rippletwin.explanation.search.stepwise_search import applicable_candidates
 from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR, MIN_LOG_BAYES_FACTOR
@@ -134,8 +134,8 @@ class _Rival:
         posterior = Posterior(self.twin, seen)
         posterior.model_error = MIN_MODEL_ERROR
         nominal = any(o.source == "nominal" for o in seen)
-        posterior.source_sd = float(SOURCE_SDS[1])
-        posterior.smooth_sd = float(SMOOTH_SDS[1]) if nominal else 0.0
+        posterior.source_sd = FIRST_SOURCE_SD
+        posterior.smooth_sd = FIRST_SOURCE_SD if nominal else 0.0
         theta = self.twin.theta
         r, jacobian = posterior.linearise(theta, posterior.predict(theta))
         count = 2 * posterior.values.size  # the rest are the residuals of the priors
