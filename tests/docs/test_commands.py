@@ -45,6 +45,7 @@ NOT_RUN = {
     "make docs-site": ("it makes an environment", "make --dry-run docs-site"),
     "make test": ("it runs this test", "make --dry-run test"),
     "make test-long": ("it runs this test", "make --dry-run test-long"),
+    "make coverage": ("it runs this test", "make --dry-run coverage"),
     "python3 -m venv .venv": (NETWORK, "python3 -m venv --help"),
     ". .venv/bin/activate": ("it needs the environment above", "true"),
     "pip install --requirement environment.txt": (
