@@ -288,6 +288,13 @@ def _select_fitted(
     halves: Sequence[Observation], rig: Rig, data: Sequence[Observation]
 ) -> list[Observation]:
     """The halves of recordings as the whole ones, `data`, are fitted."""
-    ripples = {o.label: o.flow_ripple for o in data}
-    fitted = [replace(half, flow_ripple=ripples[half.label]) for half in halves]
+    whole = {o.label: o for o in data}
+    fitted = [
+        replace(
+            half,
+            flow_ripple=whole[half.label].flow_ripple,
+            modulation=whole[half.label].modulation,
+        )
+        for half in halves
+    ]
     return select_fitted_frequencies(fitted, rig, HIGHEST_HZ)

@@ -19,6 +19,7 @@ from scipy.optimize import least_squares
 from scipy.special import jv
 
 from rippletwin.explanation.localise.order_flow import OrderFlow
+from rippletwin.explanation.thresholds import MIN_SHAFT_ORDER_LEVEL
 
 CARRIER_LIMITS = (4, 12, 1000)
 """Numbers of piston orders, from the lowest, that give a first estimate of b, as a small one. High
@@ -31,7 +32,7 @@ class Modulation(NamedTuple):
 
     amplitude   b, rad
     sidebands   (F,) flow that it makes at the orders of an `OrderFlow`, m3/s; 0 at piston orders
-    energy      of the flow at shaft orders, each order relative to its neighbourhood
+    energy      of the flow at shaft orders, each order relative to its neighbourhood, without noise
     left        of that, what the modulation does not account for
     """
 
@@ -47,7 +48,7 @@ class Modulation(NamedTuple):
         degrees of freedom. The pattern of the modulation has as much of it in each of its two.
         """
         left = self.left / (pistons - 3)
-        return float(np.sqrt(left / max(self.energy - self.left, left)))
+        return float(np.sqrt(left / max(self.energy - self.left, left, 1e-300)))
 
 
 def fit_modulation(flow: OrderFlow, pistons: int, start: complex | None = None) -> Modulation:
@@ -55,6 +56,7 @@ def fit_modulation(flow: OrderFlow, pistons: int, start: complex | None = None) 
 
     start   an estimate of b, which then takes one step; by default b is sought from several
 
+    Each order counts relative to its neighbourhood, down to flows that the sensors hardly see.
     Orders below half the first piston order are left out: the line is not fitted there, and the
     mean flow is modulated too.
     """
@@ -64,7 +66,9 @@ def fit_modulation(flow: OrderFlow, pistons: int, start: complex | None = None) 
     orders = flow.orders[used]
     near = np.abs(np.subtract.outer(orders, orders)) <= half + 1
     power = near @ np.abs(flow.values[used]) ** 2 / np.sum(near, axis=1)
-    weight = 1.0 / np.sqrt(flow.variance[used] + power)
+    pressure = np.mean(np.abs(flow.gain * flow.values)[used] ** 2)
+    negligible = MIN_SHAFT_ORDER_LEVEL**2 * pressure / flow.gain[used] ** 2
+    weight = 1.0 / np.sqrt(flow.variance[used] + power + negligible)
     target = weight * flow.values[used]
 
     def even_flow(b: complex) -> tuple[np.ndarray, np.ndarray]:
@@ -87,8 +91,11 @@ def fit_modulation(flow: OrderFlow, pistons: int, start: complex | None = None) 
     at_piston = flow.orders % pistons == 0
     spread = spread_by_modulation(flow.orders, carriers, b) @ even_flow(b)[0]
     sidebands = np.where(at_piston, 0.0, spread)
-    energy = float(np.sum(np.abs(target[~at_piston[used]]) ** 2))
-    return Modulation(b, sidebands, energy, 2.0 * float(best.cost))
+    is_shaft_order = ~at_piston[used]
+    noise = float(np.sum((weight**2 * flow.variance[used])[is_shaft_order]))
+    energy = float(np.sum(np.abs(target[is_shaft_order]) ** 2)) - noise
+    left = 2.0 * float(best.cost) - noise
+    return Modulation(b, sidebands, max(energy, 0.0), max(left, 0.0))
 
 
 def spread_by_modulation(orders: np.ndarray, carriers: np.ndarray, b: complex) -> np.ndarray:

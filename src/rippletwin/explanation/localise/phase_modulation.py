@@ -13,7 +13,6 @@ import numpy as np
 from scipy.special import j0
 
 from rippletwin.calibration.frequency_continuation import fit_hypothesis, refine
-from rippletwin.case.model import FlowRipple
 from rippletwin.explanation.fit_jobs import transfer_theta
 from rippletwin.explanation.localise.shaft_orders import (
     ShaftOrders,
@@ -21,7 +20,6 @@ from rippletwin.explanation.localise.shaft_orders import (
     shaft_order_level,
 )
 from rippletwin.explanation.thresholds import MIN_SHAFT_ORDER_LEVEL
-from rippletwin.harmonics import flow_harmonics, phase_modulate
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
 from rippletwin.twin.twin import Twin
 
@@ -72,12 +70,10 @@ def modulation_differs(
 
 
 def with_phase_modulation(observations: Sequence, shaft_orders: ShaftOrders | None) -> list:
-    """The observations with the flow ripple of a shaft with the modulation of `shaft_orders`."""
+    """The observations with the modulation of `shaft_orders`."""
     modulation = _modulation_of(shaft_orders)
     return [
-        o
-        if o.flow_ripple is None or o.label not in modulation
-        else replace(o, flow_ripple=modulate_ripple(o.flow_ripple, modulation[o.label]))
+        replace(o, modulation=modulation[o.label]) if o.label in modulation else o
         for o in observations
     ]
 
@@ -85,15 +81,3 @@ def with_phase_modulation(observations: Sequence, shaft_orders: ShaftOrders | No
 def _modulation_of(shaft_orders: ShaftOrders | None) -> Mapping[str, complex]:
     """Modulation of each recording by its label; empty without a speed fluctuation."""
     return {} if shaft_orders is None else shaft_orders.modulation
-
-
-def modulate_ripple(ripple: FlowRipple, modulation: complex) -> FlowRipple:
-    """The flow ripple of a shaft that leads an even rotation by Re(b exp(j t)) rad at angle t.
-
-    b is `modulation`.
-    """
-    count = max(len(ripple.flow) // 2, 8)
-    spectrum = flow_harmonics(ripple, np.arange(count))
-    flow = phase_modulate(spectrum, modulation, 4 * count)
-    angle = 360.0 * np.arange(len(flow)) / len(flow)
-    return replace(ripple, angle_deg=angle, flow=flow, modulation=modulation)

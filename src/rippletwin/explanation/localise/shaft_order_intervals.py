@@ -3,9 +3,9 @@
 An amplitude has two errors: noise of the readings, and errors of the twin that turns readings into
 flow. Both are drawn and the amplitudes are estimated again: the readings by their covariance and
 the model error, the parameters of the twin by their posterior. A modulation has a third one, the
-part of the pistons' deviations that looks like it, which is common to all recordings. The interval is that of a normal
-distribution with the bootstrap's standard deviation, and its bias taken off (Efron and Tibshirani
-1993, An Introduction to the Bootstrap, secs. 6.2 and 10.2).
+part of the pistons' deviations that looks like it, which is common to all recordings. The interval
+is that of a normal distribution with the bootstrap's standard deviation, and its bias taken off
+(Efron and Tibshirani 1993, An Introduction to the Bootstrap, secs. 6.2 and 10.2).
 """
 
 from __future__ import annotations

@@ -129,7 +129,8 @@ def _name_effects(
     flows: Sequence[OrderFlow], modulations: Sequence[Modulation], pistons: int
 ) -> tuple[ShaftEffect, ...]:
     """The effects that make the flow at shaft orders, the stronger first."""
-    share = 1.0 - sum(m.left for m in modulations) / sum(m.energy for m in modulations)
+    energy = sum(m.energy for m in modulations)
+    share = 1.0 - sum(m.left for m in modulations) / max(energy, 1e-300)
     whole = sum(np.sum(np.abs(flow.gain * flow.values) ** 2) for flow in flows)
     modulated = spread = 0.0
     for flow, modulation in zip(flows, modulations):
