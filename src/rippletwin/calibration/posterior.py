@@ -46,6 +46,7 @@ stand side by side.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 
@@ -105,9 +106,7 @@ class Posterior:
         self.prior = np.array([not p.flat for p in twin.parameters])
         data = [to_predicted_quantity(o, twin.rig) for o in self.observations]
         self._noise = NoiseBasis(np.concatenate([o.covariance for o in data]))
-        self.values = np.concatenate([o.values for o in data], axis=1)  # (S, F)
-        self._rotated = self._rotate(self.values)
-        self.power = np.mean(np.abs(self.values) ** 2, axis=0)  # (F,)
+        self._set_values(np.concatenate([o.values for o in data], axis=1))
         sources = np.repeat([o.source for o in data], [o.values.shape[1] for o in data])
         self._known = sources == "known"
         self._free = (sources == "free") | (source_free & (sources == "nominal"))
@@ -127,6 +126,18 @@ class Posterior:
         self._source_scale = np.where(self._known, 0.0, np.where(self._free, np.inf, self._scale))
         self.count = 2 * (self.values.size - int(np.sum(self._free)))
         self._pressures = all(o.kind != "input_impedance" for o in data)
+
+    def _set_values(self, values: np.ndarray) -> None:
+        self.values = values
+        self._rotated = self._rotate(values)
+        self.power = np.mean(np.abs(values) ** 2, axis=0)
+
+    def with_values(self, values: np.ndarray) -> Posterior:
+        """The same error model, at the present errors, of other measured `values` (S, F), given in
+        the quantity that is predicted. It shares the forward model."""
+        other = copy(self)
+        other._set_values(values)
+        return other
 
     def below(self, max_frequency_hz: float) -> Posterior:
         """The same error model of the data at and below a frequency."""

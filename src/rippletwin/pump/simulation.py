@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rippletwin.case.model import ATMOSPHERE, FlowRipple, Fluid, absolute
+from rippletwin.harmonics import resample_period
 from rippletwin.pump import chambers
 from rippletwin.pump.faults import Cylinder, Slipper, leak_conductances, orifice_conductance
 from rippletwin.pump.geometry import Geometry
@@ -23,7 +24,6 @@ from rippletwin.pump.outlets import (
     orifice_coefficient,
     pipe_state,
     pressure_at_steps,
-    resample_periodic,
 )
 from rippletwin.pump.source_admittance import source_admittance
 
@@ -133,7 +133,7 @@ def simulate(
     pressures, readings = pressures - ATMOSPHERE, readings - ATMOSPHERE
 
     def sample(values):  # values at the end of each step -> at the output's angles
-        return resample_periodic(np.roll(values, 1, axis=0), samples_per_revolution).T
+        return resample_period(np.roll(values, 1, axis=0).T, samples_per_revolution)
 
     return PumpRipple(
         angle_deg=np.arange(samples_per_revolution) * 360.0 / samples_per_revolution,
