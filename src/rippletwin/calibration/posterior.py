@@ -326,7 +326,7 @@ class Posterior:
 
     def best_source(self, prediction: np.ndarray) -> np.ndarray:
         """The prediction with every free source at its most likely amplitude, (S, F)."""
-        return np.where(self._free, self._amplitude(prediction), 1.0) * prediction
+        return self._with_free_amplitudes(np.ones(len(self.power)), prediction) * prediction
 
     def most_likely_source(self, prediction: np.ndarray) -> np.ndarray:
         """Most likely source (F,) relative to that of the prediction, at the present errors."""
@@ -339,17 +339,19 @@ class Posterior:
         pull = np.sum(np.conj(self._rotate(prediction)) * whitening.adjoint(whitened), axis=0)
         error = (self.source_sd * self._scale) ** 2 * pull
         error[self._smooth.frequencies] += self._smooth.most_likely(pull, self.smooth_sd)
-        return np.where(
-            self._free, self._amplitude(prediction), 1.0 + np.where(self._known, 0.0, error)
-        )
+        source = 1.0 + np.where(self._known, 0.0, error)
+        return self._with_free_amplitudes(source, prediction)
 
-    def _amplitude(self, prediction: np.ndarray) -> np.ndarray:
-        """Most likely amplitude (F,) of a free source relative to that of the prediction."""
+    def _with_free_amplitudes(self, source: np.ndarray, prediction: np.ndarray) -> np.ndarray:
+        """`source` (F,), with that of a free source at its most likely amplitude."""
+        if not self._free.any():
+            return source
         weight = 1.0 / self._variance(self.model_error)
         h = self._rotate(prediction)
-        return np.sum(weight * np.conj(h) * self._rotated, 0) / np.maximum(
+        amplitude = np.sum(weight * np.conj(h) * self._rotated, 0) / np.maximum(
             np.sum(weight * np.abs(h) ** 2, 0), 1e-300
         )
+        return np.where(self._free, amplitude, source)
 
     def _rotate(self, x: np.ndarray) -> np.ndarray:
         return self._noise.rotate(x)
