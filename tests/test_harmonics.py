@@ -5,7 +5,13 @@ import pytest
 from scipy.special import jv
 
 from rippletwin.case.model import FlowRipple
-from rippletwin.harmonics import flow_harmonics, one_period, peak_amplitudes, phase_modulate
+from rippletwin.harmonics import (
+    flow_harmonics,
+    one_period,
+    peak_amplitudes,
+    phase_modulate,
+    resample_period,
+)
 
 ORDERS = np.array([0, 3, 9, 40])
 
@@ -30,6 +36,21 @@ def test_a_period_survives_there_and_back(count):
     """Any period comes back from its harmonics, the last order of an even count included."""
     wave = np.random.default_rng(1).normal(size=(3, count))
     np.testing.assert_allclose(one_period(peak_amplitudes(wave), count), wave, atol=1e-12)
+
+
+@pytest.mark.parametrize("count", [16, 17, 64, 81])
+@pytest.mark.parametrize("size", [32, 33])
+def test_a_resampled_period_is_the_same_wave(size, count):
+    """Orders that both counts can have come back at the other instants, and no other ones do."""
+    t, other = (2 * np.pi * np.arange(n) / n for n in (size, count))
+    wave = np.array([1.0 + np.cos(7 * t + 0.3), np.sin(3 * t)])
+    if size == 32 and count > size:
+        wave[1] += np.cos(16 * t)  # of an even count the last order is a cosine
+    expected = np.array([1.0 + np.cos(7 * other + 0.3), np.sin(3 * other)])
+    expected[1] += np.cos(16 * other) if size == 32 and count > size else 0.0
+    np.testing.assert_allclose(resample_period(wave, count), expected, atol=1e-12)
+    above = resample_period(np.cos(16 * t), 32 if size == 33 else 16)
+    np.testing.assert_allclose(above, 0.0, atol=1e-12)
 
 
 def test_modulation_makes_the_sidebands_of_a_modulated_wave():

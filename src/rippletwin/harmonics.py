@@ -1,4 +1,4 @@
-"""Harmonics of one period: peak amplitudes of its orders, and phase modulation of a flow."""
+"""Harmonics of one period: peak amplitudes of its orders, resampling, phase modulation."""
 
 from __future__ import annotations
 
@@ -43,6 +43,20 @@ def one_period(
     spectrum[..., orders] = 0.5 * count * np.asarray(amplitudes)
     spectrum[..., 0] *= 2.0
     return irfft(spectrum, count)
+
+
+def resample_period(period: np.ndarray, count: int) -> np.ndarray:
+    """One period (..., M) at `count` even instants, with the orders that both can have.
+
+    The order count/2 of an even count, of which the sine is not sampled, is left out.
+    """
+    size = np.shape(period)[-1]
+    spectrum = rfft(period)[..., : count // 2 + 1]
+    if count < size and count % 2 == 0:
+        spectrum[..., -1] = 0.0
+    if count > size and size % 2 == 0:
+        spectrum[..., -1] *= 0.5  # the last order becomes one like the others
+    return irfft(spectrum, count) * (count / size)
 
 
 def flow_harmonics(ripple: FlowRipple, orders: np.ndarray) -> np.ndarray:

@@ -5,13 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rippletwin.calibration.posterior import FIRST_SOURCE_SD, MIN_MODEL_ERROR, Posterior
+from rippletwin.case.model import Fluid, Load, Rig, Segment, Uncertainty
 from rippletwin.case.recording_advice import BAND_HZ
 from rippletwin.explanation.explain import HIGHEST_HZ
+from rippletwin.explanation.search.stepwise_search import applicable_candidates
 from rippletwin.explanation.verdict.expected_confusion import (
     CHANGE,
+    _Rival,
     expect_discriminations,
     in_words,
 )
+from rippletwin.explanation.verdict.next_experiment import FLAT_VARIANCE
+from rippletwin.spectra.observation import Observation
+from rippletwin.twin.twin import Twin
 from synthetic_observations import make
 
 ONE_PRESSURE = ((1000, 9.5e6), (1200, 9.5e6))
@@ -54,10 +61,47 @@ def test_air_needs_a_second_pressure(nominal):
 
 
 def test_effects_are_equally_strong(nominal):
-    """Every effect that has a size changes the ripple by about the same share."""
-    changes = {name: d.change for name, d in nominal.items() if name != "unsteady_friction"}
-    near = [name for name, change in changes.items() if 0.5 < change / CHANGE < 2]
-    assert len(near) >= len(changes) - 2, changes
+    """Every effect that has a size changes the ripple by the same share, but for two that cannot
+    be so small: a sensor's resonance and a side hole."""
+    larger = ("unsteady_friction", "sensor_dynamics", "side_hole")
+    for name, one in nominal.items():
+        if name not in larger:
+            assert one.change == pytest.approx(CHANGE, rel=0.011), name
+
+
+def test_a_loss_is_that_of_a_posterior_of_its_own(nominal):
+    """One model serves all losses of a rival. A posterior that is made of the other's readings, and
+    its Jacobian, give the same."""
+    rig, observations, _ = make(np.random.default_rng(0), sensors=2, points=ONE_PRESSURE)
+    applicable = {e.name: (e, place) for e, place in applicable_candidates(rig, observations)}
+    truth = Twin(rig, observations, effects=[applicable["sensor_gain"]])
+    truth = truth.with_(theta=np.append(np.zeros(len(truth.theta) - 1), 0.3))
+    seen = [replace(o, values=v) for o, v in zip(observations, truth.predict(observations))]
+    twin = Twin(rig, observations, effects=[applicable["unsteady_friction"]])
+    posterior = Posterior(twin, seen)
+    posterior.model_error = MIN_MODEL_ERROR
+    posterior.source_sd = posterior.smooth_sd = FIRST_SOURCE_SD
+    r, jacobian = posterior.linearise(twin.theta, posterior.predict(twin.theta))
+    count = 2 * posterior.values.size
+    priors = np.diag([FLAT_VARIANCE if p.flat else 1.0 for p in twin.parameters])
+    covariance = np.eye(count) + jacobian[:count] @ priors @ jacobian[:count].T
+    loss = 0.5 * r[:count] @ np.linalg.solve(covariance, r[:count])
+    assert _Rival(twin, observations).loss(posterior.values) == pytest.approx(loss, rel=1e-6)
+
+
+def test_an_impedance_is_compared_with_itself():
+    """A twin loses nothing by the input impedance that it predicts, and something by another."""
+    line, no_sensors = (Segment(4.0, 0.02, 1000.0),), ()
+    rig = Rig(Fluid(870.0, 3.2e-5), {"pistons": 9}, line, no_sensors, Load("closed"), Uncertainty())
+    frequency_hz = np.linspace(40.0, 2000.0, 80)
+    values = np.full((1, 80), 2.0 + 1.0j)
+    observation = Observation(
+        "input_impedance", "one", frequency_hz, None, values, np.full((80, 1, 1), 1e-6 + 0j),
+        np.zeros(1), None, None, "known", None, no_sensors, True,
+    )  # fmt: skip
+    rival = _Rival(Twin(rig, [observation]), [observation])
+    assert rival.loss(rival.readings) == 0.0
+    assert rival.loss(1.05 * rival.readings) > 1.0
 
 
 def test_every_effect_is_told_once_in_words(nominal):

@@ -6,7 +6,7 @@ import pytest
 from default_pump import LOAD, OIL, PIPE, POSITIONS, SPEED, relative_rms
 from kinematic_flow import kinematic_flow
 from rippletwin.pump.geometry import Geometry
-from rippletwin.pump.outlets import ConstantPressure, Pipe
+from rippletwin.pump.outlets import ConstantPressure, Pipe, PressureWave
 from rippletwin.pump.simulation import simulate
 
 
@@ -46,6 +46,18 @@ def test_pressures_are_above_the_atmosphere(suction, load):
     expected = expected_mean_flow(Geometry.from_dict(airy), load)
     assert ripple.flow.mean() == pytest.approx(expected, rel=0.01)
     assert ripple.pressure_mean == pytest.approx(load)
+
+
+@pytest.mark.parametrize("pump", [{}, {"pistons": 7, "air_fraction": 0.02}])
+def test_one_chamber_stands_for_all_at_a_constant_pressure(pump):
+    """All chambers solved together, into the same pressure given angle by angle, have the flow and
+    the pressures that the first one's say."""
+    one = simulate(pump, OIL, SPEED, ConstantPressure(LOAD))
+    each = simulate(pump, OIL, SPEED, PressureWave(np.full(64, LOAD)))
+    assert np.max(np.abs(one.flow - each.flow)) < 1e-7 * np.max(each.flow)  # the solver's tolerance
+    assert np.max(np.abs(one.chamber_pressure - each.chamber_pressure)) < 1e-6 * LOAD
+    assert np.all(one.outlet_pressure == pytest.approx(LOAD))
+    assert one.converged and one.pressure_mean == pytest.approx(each.pressure_mean, rel=1e-12)
 
 
 def test_pump_between_open_tanks_delivers_what_it_displaces():

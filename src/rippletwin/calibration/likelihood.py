@@ -26,8 +26,15 @@ from typing import Any
 
 import numpy as np
 
+from rippletwin.calibration.error_costs import error_costs
 from rippletwin.calibration.error_model import ObservedRipple
-from rippletwin.calibration.whitening import NoiseBasis, Whitening, as_real
+from rippletwin.calibration.whitening import (
+    NO_BASIS,
+    NO_FREQUENCIES,
+    NoiseBasis,
+    Whitening,
+    as_real,
+)
 from rippletwin.spectra.frequency_selection import select_below
 from rippletwin.twin.forward_jacobian import STEP, DifferentiableForward
 from rippletwin.twin.forward_model import characteristic_impedance, reflection
@@ -246,17 +253,20 @@ class _Group:
 
         The squares are multiplied by `scale`.
         """
-        weight = 1.0 / self.variance(model_errors[:, None, None])  # (D, S, F)
-        h, e = self.noise.rotate(prediction), self.residual(prediction)
-        square = np.sum(np.abs(e) ** 2 * weight, axis=1)
-        cross = np.abs(np.sum(np.conj(h) * e * weight, axis=1)) ** 2
-        size = np.maximum(np.sum(np.abs(h) ** 2 * weight, axis=1), 1e-300)
-        variances = np.where(self.nominal, sigmas[:, None] ** 2, 0.0)
-        stretch = 1.0 + variances * size[:, None]  # (D, G, F)
-        along = np.where(self.free, 1.0 / size[:, None], variances / stretch) * cross[:, None]
-        logs = np.log(np.where(self.free, size[:, None], stretch))
-        cost = np.sum(scale * (square[:, None] - along) + logs, axis=2)
-        return cost - np.sum(np.log(weight), axis=(1, 2))[:, None]
+        source = np.where(self.free, np.inf, np.where(self.nominal, 1.0, 0.0))
+        return error_costs(
+            self.residual(prediction),
+            self.noise.rotate(prediction),
+            self.noise.variances,
+            self.power,
+            source,
+            NO_FREQUENCIES,
+            NO_BASIS,
+            model_errors,
+            sigmas,
+            np.empty((1, 0)),
+            scale,
+        )[0].T
 
 
 def to_predicted_quantity(observation, rig):

@@ -46,6 +46,7 @@ stand side by side.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 
@@ -105,9 +106,7 @@ class Posterior:
         self.prior = np.array([not p.flat for p in twin.parameters])
         data = [to_predicted_quantity(o, twin.rig) for o in self.observations]
         self._noise = NoiseBasis(np.concatenate([o.covariance for o in data]))
-        self.values = np.concatenate([o.values for o in data], axis=1)  # (S, F)
-        self._rotated = self._rotate(self.values)
-        self.power = np.mean(np.abs(self.values) ** 2, axis=0)  # (F,)
+        self._set_values(np.concatenate([o.values for o in data], axis=1))
         sources = np.repeat([o.source for o in data], [o.values.shape[1] for o in data])
         self._known = sources == "known"
         self._free = (sources == "free") | (source_free & (sources == "nominal"))
@@ -127,6 +126,18 @@ class Posterior:
         self._source_scale = np.where(self._known, 0.0, np.where(self._free, np.inf, self._scale))
         self.count = 2 * (self.values.size - int(np.sum(self._free)))
         self._pressures = all(o.kind != "input_impedance" for o in data)
+
+    def _set_values(self, values: np.ndarray) -> None:
+        self.values = values
+        self._rotated = self._rotate(values)
+        self.power = np.mean(np.abs(values) ** 2, axis=0)
+
+    def with_values(self, values: np.ndarray) -> Posterior:
+        """The same error model, at the present errors, of other measured `values` (S, F), given in
+        the quantity that is predicted. It shares the forward model."""
+        other = copy(self)
+        other._set_values(values)
+        return other
 
     def below(self, max_frequency_hz: float) -> Posterior:
         """The same error model of the data at and below a frequency."""
@@ -315,7 +326,7 @@ class Posterior:
 
     def best_source(self, prediction: np.ndarray) -> np.ndarray:
         """The prediction with every free source at its most likely amplitude, (S, F)."""
-        return np.where(self._free, self._amplitude(prediction), 1.0) * prediction
+        return self._with_free_amplitudes(np.ones(len(self.power)), prediction) * prediction
 
     def most_likely_source(self, prediction: np.ndarray) -> np.ndarray:
         """Most likely source (F,) relative to that of the prediction, at the present errors."""
@@ -328,17 +339,19 @@ class Posterior:
         pull = np.sum(np.conj(self._rotate(prediction)) * whitening.adjoint(whitened), axis=0)
         error = (self.source_sd * self._scale) ** 2 * pull
         error[self._smooth.frequencies] += self._smooth.most_likely(pull, self.smooth_sd)
-        return np.where(
-            self._free, self._amplitude(prediction), 1.0 + np.where(self._known, 0.0, error)
-        )
+        source = 1.0 + np.where(self._known, 0.0, error)
+        return self._with_free_amplitudes(source, prediction)
 
-    def _amplitude(self, prediction: np.ndarray) -> np.ndarray:
-        """Most likely amplitude (F,) of a free source relative to that of the prediction."""
+    def _with_free_amplitudes(self, source: np.ndarray, prediction: np.ndarray) -> np.ndarray:
+        """`source` (F,), with that of a free source at its most likely amplitude."""
+        if not self._free.any():
+            return source
         weight = 1.0 / self._variance(self.model_error)
         h = self._rotate(prediction)
-        return np.sum(weight * np.conj(h) * self._rotated, 0) / np.maximum(
+        amplitude = np.sum(weight * np.conj(h) * self._rotated, 0) / np.maximum(
             np.sum(weight * np.abs(h) ** 2, 0), 1e-300
         )
+        return np.where(self._free, amplitude, source)
 
     def _rotate(self, x: np.ndarray) -> np.ndarray:
         return self._noise.rotate(x)

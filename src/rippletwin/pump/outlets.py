@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import resample
 
 from rippletwin.case.model import Segment
+from rippletwin.harmonics import resample_period
 
 DELAY_TOLERANCE = 1e-5  # relative, of the pipe's travel time as a whole number of steps
 
@@ -112,12 +112,4 @@ def pressure_at_steps(pressure, steps):
     """The outlet's pressure at the end of each step, (steps,)."""
     if np.ndim(pressure) == 0:
         return np.full(steps, float(pressure))
-    return np.roll(resample(np.asarray(pressure, float), steps), -1)
-
-
-def resample_periodic(values, samples):
-    """Values (K, ...) over a period at `samples` <= K, with the harmonics that both can have."""
-    spectrum = np.fft.rfft(values, axis=0)[: samples // 2 + 1]
-    if samples % 2 == 0 and samples < len(values):
-        spectrum[-1] = 0.0
-    return np.fft.irfft(spectrum, samples, axis=0) * (samples / len(values))
+    return np.roll(resample_period(np.asarray(pressure, float), steps), -1)

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from rippletwin.case.model import ATMOSPHERE, FlowRipple, Fluid, absolute
+from rippletwin.harmonics import resample_period
 from rippletwin.pump import chambers
 from rippletwin.pump.faults import Cylinder, Slipper, leak_conductances, orifice_conductance
 from rippletwin.pump.geometry import Geometry
@@ -23,7 +25,6 @@ from rippletwin.pump.outlets import (
     orifice_coefficient,
     pipe_state,
     pressure_at_steps,
-    resample_periodic,
 )
 from rippletwin.pump.source_admittance import source_admittance
 
@@ -55,13 +56,22 @@ class PumpRipple(FlowRipple):
     def source_admittance(self, s: np.ndarray) -> np.ndarray:
         """Admittance (F,), m3/(Pa s), of the chambers, beside the flow into a constant pressure.
 
-        Zero for a ripple coupled to a pipe, whose flow contains the response to a line.
+        Zero for a ripple coupled to a pipe, whose flow contains the response to a line. The result
+        is kept with the ripple and read-only, since fits need the same frequencies very often.
         """
         if self.orifice is not None:
             return super().source_admittance(s)
-        return source_admittance(
-            self.geometry, self.density, self.pressure_mean, self.chamber_pressure, s
-        )
+        key, known = np.asarray(s, complex).tobytes(), self._known_admittances
+        if key not in known:
+            known[key] = source_admittance(
+                self.geometry, self.density, self.pressure_mean, self.chamber_pressure, s
+            )
+            known[key].flags.writeable = False
+        return known[key]
+
+    @cached_property
+    def _known_admittances(self) -> dict[bytes, np.ndarray]:
+        return {}
 
     def source_capacitance(self, frequency_hz: float) -> float:
         """The source admittance as a capacitance, Im Y/w, m3/Pa; its real part, the ports' loss, is
@@ -92,7 +102,10 @@ def simulate(
         geometry.pistons, period, outlet, max(min_steps, samples_per_revolution)
     )
     case_leak, cross_leak = leak_conductances(geometry, fluid, fault)
-    end_of_step, first_stage = _tables(geometry, fluid, period, steps)
+    # Sound chambers at a constant pressure do the same one after another: one is enough.
+    alike = isinstance(outlet, ConstantPressure) and not (case_leak.any() or cross_leak.any())
+    simulated = 1 if alike else geometry.pistons
+    end_of_step, first_stage = _tables(geometry, fluid, period, steps, simulated)
     constants = (
         geometry.bulk_modulus,
         geometry.air_fraction,
@@ -110,7 +123,7 @@ def simulate(
     else:
         given = absolute(pressure_at_steps(outlet.pressure, steps))
     load_pressure = line_p[0] if cells else given.mean()
-    delivering = np.arange(geometry.pistons) * 2 > geometry.pistons
+    delivering = np.arange(simulated) * 2 > geometry.pistons
     state = np.append(
         np.where(delivering, load_pressure, absolute(geometry.suction_pressure)), load_pressure
     )
@@ -118,9 +131,11 @@ def simulate(
     previous, change = None, np.inf
     for revolutions in range(1, MAX_REVOLUTIONS + 1):  # noqa: B007 (reported)
         flow, pressures, readings = chambers.revolution(
-            state, end_of_step, first_stage, period / steps, constants, case_leak, cross_leak,
-            (zc, half, k_v, behind), line_p, line_q, sensors, given,
+            state, end_of_step, first_stage, period / steps, constants, case_leak[:simulated],
+            cross_leak[:simulated], (zc, half, k_v, behind), line_p, line_q, sensors, given,
         )  # fmt: skip
+        if alike:
+            flow, pressures = _all_chambers(flow, pressures, geometry.pistons)
         if not np.isfinite(flow).all():
             raise ArithmeticError(f"the chamber equations did not converge at {speed_rpm} r/min")
         if previous is not None:
@@ -133,7 +148,7 @@ def simulate(
     pressures, readings = pressures - ATMOSPHERE, readings - ATMOSPHERE
 
     def sample(values):  # values at the end of each step -> at the output's angles
-        return resample_periodic(np.roll(values, 1, axis=0), samples_per_revolution).T
+        return resample_period(np.roll(values, 1, axis=0).T, samples_per_revolution)
 
     return PumpRipple(
         angle_deg=np.arange(samples_per_revolution) * 360.0 / samples_per_revolution,
@@ -151,9 +166,19 @@ def simulate(
     )
 
 
-def _tables(geometry, fluid, period, steps):
-    """Volumes, their rates and port conductances (K, 4, n) at the steps' ends and first stages."""
-    lag = 2 * np.pi * np.arange(geometry.pistons) / geometry.pistons
+def _all_chambers(flow, pressures, pistons):
+    """Flow (K,) and pressures (K, n + 1) of n chambers that do the same one after another, from
+    those of the first: (K,) and (K, 2)."""
+    lag = len(flow) // pistons
+    chambers = [np.roll(pressures[:, 0], k * lag) for k in range(pistons)]
+    total = np.tile(flow.reshape(pistons, lag).sum(axis=0), pistons)
+    return total, np.stack([*chambers, pressures[:, -1]], axis=1)
+
+
+def _tables(geometry, fluid, period, steps, count):
+    """Volumes, their rates and port conductances (K, 4, n) of the first n = `count` chambers at the
+    steps' ends and first stages."""
+    lag = 2 * np.pi * np.arange(count) / geometry.pistons
     tables = []
     for fraction in (1.0, chambers.GAMMA):
         phi = 2 * np.pi * (np.arange(steps) + fraction)[:, None] / steps - lag

@@ -6,10 +6,9 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from scipy.signal import resample
 
 from rippletwin.errors import InputError
-from rippletwin.harmonics import one_period, peak_amplitudes
+from rippletwin.harmonics import one_period, peak_amplitudes, resample_period
 from rippletwin.line.time_domain import method_of_characteristics
 from rippletwin.line.time_domain.line_elements import End, Pipe, TimeDomainLine, capacitance
 from rippletwin.twin.effects.base import LineState
@@ -49,12 +48,12 @@ def propagate(
     """
     line = line_in_time(twin, flow, healthy_flow, speed_hz, load_pressure, source_capacitance)
     count = method_of_characteristics.steps_a_period(line.pipes, line.period, steps)
-    line.flow = resample(line.flow, count)
+    line.flow = resample_period(line.flow, count)
     transient = method_of_characteristics.simulate(line, periods=MAX_PERIODS, tolerance=tolerance)
     return replace(
         transient,
-        pressure=resample(transient.pressure, len(flow), axis=1),
-        flow=resample(transient.flow, len(flow), axis=1),
+        pressure=resample_period(transient.pressure, len(flow)),
+        flow=resample_period(transient.flow, len(flow)),
     )
 
 

@@ -1,7 +1,8 @@
 """Which effects a case's recordings could tell apart, before anything is fitted.
 
 For each effect in turn a twin at the data sheet's values with that effect is taken for the truth.
-The effect is as strong as changes the ripple by CHANGE, a small change, so that first order holds.
+The effect is as strong as changes the ripple by CHANGE, a small change, so that first order holds;
+some cannot be so weak.
 Another effect, its parameters and the line's free to move within their priors, misses its readings
 by r in whitened units and loses
 
@@ -19,7 +20,8 @@ line's parameters further than to first order.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -33,9 +35,12 @@ from rippletwin.twin.effects.base import Effect, Place
 from rippletwin.twin.twin import Twin
 
 CHANGE = 0.05  # relative, of the ripple
-STRENGTHS = np.arange(-8.0, 2.5, 0.5)
-"""Prior standard deviations from the median of an effect's size, of which that one is taken whose
-change of the ripple is nearest to CHANGE. Beyond the last an effect is out of all proportion."""
+CHANGE_TOLERANCE = 0.01  # relative, of CHANGE
+STRENGTHS = (-8.0, 2.0)
+"""Least and largest size of an effect, in prior standard deviations from its median. Beyond the
+last an effect is out of all proportion."""
+FIRST_STRENGTHS = (-4.0, -3.0)  # of the search; most effects change a ripple by some per cent there
+MAX_TRIALS = 8
 
 
 @dataclass(frozen=True)
@@ -75,13 +80,15 @@ def expect_discriminations(
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Iterator[Discrimination]:
     """What the `observations` (at the frequencies that are fitted) can tell of each effect."""
-    base = _Rival(rig, observations)
-    rivals = [_Rival(rig, observations, e, base) for e in _one_place_each(rig, observations)]
+    base = _Rival(Twin(rig, observations), observations)
+    rivals = []
+    for pair in _one_place_each(rig, observations):
+        rivals.append(_Rival(base.twin.with_(effects=(pair,)), observations))
+        rivals[-1].set_strength(base.readings)
     for done, truth in enumerate(rivals, 1):
         losses = {r.name: r.loss(truth.readings) for r in rivals if r is not truth}
-        yield Discrimination(
-            truth.name, truth.place, truth.change(base), base.loss(truth.readings), losses
-        )
+        change = _relative_change(truth.readings, base.readings)
+        yield Discrimination(truth.name, truth.place, change, base.loss(truth.readings), losses)
         if progress is not None:
             progress("effects", done, len(rivals))
 
@@ -95,54 +102,75 @@ def _one_place_each(rig: Rig, observations) -> list[tuple[Effect, Place]]:
 
 
 class _Rival:
-    """A twin with an effect, or with none, and the data sheet's values of all else."""
+    """A twin with an effect, or with none, and the data sheet's values of all else.
 
-    def __init__(self, rig: Rig, observations, effect=None, base=None):
-        effects = () if effect is None else (effect,)
-        self.name: str = "" if effect is None else effect[0].name
-        self.place: str = "" if effect is None else str(effect[1])
-        self.observations = list(observations)
-        self.twin = Twin(rig, observations, effects=effects)
-        flat = [parameter.flat for parameter in self.twin.parameters]
+    readings   (S, F), what it predicts
+    """
+
+    def __init__(self, twin: Twin, observations):
+        self.twin, self.name, self.place = twin, "", ""
+        for effect, place in twin.effects:
+            self.name, self.place = effect.name, str(place)
+        self._posterior = Posterior(twin, observations)
+        self._posterior.model_error = MIN_MODEL_ERROR
+        self._posterior.source_sd = FIRST_SOURCE_SD
+        nominal = any(o.source == "nominal" for o in observations)
+        self._posterior.smooth_sd = FIRST_SOURCE_SD if nominal else 0.0
+        flat = [parameter.flat for parameter in twin.parameters]
         self._scale = np.where(flat, np.sqrt(FLAT_VARIANCE), 1.0)
-        self._set_strength(0.0)
-        if base is not None:
-            self._set_strength(min(STRENGTHS, key=lambda u: self._distance(u, base)))
+        self._theta = np.zeros(len(twin.parameters))
+        self.readings = self._posterior.predict(self._theta)
 
-    def _distance(self, strength: float, base: _Rival) -> float:
-        """How far from CHANGE the effect is at a strength, in factors."""
-        self._set_strength(strength)
-        change = self.change(base)
-        return abs(np.log(change / CHANGE)) if 0 < change < np.inf else np.inf
+    def set_strength(self, base: np.ndarray) -> None:
+        """Make the effect as strong as changes the readings from those of `base` (S, F) by CHANGE,
+        or as nearly as it can.
 
-    def _set_strength(self, strength: float) -> None:
-        theta = np.zeros(len(self.twin.parameters))
+        The logarithm of the change is nearly linear in the strength: secants find it.
+        """
+        trials: list[tuple[float, float]] = []  # (how far off in factors, strength)
+
+        def miss(strength: float) -> float:
+            self._predict_at(strength)
+            change = _relative_change(self.readings, base)
+            missed = float(np.log(change / CHANGE)) if 0 < change < np.inf else np.inf
+            trials.append((abs(missed), strength))
+            return missed
+
+        a, b = FIRST_STRENGTHS
+        at_a, at_b = miss(a), miss(b)
+        while len(trials) < MAX_TRIALS and min(trials)[0] > CHANGE_TOLERANCE:
+            if at_a == at_b or not np.isfinite([at_a, at_b]).all():
+                break
+            wanted = float(np.clip(b - at_b * (b - a) / (at_b - at_a), *STRENGTHS))
+            if wanted == b:
+                break
+            a, at_a, b, at_b = b, at_b, wanted, miss(wanted)
+        best = min(trials)[1]
+        if best != trials[-1][1]:
+            self._predict_at(best)
+
+    def _predict_at(self, strength: float) -> None:
         for k, parameter in enumerate(self.twin.parameters):
-            if self.name and parameter.name.startswith(f"{self.name}@"):
-                theta[k] = _coordinate(parameter.prior, strength)
-        self.twin = self.twin.with_(theta=theta)
-        self.readings = self.twin.predict(self.observations)
+            if parameter.name.startswith(f"{self.name}@"):
+                self._theta[k] = _coordinate(parameter.prior, strength)
+        self.readings = self._posterior.predict(self._theta)
 
-    def change(self, base: _Rival) -> float:
-        """Relative difference of the readings from those of `base`."""
-        own, other = (np.concatenate(r.readings, axis=1) for r in (self, base))
-        return float(np.linalg.norm(own - other) / np.linalg.norm(other))
+    @cached_property
+    def _slopes(self) -> np.ndarray:
+        return self._posterior.slopes(self._theta, self.readings)
 
-    def loss(self, readings) -> float:
-        """Log evidence that this twin is expected to lose where these are the readings."""
-        seen = [replace(o, values=values) for o, values in zip(self.observations, readings)]
-        posterior = Posterior(self.twin, seen)
-        posterior.model_error = MIN_MODEL_ERROR
-        nominal = any(o.source == "nominal" for o in seen)
-        posterior.source_sd = FIRST_SOURCE_SD
-        posterior.smooth_sd = FIRST_SOURCE_SD if nominal else 0.0
-        theta = self.twin.theta
-        r, jacobian = posterior.linearise(theta, posterior.predict(theta))
-        count = 2 * posterior.values.size  # the rest are the residuals of the priors
-        r, columns = r[:count], jacobian[:count] * self._scale
-        projection = columns.T @ r
-        absorbed = np.linalg.solve(np.eye(len(projection)) + columns.T @ columns, projection)
+    def loss(self, readings: np.ndarray) -> float:
+        """Log evidence that this twin is expected to lose where these (S, F) are the readings."""
+        posterior = self._posterior.with_values(readings)
+        r, columns = posterior.whiten_slopes(self.readings, self._slopes)
+        r, columns = r[:-1], columns[:, :-1] * self._scale[:, None]  # the last is no reading
+        projection = columns @ r
+        absorbed = np.linalg.solve(np.eye(len(projection)) + columns @ columns.T, projection)
         return 0.5 * float(max(r @ r - projection @ absorbed, 0.0))
+
+
+def _relative_change(readings: np.ndarray, base: np.ndarray) -> float:
+    return float(np.linalg.norm(readings - base) / np.linalg.norm(base))
 
 
 def _coordinate(prior, strength: float) -> float:

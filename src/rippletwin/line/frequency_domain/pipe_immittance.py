@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from scipy.special import ive
 
 FRICTION_LAWS = ("none", "steady", "unsteady")
 
@@ -60,28 +59,13 @@ def scaled_friction(sigma: np.ndarray) -> np.ndarray:
     """sigma I0(r)/I2(r) with r = sqrt(sigma), the laminar friction in units of nu/R^2.
 
     `sigma` = s R^2/nu, any shape, Re r >= 0. Finite to |r| = 1e4 and far beyond: Hankel's
-    asymptotic series (Abramowitz & Stegun 1964, 9.7.1) where it has reached rounding, scaled
-    Bessel functions elsewhere, and the power series near zero, where I2 vanishes as r^2/8.
+    asymptotic series (Abramowitz & Stegun 1964, 9.7.1) where it has reached rounding. Elsewhere the
+    continued fraction of the ratio of Bessel functions (ibid. 9.1.73 with an imaginary argument):
+
+        sigma I0/I2 = sigma + 8 + 2 rho_2,    rho_n = sigma/(2 (n + 1) + rho_(n+1))
     """
     sigma = np.asarray(sigma, dtype=complex)
-    values, is_large = _at_large_radius(sigma.ravel())
-    if not is_large.all():
-        # The same values come again and again in a batch, and Bessel functions take long.
-        distinct, inverse = np.unique(sigma.ravel()[~is_large], return_inverse=True)
-        values[~is_large] = _by_bessel_functions(distinct)[inverse]
-    return values.reshape(sigma.shape)
-
-
-def _by_bessel_functions(sigma: np.ndarray) -> np.ndarray:
-    """`scaled_friction` without the asymptotic series, (N,)."""
-    r = np.sqrt(sigma)
-    small = np.abs(r) < _SMALL_RADIUS
-    safe = np.where(small, 1.0, r)
-    # I0 = sum_k z^k/k!^2 and I2 = z sum_k z^k/(k! (k+2)!) with z = sigma/4
-    z = np.where(small, 0.25 * sigma, 0.0)
-    i0 = 1.0 + z * (1.0 + z * (1.0 / 4.0 + z / 36.0))
-    i2 = 0.5 + z * (1.0 / 6.0 + z * (1.0 / 48.0 + z / 720.0))
-    return np.where(small, 4.0 * i0 / i2, sigma * ive(0, safe) / ive(2, safe))
+    return _scaled_friction(sigma.ravel()).reshape(sigma.shape)
 
 
 def _asymptotic_ratio(terms: int) -> np.ndarray:
@@ -96,20 +80,24 @@ def _asymptotic_ratio(terms: int) -> np.ndarray:
     return np.array(ratio)
 
 
-_SMALL_RADIUS = 0.05  # below this |r| the power series is exact to 1e-15
-_LARGE_RADIUS = 18.0  # above this Re r the asymptotic series is
+_LARGE_RADIUS = 18.0  # above this Re r the asymptotic series is exact to rounding
 _ASYMPTOTIC = _asymptotic_ratio(18)
+_FIRST_DEPTH, _DEPTH_PER_RADIUS = 20, 1.2  # of the continued fraction: depth at r = 0, more by |r|
 
 
 @njit(cache=True)
-def _at_large_radius(sigma):
-    """sigma sum_k c_k r^-k, the asymptotic series (N,), and where it holds; 0 elsewhere."""
-    values, is_large = np.zeros_like(sigma), np.zeros(len(sigma), np.bool_)
+def _scaled_friction(sigma):
+    values = np.empty_like(sigma)
     for i in range(len(sigma)):
         r = np.sqrt(sigma[i])
+        value = 0j
         if r.real > _LARGE_RADIUS:
-            value, x = 0j, 1.0 / r
+            x = 1.0 / r
             for c in _ASYMPTOTIC[::-1]:
                 value = value * x + c
-            values[i], is_large[i] = sigma[i] * value, True
-    return values, is_large
+            values[i] = sigma[i] * value
+        else:
+            for n in range(int(_FIRST_DEPTH + _DEPTH_PER_RADIUS * abs(r)), 1, -1):
+                value = sigma[i] / (2.0 * (n + 1) + value)
+            values[i] = sigma[i] + 8.0 + 2.0 * value
+    return values

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-from scipy.special import ive
-
+from rippletwin.line.frequency_domain.pipe_immittance import scaled_friction
 from rippletwin.line.time_domain.weighting_functions import conduction_terms
 from rippletwin.twin.effects.base import Effect, line_place
 
@@ -16,8 +14,8 @@ def thermal_factor(s, viscosity, diameter, heat_capacity_ratio, prandtl):
 
     Broadcast over a batch of viscosities and diameters.
     """
-    r = 0.5 * diameter * np.sqrt(s * prandtl / viscosity)
-    ratio = ive(2, r) / ive(0, r)
+    sigma = 0.25 * diameter**2 * s * prandtl / viscosity
+    ratio = sigma / scaled_friction(sigma)
     return heat_capacity_ratio - (heat_capacity_ratio - 1.0) * ratio
 
 
