@@ -31,7 +31,6 @@ lint: .venv/ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check Snakefile workflow/Snakefile workflow/rules
-	$(BIN)/snakemake --lint
 	$(BIN)/mypy
 
 docs-site: .venv/ready

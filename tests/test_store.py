@@ -1,5 +1,6 @@
 """Stores hold what was saved, whole or not at all."""
 
+import ast
 import errno
 import resource
 import subprocess
@@ -10,6 +11,7 @@ import pandas as pd
 import pytest
 import xarray as xr
 
+from paths import ROOT
 from rippletwin import store
 from rippletwin.cli import main, program
 
@@ -105,3 +107,39 @@ def test_a_command_that_cannot_write_says_so_in_a_line(monkeypatch, capsys, code
     said = capsys.readouterr().err
     assert said.startswith("rippletwin: out/verdict.json: not written: why. ")
     assert said.count("\n") == 1 and "run it again; what was finished is kept" in said
+
+
+WRITERS = {"write_text", "write_bytes", "to_csv", "savefig", "savemat", "savez", "savetxt"}
+WHOLE = ("store", "scratch")  # names through which a file is whole or absent
+NOT_RESULTS = {
+    "job.py",  # a job's log
+    "new_sheet.py",  # a sheet to fill in, never written over one that is there
+}
+
+
+def writes_directly(call: ast.Call) -> bool:
+    """Whether a call opens a file to write, or writes one, under its final name."""
+    text = ast.unparse(call)
+    name = ast.unparse(call.func).split(".")[-1]
+    modes = [*call.args, *(word.value for word in call.keywords if word.arg == "mode")]
+    opens = name == "open" and any(
+        isinstance(mode, ast.Constant) and str(mode.value)[:1] in ("w", "x", "a") for mode in modes
+    )
+    return (opens or name in WRITERS) and not any(word in text for word in WHOLE)
+
+
+def test_every_result_is_written_whole_or_not_at_all():
+    """No source file writes a result under its final name: all go through `store`. A kill between
+    the first and the last byte would else leave a file that looks whole."""
+    folders = ("src/rippletwin", "src/concealed", "src/diagnosis_trial", "workflow/scripts")
+    files = [path for folder in folders for path in sorted((ROOT / folder).rglob("*.py"))]
+    found = [
+        f"{path.relative_to(ROOT)}:{call.lineno}"
+        for path in files
+        if path.name not in NOT_RESULTS
+        for call in ast.walk(ast.parse(path.read_text()))
+        if isinstance(call, ast.Call) and writes_directly(call)
+    ]
+    assert len(files) > 200 and not found, found
+    assert writes_directly(ast.parse('open(path, "w")').body[0].value)
+    assert writes_directly(ast.parse("path.write_text(text)").body[0].value)

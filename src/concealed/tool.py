@@ -14,6 +14,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from concealed.sparse import pick_by_matching_pursuit
+from rippletwin import store
 from rippletwin.calibration.likelihood import Likelihood
 from rippletwin.calibration.misfit import misfit
 from rippletwin.calibration.report import segment_table
@@ -42,10 +43,11 @@ def main(case_folder: str, out: str) -> None:
         seconds = time.perf_counter() - started
     except Exception as error:  # any error: one case must not end the trial
         traceback.print_exc()
-        (out / "verdict.json").write_text(json.dumps(crash_verdict(error)))
+        store.write_text(out / "verdict.json", json.dumps(crash_verdict(error)))
         seconds, explanation = time.perf_counter() - started, None
     results = NO_BASELINES if explanation is None else compute_baselines(explanation)
-    (out / "baselines.json").write_text(json.dumps(results | {"seconds": seconds}, indent=1) + "\n")
+    text = json.dumps(results | {"seconds": seconds}, indent=1) + "\n"
+    store.write_text(out / "baselines.json", text)
 
 
 def crash_verdict(error: Exception) -> dict:

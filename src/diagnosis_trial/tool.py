@@ -23,6 +23,7 @@ import yaml
 
 from diagnosis_trial.networks import ask_network, teach_network
 from diagnosis_trial.twins import TWINS, FittedTwin
+from rippletwin import store
 from rippletwin.case.load import load_case
 from rippletwin.case.model import Case
 from rippletwin.diagnosis.diagnose import diagnose, select_recordings
@@ -48,8 +49,8 @@ def main(case_folder: str, out: str, *columns: str) -> None:
             crashed = [{"label": x, "state": "crashed"} for x in unknown_labels(case_folder)]
             diagnoses[column] = {"recordings": crashed}
         runs[column] = run
-    (out / "diagnosis.json").write_text(json.dumps(diagnoses, indent=1) + "\n")
-    (out / "run.json").write_text(json.dumps(runs) + "\n")
+    store.write_text(out / "diagnosis.json", json.dumps(diagnoses, indent=1) + "\n")
+    store.write_text(out / "run.json", json.dumps(runs) + "\n")
 
 
 def fit_twin(case_folder: str, kind: str, out: Path) -> FittedTwin:

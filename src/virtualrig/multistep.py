@@ -11,7 +11,7 @@ LEAD = 25 / 12
 """First coefficient of BDF4: LEAD x - (older values) = dt dx/dt."""
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True)
 def extrapolate(rates, ring):
     """Replace the oldest of four rates by their extrapolation to the next step."""
     r0, r1 = rates[ring[0]].reshape(-1), rates[ring[1]].reshape(-1)
@@ -20,7 +20,7 @@ def extrapolate(rates, ring):
         r3[i] = 4 * (r0[i] + r2[i]) - 6 * r1[i] - r3[i]
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True)
 def combine_past(past, ring):
     """Replace the oldest of four values by the past's part `out` of LEAD x - out = dt dx/dt."""
     x0, x1 = past[ring[0]].reshape(-1), past[ring[1]].reshape(-1)

@@ -115,7 +115,7 @@ def pump_tables(pump: Pump, density: float, faults: tuple = ()):
     return chambers, ports
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True)
 def orifice_flow(drop, laminar):
     """Square-root orifice, linear below about `laminar` Pa: drop/(drop^2 + laminar^2)^(1/4),
     slope.
@@ -177,7 +177,7 @@ def compression(pressure, ports):
     return absolute - ATMOSPHERE + ports[AIR] - gas + slope * below, slope
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True)
 def chamber_kinematics(angle, speed, chambers, ports, stations):
     """Write what depends on the crank angle alone into `stations` (pistons, 4).
 
@@ -199,7 +199,7 @@ def chamber_kinematics(angle, speed, chambers, ports, stations):
             stations[i, 3] += worn
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True)
 def step_chambers(stations, history, lead, chambers, ports, outlet_lead, outlet_rest, x, matrix):
     """One implicit step of all chambers and of the outlet that they share; returns Newton steps.
 
@@ -264,7 +264,7 @@ def step_chambers(stations, history, lead, chambers, ports, outlet_lead, outlet_
     return MOST_NEWTON_STEPS + 1
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True)
 def _eliminate(matrix):
     """Solve in place, right-hand side in the last column; diagonally dominant, so without
     pivots.

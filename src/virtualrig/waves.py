@@ -51,7 +51,7 @@ class State(NamedTuple):
     chamber_pressure: np.ndarray  # (pistons,)
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True)
 def wave_rates(line, state, now, flux_p, flux_q):
     """Right-hand sides of the waves at step `now`; flux_* (2, E) are the settled end values.
 
@@ -78,7 +78,7 @@ def wave_rates(line, state, now, flux_p, flux_q):
         _special_rates(line, p, q, state.strain[now], dp, dq)
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True)
 def _special_rates(line, p, q, strain, dp, dq):
     """Contributions of retarded wall, gas, stiffening liquid and turbulent drag."""
     n, elements = p.shape
@@ -98,7 +98,7 @@ def _special_rates(line, p, q, strain, dp, dq):
             dq[i, e] -= drag * q[i, e] * abs(q[i, e])
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True)
 def advance_waves(line, state, ring, dt):
     """Write the fields of the next step over the oldest ones (index ring[3])."""
     n, elements = state.flow.shape
@@ -127,7 +127,7 @@ def advance_waves(line, state, ring, dt):
                 state.strain[ring[3], i, e] = bent / (LEAD + pull)
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True)
 def gather_at_nodes(line, state, now, flux_p, flux_q, wave_in, wave_lead):
     """Solve the faces between elements, and sum over the pipes at each node.
 
@@ -152,7 +152,7 @@ def gather_at_nodes(line, state, now, flux_p, flux_q, wave_in, wave_lead):
         wave_lead[line.end[k]] += 1 / line.impedance[b]
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True)
 def close_pipes(line, state, now, flux_p, flux_q):
     """Set the values at the ends of the pipes by the pressures of the nodes."""
     n = state.flow.shape[0]

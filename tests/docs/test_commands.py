@@ -24,9 +24,7 @@ from doc_pages import PAGES, Block, blocks, blocks_of, prose_of
 from paths import ROOT
 
 LANGUAGES = {"sh", "text", "python", "yaml", "json", "mermaid"}
-PROGRAMS = (
-    "rippletwin", "virtualrig", "snakemake", "python", "python3", "make", "pip", "apptainer",
-)  # fmt: skip
+PROGRAMS = ("rippletwin", "virtualrig", "snakemake", "python", "python3", "make", "pip")
 COPIED = ("workflow", "config", "src", "resources", "profiles", "benchmarks", "docs", "tests")
 COPIED_FILES = (
     "Snakefile", "Makefile", "pyproject.toml", "environment.txt", "environment-bench.txt",
@@ -34,7 +32,7 @@ COPIED_FILES = (
 )  # fmt: skip
 SCHEDULED = "it takes from minutes to hours; the smoke run of `make test` runs the same rules"
 NETWORK = "it downloads packages"
-CLUSTER = "it needs a cluster or a container engine"
+CLUSTER = "it needs a cluster"
 HOURS = "it takes a quarter of an hour and more"
 
 NOT_RUN = {
@@ -54,10 +52,6 @@ NOT_RUN = {
     ),
     "pip install 'rippletwin[readers]'": (NETWORK, "python -m pip install --help"),
     "pip install snakemake-executor-plugin-slurm": (NETWORK, "python -m pip install --help"),
-    "apptainer build rippletwin.sif workflow/rippletwin.def": (
-        CLUSTER,
-        "test -s workflow/rippletwin.def",
-    ),
     "snakemake --report report.zip": ("it needs a finished run", "snakemake --help"),
     "python docs/figures/report.py my_case/report.html": (
         "it needs a browser",

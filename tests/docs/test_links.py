@@ -74,7 +74,7 @@ def test_pages_that_the_code_names_exist():
     missing = []
     for folder in ("src", "tests", "benchmarks", "workflow", "config", "resources", "profiles"):
         for file in (ROOT / folder).rglob("*"):
-            if file.suffix not in (".py", ".smk", ".yaml", ".yml", ".def"):
+            if file.suffix not in (".py", ".smk", ".yaml", ".yml"):
                 continue
             for page in re.findall(r"\bdocs/[\w/-]+\.md\b", file.read_text()):
                 if not (ROOT / page).exists():

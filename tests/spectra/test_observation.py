@@ -6,6 +6,7 @@ from scipy.optimize import minimize_scalar
 
 from rippletwin.case.model import Fluid, Load, Recording, Rig, Segment, Sensor
 from rippletwin.spectra.angular_resampling import cut_revolutions, interpolate
+from rippletwin.spectra.interpolation_kernel import sum_taps
 from rippletwin.spectra.noise import noise_cycle_scatter, noise_mad
 from rippletwin.spectra.observation import observe
 
@@ -134,6 +135,20 @@ def test_interpolation_error_is_far_below_noise():
         omega = 2 * np.pi * frequency / RATE
         found = interpolate(np.sin(omega * n)[None], position)[0]
         assert np.abs(found - np.sin(omega * position)).max() < bound
+
+
+def test_compiled_sums_of_taps_are_those_of_numpy():
+    """Every sample's weight by interpolation in the table, the signal constant beyond its ends."""
+    rng = np.random.default_rng(2)
+    signal, table = rng.normal(size=(2, 30)).astype(np.float32), rng.normal(size=(9, 5))
+    position, before = np.array([-7.3, 0.2, 11.0, 11.999, 20.63, 29.5, 40.0]), 2
+    base = np.floor(position).astype(int)
+    weights = [
+        [np.interp(x, np.linspace(0, 1, 9), column) for column in table.T] for x in position - base
+    ]
+    near = np.clip(base[:, None] - before + np.arange(5), 0, 29)
+    expected = np.einsum("spt,pt->sp", signal[:, near], weights)
+    np.testing.assert_allclose(sum_taps(signal, position, table, before), expected, rtol=1e-12)
 
 
 def test_windows_have_the_asked_length_and_repeat():

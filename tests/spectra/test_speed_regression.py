@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from rippletwin.spectra.speed_regression import harmonics_at_mean_speed, mean_speed
+from rippletwin.spectra.response_covariance import factor_covariance
+from rippletwin.spectra.speed_regression import _kernel, harmonics_at_mean_speed, mean_speed
 
 MEAN_HZ, STEPS_PER_REVOLUTION, COUNT = 25.0, 50, 80
 POLE = -np.pi + 2j * np.pi * 140.02 * MEAN_HZ  # a resonance 1 Hz wide, quality 3500
@@ -87,6 +88,30 @@ def test_independence_of_the_speed_costs_no_variance(size):
     variance = np.einsum("fss->sf", covariance).real
     assert np.mean(variance) == pytest.approx(2 / 60, rel=0.1)
     assert np.mean(np.abs(values - 5.0) ** 2 / variance) == pytest.approx(1.0, abs=0.2)
+
+
+@pytest.mark.parametrize("width,low_rank", [(1e-5, False), (1e-3, True)])
+def test_factor_and_eigenvectors_are_those_of_the_dense_covariance(width, low_rank):
+    """Of speeds far apart and of speeds that lie together, where the factor has few columns: the
+    covariance of the module's equation, and its part that is free of the mean."""
+    rng = np.random.default_rng(5)
+    deviation, chirp = rng.normal(scale=5e-4, size=40), rng.normal(scale=1e-8, size=40)
+    square = width**2 - 2j * (chirp[:, None] - chirp)
+    away = deviation[:, None] - deviation
+    dense = width / np.sqrt(square) * np.exp(-0.5 * away**2 / square)
+    factor = factor_covariance(deviation, chirp, width)
+    assert (factor.shape[1] < 20) == low_rank
+    np.testing.assert_allclose(factor @ factor.conj().T, dense, atol=1e-12)
+    kernel = _kernel(deviation, chirp, width)
+    free = dense - dense.mean(axis=0)
+    free = free - free.mean(axis=1, keepdims=True)
+    np.testing.assert_allclose(
+        (kernel.basis * kernel.sizes) @ kernel.basis.conj().T, free, atol=1e-10
+    )
+    np.testing.assert_allclose(
+        kernel.to_mean, width / np.sqrt(width**2 - 2j * chirp)
+        * np.exp(-0.5 * deviation**2 / (width**2 - 2j * chirp)), rtol=1e-12,
+    )  # fmt: skip
 
 
 def test_few_revolutions_are_averaged():

@@ -5,17 +5,19 @@ import os
 import shutil
 import signal
 import subprocess
-import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
+import matplotlib.image
 import numpy as np
 import pandas as pd
 import pytest
 
-from paths import ROOT
+from rippletwin import store
+from small_run import EVERY_STAGE, OVERLAY, start, write_case
 
-SMALL = """\
+SMOKE = """\
 results: out
 datasets: [CFD-MOC-P+, experimental]
 seeds: 1
@@ -23,118 +25,177 @@ samples_per_class: {time: 16, image: 10, randomised: 2}
 architectures: [cnn1d_341_100]
 training: {plain: {max_epochs: 2}}
 """
-COMMAND = (sys.executable, "-m", "snakemake", "--cores", "2", "--quiet", "all")
-LEAST, MEAN = 4.0, 40.0  # s from a start to the kill
-MAX_RUNS = 400
-RESULTS = ("*.csv", "explain/*.json", "diagnosis/*.json", "calibration/*.json")
+POLL = 0.02  # s
+# Snakemake's own hidden file in an output folder is no part of the store
+pytestmark = pytest.mark.filterwarnings("ignore:.*snakemake_timestamp")
+NOT_COMPARED = ("benchmarks", "logs")  # times of the machine
 
 
-def copy_repository(folder: Path) -> Path:
-    """What a run needs, in `folder`, with a small configuration."""
-    for name in ("workflow", "config", "src", "resources", "profiles"):
-        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copy(ROOT / "Snakefile", folder)
-    (folder / "small.yaml").write_text(SMALL)
+@dataclass(frozen=True)
+class Experiment:
+    """What is run, and how often it is killed."""
+
+    overlay: str
+    has_case: bool  # whether the recordings are there before the run
+    targets: tuple[str, ...]
+    runs: int
+    kills: int  # in each run
+
+
+FAST = Experiment(OVERLAY, True, EVERY_STAGE, 1, 3)
+LONG = Experiment(SMOKE, False, ("all",), 25, 4)
+
+
+def make(folder: Path, experiment: Experiment) -> Path:
+    """A folder in which nothing has run yet."""
+    folder.mkdir()
+    (folder / "small.yaml").write_text(experiment.overlay)
+    if experiment.has_case:
+        write_case(folder / "case")
     return folder
 
 
-def run(folder: Path, seconds: float | None = None) -> bool:
-    """Whether the run ended by itself with success; else its whole process group was killed.
+def run(folder: Path, experiment: Experiment, moment: tuple[int, float] | None = None) -> bool:
+    """Whether the run was killed; it ends with success where it is not.
 
-    Whatever it printed is in the message of the error if it ended with a failure.
+    moment : (jobs that have ended in this folder, s after that): when SIGKILL goes to the whole
+        process group; None for never.
     """
-    overlay = ("--configfile", "config/smoke.yaml", "small.yaml")
-    environment = os.environ | {"PYTHONPATH": str(folder / "src")}
     with (folder / "printed").open("w") as printed:
-        process = subprocess.Popen(
-            [*COMMAND, *overlay], cwd=folder, env=environment, start_new_session=True,
-            stdout=printed, stderr=subprocess.STDOUT,
-        )  # fmt: skip
+        process = start(folder, experiment.targets, stdout=printed, stderr=subprocess.STDOUT)
+        while moment is not None and process.poll() is None and ended(folder) < moment[0]:
+            time.sleep(POLL)
         try:
-            code = process.wait(seconds)
+            code = process.wait(None if moment is None else moment[1])
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             process.wait()
-            subprocess.run(
-                [*COMMAND, *overlay, "--unlock"], cwd=folder, env=environment, check=True,
-                capture_output=True,
-            )  # fmt: skip
-            return False
+            # what `snakemake --unlock` does, without planning the whole run
+            shutil.rmtree(folder / ".snakemake" / "locks", ignore_errors=True)
+            return True
     assert code == 0, (folder / "printed").read_text()[-3000:]
-    return True
+    return False
+
+
+def benchmarks(folder: Path) -> list[Path]:
+    """A file for each job that has ended."""
+    return list((folder / "out" / "benchmarks").rglob("*.tsv"))
+
+
+def ended(folder: Path) -> int:
+    return len(benchmarks(folder))
 
 
 def read_everything(results: Path) -> None:
-    """Read each finished table and JSON file; a torn one raises."""
-    for path in results.rglob("*.json"):
-        if not any(part.startswith(".") for part in path.relative_to(results).parts):
+    """Read each file of the results that has its final name; a torn one raises."""
+    for path in finished_files(results):
+        if path.suffix == ".json":
             json.loads(path.read_text())
-    for path in results.glob("*.csv"):
-        pd.read_csv(path)
+        elif path.suffix == ".csv":
+            pd.read_csv(path)
+        elif path.suffix == ".png":
+            matplotlib.image.imread(path)
+        elif path.suffix == ".html":
+            assert path.read_text().rstrip().endswith("</html>"), path
+    for path in results.rglob("[!.]*.zarr"):
+        store.load(path).load()
+
+
+def finished_files(results: Path) -> list[Path]:
+    """Files without a hidden name on the way, outside stores and what is not compared."""
+    named = ((path, path.relative_to(results).parts) for path in results.rglob("*"))
+    return [
+        path
+        for path, parts in named
+        if path.is_file()
+        and parts[0] not in NOT_COMPARED
+        and not any(part.startswith(".") or part.endswith(".zarr") for part in parts)
+    ]
 
 
 def final_results(results: Path) -> dict[str, bytes]:
-    """The contents of tables, verdict, twin and calibration, by name."""
+    """The bytes of every table, verdict, twin, diagnosis and store, by name.
+
+    The page and the tables of costs tell how long the stages took, figures are made of the numbers.
+    """
     found = {
         str(path.relative_to(results)): path.read_bytes()
-        for pattern in RESULTS
-        for path in results.glob(pattern)
+        for path in finished_files(results)
+        if path.suffix in (".csv", ".md", ".json")
     }
-    assert {"accuracy.csv", "explain/verdict.json", "explain/twin.json"} <= set(found)
+    for path in results.rglob("*.zarr"):
+        dataset = store.load(path).load()
+        for name, variable in dataset.variables.items():
+            found[f"{path.relative_to(results)}/{name}"] = np.asarray(variable.values).tobytes()
+    assert {"accuracy.csv", "explain/verdict.json", "diagnosis/diagnosis.json"} <= set(found)
     return found
 
 
-@pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory) -> dict[str, bytes]:
-    folder = copy_repository(tmp_path_factory.mktemp("undisturbed") / "run")
-    assert run(folder)
-    return final_results(folder / "out")
+class Undisturbed:
+    """A run that nobody kills: its results, and when each of its jobs ended."""
+
+    def __init__(self, folder: Path, experiment: Experiment):
+        began = time.time()
+        assert not run(make(folder, experiment), experiment)
+        self.seconds = time.time() - began
+        self.ends = sorted(path.stat().st_mtime - began for path in benchmarks(folder))
+        read_everything(folder / "out")
+        self.results = final_results(folder / "out")
+
+    def moment(self, fraction: float) -> tuple[int, float]:
+        """(jobs that had ended, s after the last of them) at this fraction of the run."""
+        time_ = fraction * self.seconds
+        count = int(np.searchsorted(self.ends, time_))
+        return count, time_ - (self.ends[count - 1] if count else 0.0)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("kills", [3, 100])
-def test_a_killed_run_ends_as_an_undisturbed_one(undisturbed, tmp_path, kills):
-    """SIGKILL to the whole process group at random moments: no finished file is torn, and once the
-    run may end, tables, verdict and twin have the bytes of a run that nobody disturbed. A run that
-    has ended is begun anew until so many kills have hit."""
-    rng, folder, killed = np.random.default_rng(), None, 0
-    for attempt in range(MAX_RUNS):
-        if folder is None:
-            folder = copy_repository(tmp_path / str(attempt))
-        wait = LEAST + rng.exponential(MEAN) if killed < kills else None
-        if not run(folder, wait):
+@pytest.mark.parametrize(
+    "experiment", [FAST, pytest.param(LONG, marks=pytest.mark.long)], ids=["3", "100"]
+)
+def test_a_killed_run_ends_as_an_undisturbed_one(tmp_path, experiment):
+    """SIGKILL to the whole process group at moments that are uniform over the course of the run:
+    after each no file that has its final name is torn, and once the run may end, tables, verdict,
+    twin, diagnosis and stores have the bytes of a run that nobody disturbed. A moment that comes
+    after the end is drawn again, in a new folder."""
+    undisturbed = Undisturbed(tmp_path / "undisturbed", experiment)
+    seed = int.from_bytes(os.urandom(4), "big")
+    print(f"seed {seed}, {undisturbed.seconds:.0f} s undisturbed")
+    rng, killed, attempt = np.random.default_rng(seed), 0, 0
+    while killed < experiment.runs * experiment.kills:
+        folder = make(tmp_path / str(attempt), experiment)
+        attempt += 1
+        assert attempt <= 3 * experiment.runs, f"{killed} kills in {attempt} runs"
+        for fraction in sorted(rng.uniform(size=experiment.kills)):
+            moment = undisturbed.moment(fraction)
+            if not run(folder, experiment, moment):
+                break
+            print(f"killed {moment[1]:.2f} s after {moment[0]} jobs")
             killed += 1
             read_everything(folder / "out")
-            continue
-        assert final_results(folder / "out") == undisturbed, folder
+        run(folder, experiment)
+        read_everything(folder / "out")
+        results = final_results(folder / "out")
+        assert set(results) == set(undisturbed.results), folder
+        differing = [name for name in results if results[name] != undisturbed.results[name]]
+        assert not differing, (folder, differing)
         shutil.rmtree(folder)
-        folder = None
-        if killed >= kills:
-            return
-    pytest.fail(f"{killed} kills in {MAX_RUNS} runs")
 
 
 def test_a_second_run_in_a_folder_is_refused(tmp_path):
     """While one run holds a folder another ends at once with a clear word; the first goes on."""
-    folder = copy_repository(tmp_path / "run")
-    overlay = ("--configfile", "config/smoke.yaml", "small.yaml")
-    environment = os.environ | {"PYTHONPATH": str(folder / "src")}
-    first = subprocess.Popen(
-        [*COMMAND, *overlay], cwd=folder, env=environment, start_new_session=True,
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
+    folder = make(tmp_path / "run", FAST)
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    first = start(folder, FAST.targets, **quiet)
     try:
         locks = folder / ".snakemake" / "locks"
         while not (locks.is_dir() and any(locks.iterdir())):
             assert first.poll() is None
             time.sleep(0.1)
-        # without --quiet, which hides what is wrong
-        second = subprocess.run(
-            [*COMMAND[:-2], *overlay], cwd=folder, env=environment, capture_output=True, text=True,
-            check=False,
-        )  # fmt: skip
+        both = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+        second = start(folder, FAST.targets, **both)
+        told, _ = second.communicate()
         assert second.returncode != 0
-        assert "cannot be locked" in second.stderr + second.stdout
+        assert "cannot be locked" in told
         assert first.poll() is None
     finally:
         os.killpg(first.pid, signal.SIGKILL)

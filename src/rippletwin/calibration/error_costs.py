@@ -27,6 +27,7 @@ def error_costs(
     costs = np.zeros((len(smooth_sds), len(sds), len(model_errors)))
     size, cross = np.empty(count), np.empty(count, np.complex128)
     gram, share = np.empty((functions, functions)), np.empty(functions, np.complex128)
+    columns = np.ascontiguousarray(basis.T)  # the innermost loop goes along memory
     for d in range(len(model_errors)):
         common = 0.0  # what neither source error changes
         for f in range(count):
@@ -54,9 +55,11 @@ def error_costs(
                 f = nominal[n]
                 gain = 1.0 / (1.0 + (source_scale[f] * sds[g]) ** 2 * size[f])
                 for i in range(functions):
-                    share[i] += basis[i, n] * gain * cross[f]
+                    entry = columns[n, i] * gain
+                    share[i] += entry * cross[f]
+                    entry *= size[f]
                     for j in range(i + 1):
-                        gram[i, j] += basis[i, n] * basis[j, n] * gain * size[f]
+                        gram[i, j] += entry * columns[n, j]
             for t in range(len(smooth_sds)):
                 costs[t, g, d] = cost + _smooth_cost(gram, share, smooth_sds[t], scale)
     return costs

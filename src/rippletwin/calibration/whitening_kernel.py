@@ -73,11 +73,13 @@ def _prepare_smooth(size, stretch, nominal, basis, left, right, left_over):
     """
     functions, count = basis.shape
     gram = np.zeros((functions, functions))
+    columns = np.ascontiguousarray(basis.T)  # the innermost loop goes along memory
     for n in range(count):
         weight = size[nominal[n]] / stretch[nominal[n]]
         for i in range(functions):
+            entry = columns[n, i] * weight
             for j in range(i + 1):
-                gram[i, j] += basis[i, n] * basis[j, n] * weight
+                gram[i, j] += entry * columns[n, j]
     grown, turn = np.linalg.eigh(gram)  # of the lower triangle
     volume = 0.0
     for i in range(functions):
@@ -87,7 +89,7 @@ def _prepare_smooth(size, stretch, nominal, basis, left, right, left_over):
         for n in range(count):
             along, f = 0.0, nominal[n]
             for j in range(functions):
-                along += turn[j, i] * basis[j, n]
+                along += turn[j, i] * columns[n, j]
             left[i, n] = along / stretch[f] * reduce
             right[i, n] = along / np.sqrt(stretch[f])
             left_over[f] += along**2 / (1.0 + size_i) / stretch[f] ** 2

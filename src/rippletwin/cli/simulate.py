@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import csv
 import json
-from pathlib import Path
 
 import click
 
+from rippletwin import store
 from rippletwin.cli import options
 from rippletwin.cli.progress import warn
 from rippletwin.errors import InputError
@@ -123,8 +123,7 @@ def command(
 def _write_csv(path: str, names: list[str], runs: list) -> None:
     """Columns time_s and one for each sensor; before them area_m2 where there are several areas."""
     several = len(runs) > 1
-    Path(path).parent.mkdir(parents=True, exist_ok=True)
-    with open(path, "w", newline="") as file:
+    with store.whole(path) as scratch, scratch.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([*(["area_m2"] if several else []), "time_s", *names])
         for run in runs:

@@ -98,13 +98,12 @@ class NearFit:
             for start in weak_effect_starts(base.rig, hypothesis, positions)
             if start not in starts
         ]
-        twin, thetas = base.with_(effects=hypothesis), []
-        for start in starts:
-            theta = transfer_theta(self.neighbour, hypothesis, base)
+        index = base.with_(effects=hypothesis).index
+        thetas = np.tile(transfer_theta(self.neighbour, hypothesis, base), (len(starts), 1))
+        for theta, start in zip(thetas, starts):
             for name, u in start.items():
-                theta[twin.index[name]] = u
-            thetas.append(theta)
-        return thetas
+                theta[index[name]] = u
+        return list(thetas)
 
 
 @dataclass(frozen=True, eq=False)

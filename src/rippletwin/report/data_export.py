@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy.io import savemat
 
+from rippletwin import store
 from rippletwin.harmonics import one_period
 from rippletwin.spectra.observation import Observation
 from rippletwin.twin.state_space import twin_state_space
@@ -37,7 +38,6 @@ def export_observation(observation: Observation, folder: str | Path) -> list[Pat
     recording states it; `sd` is the standard deviation of the complex error.
     """
     folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
     names = [sensor.name for sensor in observation.sensors]
     if len(names) != len(observation.values):  # an impedance has no sensors
         names = ["impedance"]
@@ -66,15 +66,13 @@ def export_observation(observation: Observation, folder: str | Path) -> list[Pat
         written.append(folder / f"{observation.label}_ripple.csv")
         _write_csv(written[-1], {"time_s": time, **dict(zip(names, pressure))})
     written.append(folder / f"{observation.label}.mat")
-    savemat(written[-1], data, oned_as="row")
+    _write_matlab(written[-1], data)
     return written
 
 
 def export_twin(twin: Twin, covariance: np.ndarray | None, path: str | Path) -> Path:
     """Write the twin's values with units and, where `covariance` (P, P) of its theta is known, the
     standard deviations to first order."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     values = {}
     for k, (parameter, u) in enumerate(zip(twin.parameters, twin.theta)):
         entry = {"value": float(parameter.value(u)), "unit": parameter.unit}
@@ -86,15 +84,13 @@ def export_twin(twin: Twin, covariance: np.ndarray | None, path: str | Path) -> 
         "effects": [{"name": effect.name, "place": str(place)} for effect, place in twin.effects],
         "values": values,
     }
-    path.write_text(json.dumps(result, indent=1) + "\n")
-    return path
+    return store.write_text(path, json.dumps(result, indent=1) + "\n")
 
 
 def export_state_space(twin: Twin, observation: Observation, folder: str | Path) -> list[Path]:
     """Write LABEL_state_space.json and .mat: the twin's line at a recording's operating point from
     the pump's flow ripple to pressure ripples, valid over the recording's band."""
     folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
     band = [float(observation.frequency_hz[0]), float(observation.frequency_hz[-1])]
     space = twin_state_space(twin, observation, *band)
     matrices = {"A": space.a, "B": space.b, "C": space.c, "D": space.d}
@@ -108,16 +104,21 @@ def export_state_space(twin: Twin, observation: Observation, folder: str | Path)
     }
     written = [folder / f"{observation.label}_state_space{suffix}" for suffix in (".json", ".mat")]
     plain = {name: np.asarray(value).tolist() for name, value in (about | matrices).items()}
-    written[0].write_text(json.dumps(plain, indent=None) + "\n")
+    store.write_text(written[0], json.dumps(plain, indent=None) + "\n")
     about["outputs"] = np.array(about["outputs"], dtype=object)
-    savemat(written[1], about | matrices, oned_as="row")
+    _write_matlab(written[1], {**about, **matrices})
     return written
 
 
 def _write_csv(path: Path, columns: Mapping[str, np.ndarray]) -> None:
     """Columns of equal length under their names; numbers keep all their digits."""
     rows: Iterable = zip(*(np.asarray(column).tolist() for column in columns.values()))
-    with open(path, "w", newline="", encoding="utf-8") as file:
+    with store.whole(path) as scratch, scratch.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         writer.writerows(rows)
+
+
+def _write_matlab(path: Path, data: Mapping[str, object]) -> None:
+    with store.whole(path) as scratch:
+        savemat(scratch, data, oned_as="row")

@@ -19,6 +19,8 @@ from scipy.fft import next_fast_len
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import map_coordinates, spline_filter1d
 
+from rippletwin.spectra.interpolation_kernel import sum_taps
+
 KNOTS_PER_REVOLUTION = 4
 FIRST_PISTON_HARMONICS = 6  # for the first estimate of the angle
 MAX_TRACKED_HZ = 5000.0
@@ -86,15 +88,7 @@ def interpolate(signal: np.ndarray, position: np.ndarray, cutoff: float = 1.0) -
 
     `cutoff` < 1 lowers the band to that share of Nyquist. Beyond its ends the signal is constant.
     """
-    table, before = _kernel(cutoff)
-    base = np.floor(position).astype(int)
-    entry, share = np.divmod((position - base) * KERNEL_FRACTIONS, 1)
-    entry, share = entry.astype(int), share[:, None]
-    weight = table[entry] * (1 - share) + table[entry + 1] * share
-    first, last = base.min() - before, base.max() - before + table.shape[1]
-    near = signal[:, np.clip(np.arange(first, last), 0, signal.shape[1] - 1)]
-    taps = np.lib.stride_tricks.sliding_window_view(near, table.shape[1], axis=1)
-    return np.einsum("spt,pt->sp", taps[:, base - before - first], weight)
+    return sum_taps(signal, position, *_kernel(cutoff))
 
 
 @lru_cache(maxsize=4)

@@ -27,6 +27,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rippletwin.spectra.response_covariance import factor_covariance, response_covariance
+
 MIN_REVOLUTIONS = 8  # for the regression; of fewer the mean is taken
 WIDTHS = 1e-4 * 2.0 ** np.arange(9)  # candidates: relative speed over which an order changes
 VARIANCE_RATIOS = 10.0 ** np.arange(-1, 8)  # candidates: variance of the function over the noise's
@@ -36,6 +38,7 @@ MIN_CORRELATION = 3.0  # of neighbouring residuals, in standard errors, to be be
 MAX_CORRELATION = 0.98  # beyond which the noise of a mean is not increased
 MAX_REVOLUTIONS_TOGETHER = 256  # in one regression; more are regressed in blocks
 MAX_BLOCK_REVOLUTIONS = 128
+MIN_SIZE = 1e-12  # of an eigenvalue, of responses of unit variance
 
 
 def harmonics_at_mean_speed(
@@ -93,12 +96,24 @@ def mean_speed(speed_hz: np.ndarray) -> float:
 
 
 class _Kernel(NamedTuple):
-    """The covariance (B, B) of what B revolutions answer, with its part free of the mean."""
+    """The covariance of what B revolutions answer."""
 
-    covariance: np.ndarray
-    to_mean: np.ndarray  # (B,) covariance with the answer at the mean speed
-    sizes: np.ndarray  # (B - 1,) eigenvalues of the part that is free of the mean
-    basis: np.ndarray  # (B, B - 1) its eigenvectors
+    deviation: np.ndarray  # (B,)
+    chirp: np.ndarray  # (B,)
+    width: float
+    factor: np.ndarray  # (B, r) of the whole covariance
+    sizes: np.ndarray  # (r,) eigenvalues of the part that is free of the mean; others are zero
+    basis: np.ndarray  # (B, r) their eigenvectors
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """The whole covariance (B, B)."""
+        return self.factor @ self.factor.conj().T
+
+    @property
+    def to_mean(self) -> np.ndarray:
+        """Covariance (B,) with the answer at the mean speed."""
+        return response_covariance(self.deviation, self.chirp, 0.0, 0.0, self.width)
 
 
 def _regress(data, deviation, chirp) -> Iterator[tuple]:
@@ -117,17 +132,20 @@ def _regress(data, deviation, chirp) -> Iterator[tuple]:
         rest = np.empty((count, np.count_nonzero(which)), complex)
         noise, missed = 0.0, 0.0
         for own, kernel in zip(blocks, kernels(), strict=True):
-            size = len(own)
+            size, covariance, to_mean = len(own), kernel.covariance, kernel.to_mean
             system = np.ones((size + 1, size + 1), complex)
-            system[:size, :size] = ratio * kernel.covariance + np.eye(size)
+            system[:size, :size] = ratio * covariance + np.eye(size)
             system[size, size] = 0.0
-            solved = np.linalg.solve(system, np.append(ratio * kernel.to_mean, 1.0))[:size]
-            part = kernel.basis.conj().T @ data[np.ix_(own, which)]
+            solved = np.linalg.solve(system, np.append(ratio * to_mean, 1.0))[:size]
+            centred = data[np.ix_(own, which)]
+            centred = centred - centred.mean(axis=0)
+            part = kernel.basis.conj().T @ centred
             shrink = (1 / (1 + ratio * kernel.sizes))[:, None]
+            noise += np.sum(np.abs(centred - kernel.basis @ part) ** 2, axis=0)
             noise += np.sum(shrink * np.abs(part) ** 2, axis=0)
-            rest[own] = kernel.basis @ (shrink * part)
+            rest[own] = centred - kernel.basis @ ((1 - shrink) * part)
             # an error of the function is the same in every block
-            error = 1 + np.vdot(solved, kernel.covariance @ solved - 2 * kernel.to_mean).real
+            error = 1 + np.vdot(solved, covariance @ solved - 2 * to_mean).real
             missed += size / count * max(error, 0.0)
             row[own] = size / count * solved
         noise = noise / (count - len(blocks)) * _variance_inflation(rest)
@@ -145,10 +163,10 @@ def _blocks(count: int) -> list[np.ndarray]:
 def _choose_covariances(data, deviation, chirp, blocks) -> tuple[np.ndarray, list]:
     """For each column of data (R, N) the most likely covariance: its index, -1 where none is worth
     MIN_GAIN, and for each index (ratio, a function that gives the kernels of the blocks)."""
-    plain = 0.0
+    plain, totals = 0.0, []
     for own in blocks:
-        contrast = _off_mean(data[own])
-        plain = plain + (len(own) - 1) * np.log(np.sum(np.abs(contrast) ** 2, axis=0) + 1e-300)
+        totals.append(np.sum(np.abs(data[own] - data[own].mean(axis=0)) ** 2, axis=0))
+        plain = plain + (len(own) - 1) * np.log(totals[-1] + 1e-300)
     best = -plain + MIN_GAIN
     chosen = np.full(data.shape[1], -1)
     tried: list[tuple[float, Callable]] = []
@@ -157,12 +175,13 @@ def _choose_covariances(data, deviation, chirp, blocks) -> tuple[np.ndarray, lis
         kernels: Iterable[_Kernel] = (_kernel(deviation[own], chirp[own], width) for own in blocks)
         if len(blocks) == 1:  # kept; of many blocks they are calculated again where they are chosen
             kernels = list(kernels)
-        for own, kernel in zip(blocks, kernels, strict=True):
+        for own, total, kernel in zip(blocks, totals, kernels, strict=True):
             power = np.abs(kernel.basis.conj().T @ data[own]) ** 2
+            apart = np.maximum(total - np.sum(power, axis=0), 0.0)  # no part of the function
             for k, ratio in enumerate(VARIANCE_RATIOS):
                 shrink = 1 / (1 + ratio * kernel.sizes)
                 likelihood[k] += np.sum(np.log(shrink))
-                likelihood[k] -= (len(own) - 1) * np.log(shrink @ power + 1e-300)
+                likelihood[k] -= (len(own) - 1) * np.log(apart + shrink @ power + 1e-300)
         again = partial(_kernels, kernels, blocks, deviation, chirp, width)
         for k, ratio in enumerate(VARIANCE_RATIOS):
             chosen[likelihood[k] > best] = len(tried)
@@ -180,16 +199,17 @@ def _kernels(kept, blocks, deviation, chirp, width) -> Iterator[_Kernel]:
 
 def _kernel(deviation, chirp, width) -> _Kernel:
     """The covariance of what revolutions answer whose speeds deviate so and change so fast."""
-    covariance = _covariance(deviation[:, None] - deviation, chirp[:, None] - chirp, width)
-    inner = _off_mean(_off_mean(covariance).conj().T)
-    sizes, basis = np.linalg.eigh(inner)
-    padded = np.vstack([np.zeros(basis.shape[1]), basis])
-    return _Kernel(
-        covariance,
-        _covariance(deviation, chirp, width),
-        np.maximum(sizes, 0.0),
-        _reflect(padded),
-    )
+    factor = factor_covariance(deviation, chirp, width)
+    inner = _off_mean(factor)
+    if factor.shape[1] < len(inner):
+        sizes, turn = np.linalg.eigh(inner.conj().T @ inner)
+        turn = inner @ turn
+    else:
+        sizes, turn = np.linalg.eigh(inner @ inner.conj().T)
+    kept = sizes > MIN_SIZE
+    basis = _reflect(np.vstack([np.zeros(np.count_nonzero(kept)), turn[:, kept]]))
+    basis /= np.linalg.norm(basis, axis=0)
+    return _Kernel(deviation, chirp, width, factor, sizes[kept], basis)
 
 
 def _off_mean(data):
@@ -216,10 +236,3 @@ def _variance_inflation(rest):
     least = MIN_CORRELATION / np.sqrt(2 * len(rest))
     r = np.where(r > least, np.minimum(r, MAX_CORRELATION), 0.0)
     return (1 + r) / (1 - r)
-
-
-def _covariance(deviation, chirp, width):
-    """Covariance of the responses at two speeds that differ by `deviation`, and their rates of
-    change by `chirp`."""
-    square = width**2 - 2j * chirp
-    return width / np.sqrt(square) * np.exp(-0.5 * deviation**2 / square)

@@ -8,6 +8,7 @@ parameters do not change (as in most columns of a finite-difference Jacobian).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
@@ -79,6 +80,7 @@ class ForwardModel:
         self._ripples = [point.ripple for point in points]
         self._periodic = [r for r, ripple in enumerate(self._ripples) if ripple is not None]
         self.solved = True
+        self._last_linear: tuple[bytes, FrequencyDomainLine] | None = None
         periodic = [self.slices[r] for r in self._periodic]
         self.compliance_solver = NonlinearComplianceSolver(periodic, self.order)
         if rig.load.kind == "orifice" and self._periodic:
@@ -139,7 +141,13 @@ class ForwardModel:
         return not self.has_nonlinear_compliance
 
     def _linear(self, theta: np.ndarray) -> FrequencyDomainLine:
-        """The same line for a small ripple."""
+        """The same line for a small ripple; that of the last theta is kept."""
+        key = np.asarray(theta, float).tobytes()
+        if self._last_linear is None or self._last_linear[0] != key:
+            self._last_linear = key, self._make_linear(theta)
+        return copy(self._last_linear[1])
+
+    def _make_linear(self, theta: np.ndarray) -> FrequencyDomainLine:
         twin, rig = self.twin, self.twin.rig
         v = twin.arrays(theta)
         series = np.array(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -112,13 +113,7 @@ def operating_point(rig: Rig, observation, ripple: FlowRipple | None) -> Operati
 
 
 def _load_pressure(rig: Rig, observation, flow: float) -> float | None:
-    """Mean pressure before the load, Pa, estimated from the stated one and the sensors' means.
-
-    Unknowns are the pressure and a factor on its calculated fall along the line. They are estimated
-    by iteratively reweighted least squares with Student's distribution for the sensors. The effort
-    pays: the compressibility of air goes with the pressure to the power -1.7 and an orifice's
-    resistance with the pressure, so that 0.3 % of pressure make 0.5 % of ripple.
-    """
+    """Mean pressure before the load, Pa: as stated, corrected by the sensors' means."""
     stated = observation.load_pressure
     means = np.zeros(0) if observation.mean is None else np.atleast_1d(observation.mean)
     if stated is None:
@@ -130,13 +125,26 @@ def _load_pressure(rig: Rig, observation, flow: float) -> float | None:
     if len(fall) != len(means):
         return stated
     used = np.abs(means / stated - 1.0) < MAX_MEAN_DEVIATION
-    fall, means = fall[used], means[used]
-    # Rows: prior of the pressure, prior of the factor, one for each sensor; all over `stated`.
     sheet = rig.uncertainty
     fall_sd = max(np.hypot(sheet.viscosity, 4.0 * sheet.diameter), MIN_FALL_SD)
-    rows = np.vstack([np.eye(2), np.column_stack([np.ones_like(fall), fall])])
-    values = np.concatenate([[1.0, 1.0], means / stated])
-    sds = np.concatenate([[STATED_PRESSURE_SD, fall_sd], np.full(len(fall), SENSOR_MEAN_SD)])
+    relative = _estimate_pressure(tuple(means[used] / stated), tuple(fall[used]), fall_sd)
+    return float(stated * relative)
+
+
+@lru_cache(maxsize=1024)
+def _estimate_pressure(means: tuple[float, ...], falls: tuple[float, ...], fall_sd: float) -> float:
+    """Mean pressure before the load, from those of sensors and the calculated falls of pressure to
+    them, all over the stated pressure before the load; cached, since every model of a fit asks.
+
+    Unknowns are the pressure and a factor on its calculated fall along the line. They are estimated
+    by iteratively reweighted least squares with Student's distribution for the sensors. The effort
+    pays: the compressibility of air goes with the pressure to the power -1.7 and an orifice's
+    resistance with the pressure, so that 0.3 % of pressure make 0.5 % of ripple.
+    """
+    # Rows: prior of the pressure, prior of the factor, one for each sensor.
+    rows = np.vstack([np.eye(2), np.column_stack([np.ones(len(falls)), falls])])
+    values = np.concatenate([[1.0, 1.0], means])
+    sds = np.concatenate([[STATED_PRESSURE_SD, fall_sd], np.full(len(falls), SENSOR_MEAN_SD)])
     weight, estimate = 1.0 / sds**2, np.ones(2)
     for _ in range(MAX_ITERATIONS):
         off = (rows[2:] @ estimate - values[2:]) / sds[2:]
@@ -145,7 +153,7 @@ def _load_pressure(rig: Rig, observation, flow: float) -> float | None:
         estimate = np.linalg.solve(weighted @ rows, weighted @ values)
         if np.max(np.abs(estimate - before)) < CONVERGED:
             break
-    return float(stated * estimate[0])
+    return float(estimate[0])
 
 
 def _fall(rig: Rig, position: float, flow: float) -> float:

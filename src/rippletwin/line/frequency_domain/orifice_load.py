@@ -109,15 +109,15 @@ def _substitute(
                 re[samples - m] += above.real
                 im[samples - m] += above.imag
             _transform(re, im, more_re, more_im, cos, sin)
-            passed = 0.0
+            passed, flow = 0.0, more_re
             for i in range(samples):
                 root_drop = np.sqrt(max(drop[r] + re[i], MIN_RELATIVE_DROP * drop[r]))
-                passed += (1.0 + im[i]) * root_drop
+                flow[i] = (1.0 + im[i]) * root_drop
+            for i in range(samples):
+                passed += flow[i]
             scale = coefficient[r] * (root / (passed / samples) if passes_flow else 1.0)
             for i in range(samples):
-                root_drop = np.sqrt(max(drop[r] + re[i], MIN_RELATIVE_DROP * drop[r]))
-                linear = slope * re[i] + coefficient[r] * root * im[i]
-                re[i] = scale * (1.0 + im[i]) * root_drop - linear
+                re[i] = scale * flow[i] - slope * re[i] - coefficient[r] * root * im[i]
                 im[i] = 0.0
             _transform(re, im, more_re, more_im, cos, sin)
             change = largest = 0.0
@@ -140,62 +140,54 @@ def _transform(re, im, more_re, more_im, cos, sin):
     more_re, more_im   (N,) room for the work
 
     The self-sorting form for a length that is a power of two (Stockham; Van Loan 1992,
-    Computational Frameworks for the Fast Fourier Transform, sec. 1.7). Its first two stages are one
-    of base four, since its others have short loops there.
+    Computational Frameworks for the Fast Fourier Transform, sec. 1.7) with stages of base four, and
+    a last one of base two where N is no power of four.
     """
-    _fold_by_four(re, im, more_re, more_im, cos, sin)
-    re, im, more_re, more_im = more_re, more_im, re, im
-    half, stride, swapped = len(re) // 8, 4, True
-    while half >= 1:
-        for j in range(half):
-            low, high = slice(j * stride, (j + 1) * stride), slice((j + half) * stride, None)
-            even = slice(2 * j * stride, (2 * j + 1) * stride)
-            odd = slice((2 * j + 1) * stride, (2 * j + 2) * stride)
-            _fold_by_two(
-                re[low], im[low], re[high], im[high], cos[j * stride], -sin[j * stride],
-                more_re[even], more_im[even], more_re[odd], more_im[odd],
-            )  # fmt: skip
+    count, stride, swapped = len(re), 1, False
+    while 4 * stride <= count:
+        _fold_by_four(re, im, more_re, more_im, cos, sin, stride)
         re, im, more_re, more_im = more_re, more_im, re, im
-        half, stride, swapped = half // 2, 2 * stride, not swapped
+        stride, swapped = 4 * stride, not swapped
+    if stride < count:
+        half = count // 2
+        high_re, high_im = re[half:], im[half:]
+        for k in range(half):
+            x, y = high_re[k], high_im[k]
+            high_re[k], high_im[k] = re[k] - x, im[k] - y
+            re[k], im[k] = re[k] + x, im[k] + y
     if swapped:  # the result is in the room
         more_re[:] = re
         more_im[:] = im
 
 
-# Functions of one stage take views from their first element on: the compiler then knows that no
-# index wraps, and vectorises.
-
-
 @njit(cache=True, error_model="numpy")
-def _fold_by_two(low_re, low_im, high_re, high_im, c, s, even_re, even_im, odd_re, odd_im):
-    """Sum of both halves, and their difference times c + j s."""
-    for k in range(len(low_re)):
-        x, y = low_re[k] - high_re[k], low_im[k] - high_im[k]
-        even_re[k] = low_re[k] + high_re[k]
-        even_im[k] = low_im[k] + high_im[k]
-        odd_re[k] = c * x - s * y
-        odd_im[k] = c * y + s * x
+def _fold_by_four(re, im, out_re, out_im, cos, sin, stride):
+    """One stage: four-point transforms across the quarters, times exp(-j m phi), interleaved.
 
-
-@njit(cache=True, error_model="numpy")
-def _fold_by_four(re, im, out_re, out_im, cos, sin):
-    """Four-point transforms across the quarters, times exp(-j k phi_j), interleaved."""
+    Arrays are taken as views from their first element on: the compiler then knows that no index
+    wraps, and vectorises.
+    """
     quarter = len(re) // 4
     re_1, im_1 = re[quarter:], im[quarter:]
     re_2, im_2 = re[2 * quarter :], im[2 * quarter :]
     re_3, im_3 = re[3 * quarter :], im[3 * quarter :]
-    for j in range(quarter):
-        sum_re, sum_im = re[j] + re_2[j], im[j] + im_2[j]
-        rest_re, rest_im = re[j] - re_2[j], im[j] - im_2[j]
-        other_re, other_im = re_1[j] + re_3[j], im_1[j] + im_3[j]
-        turned_re, turned_im = im_1[j] - im_3[j], re_3[j] - re_1[j]  # -j (x_1 - x_3)
-        c1, s1 = cos[j], -sin[j]
+    out_re_1, out_im_1 = out_re[stride:], out_im[stride:]
+    out_re_2, out_im_2 = out_re[2 * stride :], out_im[2 * stride :]
+    out_re_3, out_im_3 = out_re[3 * stride :], out_im[3 * stride :]
+    for first in range(0, quarter, stride):
+        c1, s1 = cos[first], -sin[first]
         c2, s2 = c1 * c1 - s1 * s1, 2.0 * c1 * s1
         c3, s3 = c1 * c2 - s1 * s2, c1 * s2 + s1 * c2
-        out_re[4 * j], out_im[4 * j] = sum_re + other_re, sum_im + other_im
-        x, y = rest_re + turned_re, rest_im + turned_im
-        out_re[4 * j + 1], out_im[4 * j + 1] = c1 * x - s1 * y, c1 * y + s1 * x
-        x, y = sum_re - other_re, sum_im - other_im
-        out_re[4 * j + 2], out_im[4 * j + 2] = c2 * x - s2 * y, c2 * y + s2 * x
-        x, y = rest_re - turned_re, rest_im - turned_im
-        out_re[4 * j + 3], out_im[4 * j + 3] = c3 * x - s3 * y, c3 * y + s3 * x
+        for k in range(stride):
+            j, out = first + k, 4 * first + k
+            sum_re, sum_im = re[j] + re_2[j], im[j] + im_2[j]
+            rest_re, rest_im = re[j] - re_2[j], im[j] - im_2[j]
+            other_re, other_im = re_1[j] + re_3[j], im_1[j] + im_3[j]
+            turned_re, turned_im = im_1[j] - im_3[j], re_3[j] - re_1[j]  # -j (x_1 - x_3)
+            out_re[out], out_im[out] = sum_re + other_re, sum_im + other_im
+            x, y = rest_re + turned_re, rest_im + turned_im
+            out_re_1[out], out_im_1[out] = c1 * x - s1 * y, c1 * y + s1 * x
+            x, y = sum_re - other_re, sum_im - other_im
+            out_re_2[out], out_im_2[out] = c2 * x - s2 * y, c2 * y + s2 * x
+            x, y = rest_re - turned_re, rest_im - turned_im
+            out_re_3[out], out_im_3[out] = c3 * x - s3 * y, c3 * y + s3 * x
