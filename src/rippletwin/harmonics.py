@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.fft import irfft, rfft
 
@@ -21,6 +23,18 @@ def phase_modulate(spectrum: np.ndarray, modulation: complex, count: int) -> np.
     orders = np.flatnonzero(spectrum)
     flow = (np.exp(1j * np.outer(instant + lead.real, orders)) @ spectrum[orders]).real
     return flow * (1.0 - lead.imag)
+
+
+def modulate_ripple(ripple: FlowRipple, modulation: complex) -> FlowRipple:
+    """The flow ripple of a shaft that leads an even rotation by Re(b exp(j t)) rad at angle t.
+
+    b is `modulation`.
+    """
+    count = max(len(ripple.flow) // 2, 8)
+    spectrum = flow_harmonics(ripple, np.arange(count))
+    flow = phase_modulate(spectrum, modulation, 4 * count)
+    angle = 360.0 * np.arange(len(flow)) / len(flow)
+    return replace(ripple, angle_deg=angle, flow=flow, modulation=modulation)
 
 
 def peak_amplitudes(period: np.ndarray) -> np.ndarray:

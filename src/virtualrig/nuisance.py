@@ -113,3 +113,16 @@ def cut_with_gradient(
                 piece = {"length": float(b - a), "wave_speed": float(speed), "viscosity": thickness}
                 pieces.append(segment | piece)
     return pieces
+
+
+def segments_as_recorded(segments: list[dict], drop: float, kelvin: float) -> list[dict]:
+    """The segments at the wave speed of their own mean temperature.
+
+    It falls by `drop`, K, evenly from pump to load and is `kelvin` above average in the middle.
+    """
+    ends = np.concatenate([[0.0], np.cumsum([s["length"] for s in segments])])
+    warmer = kelvin + drop * (0.5 - 0.5 * (ends[:-1] + ends[1:]) / ends[-1])
+    return [
+        segment | {"wave_speed": float(segment["wave_speed"] * (1 + WAVE_SPEED_PER_KELVIN * t))}
+        for segment, t in zip(segments, warmer)
+    ]

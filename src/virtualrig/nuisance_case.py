@@ -36,7 +36,7 @@ from virtualrig.folder import (
     write_ripple,
     write_sheet,
 )
-from virtualrig.nuisance import seal_at, true_pump
+from virtualrig.nuisance import seal_at, segments_as_recorded, true_pump
 from virtualrig.orbit import Bench
 from virtualrig.population import (
     TOLERANCE,
@@ -96,7 +96,14 @@ def draw_nuisance_case(count: int, commit: str, number: int | str, index: int) -
         "effects": [truth_of_effect(effect, sheet, true) for effect in effects],
         "nuisance": nuisance_effects(sheet, true, nuisance, geometry),
         "classes": classes,
-        "segments": truth_of_segments(true["line"]["segments"], context.density),
+        "segments": truth_of_segments(
+            segments_as_recorded(
+                true["line"]["segments"],
+                nuisance["temperature_drop"],
+                float(np.mean([plan.kelvin for plan in plans])),
+            ),
+            context.density,
+        ),
         "length": float(context.length),
         "noise": nuisance["noise"],
         "points": len(points),

@@ -79,8 +79,8 @@ class Pump:
         return replace(self, port_timing_deg=self.port_timing_deg + timing_deg, **values)
 
     def with_spread(self, spread: np.ndarray) -> "Pump":
-        """This pump with deviations (pistons, 3) from piston to piston."""
-        return replace(self, spread=spread)
+        """This pump with further deviations (pistons, 3) from piston to piston."""
+        return replace(self, spread=spread if self.spread is None else self.spread + spread)
 
 
 def pump_tables(pump: Pump, density: float, faults: tuple = ()):

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from paper_rig import paper_rig
-from rippletwin.explanation.localise.shaft_orders import ShaftOrders
+from rippletwin.explanation.localise.shaft_orders import ShaftEffect, ShaftOrders
 from rippletwin.explanation.verdict.number_text import (
     load_sentences,
     parameters_sentence,
@@ -17,7 +17,7 @@ from rippletwin.explanation.verdict.summary_text import liquid_like_air, summary
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
 
-SPREAD = ShaftOrders(0.02, 1e-9, 0.95, "piston_spread", 0.03, interval=(0.025, 0.036))
+SPREAD = ShaftOrders(0.02, 1e-9, 0.95, (ShaftEffect("piston_spread", 0.03, (0.025, 0.036)),))
 
 
 def summarise(

@@ -9,7 +9,7 @@ from rippletwin.calibration.frequency_continuation import refine
 from rippletwin.calibration.misfit import Score
 from rippletwin.explanation.checks.alarms import Alarms
 from rippletwin.explanation.checks.cross_validation import Validation
-from rippletwin.explanation.localise.shaft_orders import ShaftOrders
+from rippletwin.explanation.localise.shaft_orders import ShaftEffect, ShaftOrders
 from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.verdict.decision import Decision
 from rippletwin.explanation.verdict.explanation import Explanation
@@ -17,9 +17,8 @@ from rippletwin.explanation.verdict.verdict_file import verdict_dict
 from rippletwin.twin.twin import Twin
 from synthetic_observations import POINTS, make
 
-MODULATION = ShaftOrders(
-    0.02, 1e-9, 0.95, "speed_fluctuation", 4e-3, {"point 1": 4e-3}, (3.9e-3, 4.1e-3)
-)
+FLUCTUATION = ShaftEffect("speed_fluctuation", 4e-3, (3.9e-3, 4.1e-3))
+MODULATION = ShaftOrders(0.02, 1e-9, 0.95, (FLUCTUATION,), {"point 1": 4e-3})
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +65,10 @@ def test_warnings_of_the_case_are_told(explanation):
 
 def test_an_unknown_interval_is_left_out(explanation):
     """Without an interval the key is missing: an invented one would be worse."""
-    unknown = replace(explanation, shaft_orders=replace(MODULATION, interval=None))
+    unknown = replace(
+        explanation,
+        shaft_orders=replace(MODULATION, effects=(replace(FLUCTUATION, interval=None),)),
+    )
     (effect,) = verdict_dict(unknown)["effects"]
     assert effect["parameters"]["amplitude"] == {"value": 4e-3, "unit": "rad"}
 

@@ -5,9 +5,10 @@ import pytest
 from scipy.integrate import quad
 from scipy.signal import welch
 
+from virtualrig.draw import truth_of_segments
 from virtualrig.instrument import Instrument, coloured_noise, measure, revolution_scatter
 from virtualrig.network import Network, Node, Pipe, discretise
-from virtualrig.nuisance import cut_with_gradient
+from virtualrig.nuisance import cut_with_gradient, segments_as_recorded
 from virtualrig.recorder import SAMPLING_RATE_HZ
 
 SEGMENTS = [
@@ -17,8 +18,8 @@ SEGMENTS = [
 
 
 def test_waves_take_as_long_as_the_temperature_makes_them():
-    """Travel time over a line with a gradient is the integral of dx/a(x), to 1e-5 of it; and the
-    pieces meet at sensors and joints."""
+    """Travel time over a line with a gradient is the integral of dx/a(x), to 1e-5 of it, in the rig
+    and in the truth that verdicts are scored by; and the pieces meet at sensors and joints."""
     drop, kelvin = 6.0, 1.5
     pieces = cut_with_gradient(SEGMENTS, [0.5, 3.0], 4e-5, drop, kelvin)
     time = sum(piece["length"] / piece["wave_speed"] for piece in pieces)
@@ -33,6 +34,8 @@ def test_waves_take_as_long_as_the_temperature_makes_them():
     )
     assert time == pytest.approx(exact, rel=1e-5)
     assert exact != pytest.approx(2.1 / 1200 + 3.3 / 1050, rel=1e-3)
+    truth = truth_of_segments(segments_as_recorded(SEGMENTS, drop, kelvin), 870.0)
+    assert sum(segment["delay"] for segment in truth) == pytest.approx(exact, rel=1e-5)
     joints = np.cumsum([piece["length"] for piece in pieces])
     for place in (0.5, 2.1, 3.0, 5.4):
         assert np.abs(joints - place).min() < 1e-9

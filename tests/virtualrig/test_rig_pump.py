@@ -177,3 +177,10 @@ def test_crank_speed_ripple_sweeps_the_same_volume(healthy):
     assert swung.outlet_flow.mean() == pytest.approx(healthy.outlet_flow.mean(), rel=1e-3)
     second = 2 * np.abs(np.fft.rfft(swung.outlet_flow)[2]) / len(swung.outlet_flow)
     assert second == pytest.approx(0.02 * healthy.outlet_flow.mean(), rel=0.4)
+
+
+def test_a_second_spread_comes_on_top_of_the_first():
+    """Deviations of two spreads add, piston by piston."""
+    one, two = np.full((3, 3), 0.01), np.array([[0.02, 0.0, 0.1]] * 3)
+    pump = PUMP.with_spread(one).with_spread(two)
+    np.testing.assert_array_equal(pump.spread, one + two)

@@ -34,7 +34,6 @@ from functools import partial
 
 from threadpoolctl import threadpool_limits
 
-from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.posterior import MIN_MODEL_ERROR
 from rippletwin.case.model import Case, Recording, Rig
 from rippletwin.errors import InputError
@@ -57,12 +56,11 @@ from rippletwin.explanation.localise.phase_modulation import (
     with_phase_modulation,
 )
 from rippletwin.explanation.localise.remainder import find_remainder
-from rippletwin.explanation.localise.shaft_order_interval import add_amplitude_interval
+from rippletwin.explanation.localise.shaft_order_intervals import add_amplitude_intervals
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders, analyse_shaft_orders
 from rippletwin.explanation.localise.source_free_fits import refit_source_free
 from rippletwin.explanation.search.passive_networks import accepted_network, fit_passive_networks
 from rippletwin.explanation.search.stepwise_search import Search, resume_search, search_effects
-from rippletwin.explanation.thresholds import MODULATION_SHARE, ROUGH_MODULATION_SHARE
 from rippletwin.explanation.verdict.decision import decide
 from rippletwin.explanation.verdict.explanation import Explanation
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
@@ -165,8 +163,8 @@ def explain_observations(
     # Steps 17 and 18: where the mismatch is
     location = locate_mismatch(search.base, data)
     remainder = None if contradiction else find_remainder(decision.accepted, data)
-    shaft_orders = add_amplitude_interval(
-        _analyse_shaft_orders(decision.accepted, observations),
+    shaft_orders = add_amplitude_intervals(
+        analyse_shaft_orders(decision.accepted.twin, observations, HIGHEST_HZ),
         decision.accepted,
         observations,
         HIGHEST_HZ,
@@ -263,7 +261,7 @@ def _search_again(
 
     `observations` have all shaft orders.
     """
-    modulation = _analyse_shaft_orders(search.best, observations)
+    modulation = analyse_shaft_orders(search.best.twin, observations, HIGHEST_HZ)
     if not modulation_differs(modulation, state.modulation, state.observations):
         return state, search
     base, data = prepare_base(state.base.rig, observations, modulation)
@@ -290,13 +288,13 @@ def _select_fitted(
     halves: Sequence[Observation], rig: Rig, data: Sequence[Observation]
 ) -> list[Observation]:
     """The halves of recordings as the whole ones, `data`, are fitted."""
-    ripples = {o.label: o.flow_ripple for o in data}
-    fitted = [replace(half, flow_ripple=ripples[half.label]) for half in halves]
+    whole = {o.label: o for o in data}
+    fitted = [
+        replace(
+            half,
+            flow_ripple=whole[half.label].flow_ripple,
+            modulation=whole[half.label].modulation,
+        )
+        for half in halves
+    ]
     return select_fitted_frequencies(fitted, rig, HIGHEST_HZ)
-
-
-def _analyse_shaft_orders(fit: Fit, observations: Sequence[Observation]) -> ShaftOrders | None:
-    """The shaft orders by a fitted line; a poor fit asks less of a modulation."""
-    is_poor = fit.model_error >= MAX_MODEL_ERROR_FOR_COUPLING
-    share = ROUGH_MODULATION_SHARE if is_poor else MODULATION_SHARE
-    return analyse_shaft_orders(fit.twin, observations, HIGHEST_HZ, share)

@@ -57,8 +57,9 @@ effect."""
 MIN_SHAFT_ORDER_LEVEL = 0.01  # relative to the ripple; below it the orders have no name
 SHAFT_ORDER_SIGNIFICANCE = 1e-6  # p-value that the orders are noise
 MIN_COHERENT_SHARE = 0.5  # of the energy at shaft orders that one flow at the pump accounts for
-MODULATION_SHARE = 0.9  # of the energy at shaft orders that modulation must explain to be the name
-ROUGH_MODULATION_SHARE = 0.7  # the same for a twin that is only calibrated, and so less accurate
+MODULATION_SIGNIFICANCE = 0.02
+"""Probability that pistons of independent deviations put as much of the energy into the pattern of
+a modulation. It is the rate at which such a pump alone gets a speed fluctuation."""
 
 
 def min_log_bayes_factor(effect: Effect) -> float:

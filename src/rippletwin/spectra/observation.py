@@ -43,7 +43,8 @@ class Observation:
     and the imaginary part each have half the variance. orders (F,) are shaft orders, None where the
     source is not the shaft. Fits use nothing below `min_frequency_hz`. mean (S,) is the mean
     pressure, Pa. `source` is what is known of the flow source: "known" (impedance), "nominal" (a
-    flow ripple or a pump model) or "free".
+    flow ripple or a pump model) or "free". `modulation` b, rad: the shaft leads uniform rotation by
+    Re(b exp(j t)) rad, and modulates the nominal ripple.
     """
 
     kind: str
@@ -60,6 +61,7 @@ class Observation:
     sensors: tuple[Sensor, ...]
     normalised: bool = False
     min_frequency_hz: float = 0.0
+    modulation: complex = 0.0
 
     @property
     def variance(self) -> np.ndarray:

@@ -47,6 +47,7 @@ class OperatingCondition:
     mean: np.ndarray | None = None
     sensors: tuple[Sensor, ...] | None = None
     normalised: bool = False
+    modulation: complex = 0.0
 
     @classmethod
     def at_orders(

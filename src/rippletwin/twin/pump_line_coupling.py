@@ -30,8 +30,8 @@ def couple_pump_to_line(twin: Twin, observations: Sequence) -> list | None:
 
 
 def _couple(twin: Twin, observation):
-    """The observation with the coupled ripple as `flow_ripple`, or itself where its ripple is not
-    the lumped pump's."""
+    """The observation with the coupled ripple, modulated, as `flow_ripple`, or itself where its
+    ripple is not the lumped pump's."""
     given = observation.kind != "periodic" or observation.source != "nominal"
     if given or observation.flow_ripple is not None:
         return observation
@@ -57,7 +57,7 @@ def _couple(twin: Twin, observation):
     response = delivered - free + source.source_admittance(forward.s) * outlet
     response = response * np.exp(1j * orders * turned)
     flow = ripple.flow + one_period(response, count, orders)
-    return replace(observation, flow_ripple=replace(ripple, flow=flow))
+    return replace(observation, flow_ripple=replace(ripple, flow=flow), modulation=0.0)
 
 
 def _pump(twin: Twin) -> tuple[dict, float]:

@@ -29,6 +29,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rippletwin.case.model import FlowRipple, Rig, Segment, Sensor
+from rippletwin.harmonics import modulate_ripple
 from rippletwin.line.frequency_domain.pipe_immittance import FRICTION_LAWS
 from rippletwin.twin import parameters as coordinates
 from rippletwin.twin.corrected_ripple import CorrectedRipple
@@ -216,7 +217,7 @@ class Twin:
         `OperatingCondition`."""
         ripple = None
         if observation.kind == "periodic" and observation.source != "free":
-            ripple = observation.flow_ripple or self._pump_ripple(observation)
+            ripple = self._nominal_ripple(observation)
         return operating_point(self.rig, observation, ripple)
 
     def respond(
@@ -313,6 +314,16 @@ class Twin:
             )
             changes.append((k, change))
         return changes
+
+    def _nominal_ripple(self, observation) -> FlowRipple:
+        """Ripple that the shaft of a recording delivers: the stated or the simulated one."""
+        even = observation.flow_ripple or self._pump_ripple(observation)
+        if not observation.modulation:
+            return even
+        key = id(even), observation.modulation
+        if key not in self._ripples:  # with the even one, whose id stays its own
+            self._ripples[key] = even, modulate_ripple(even, observation.modulation)
+        return self._ripples[key][1]
 
     def _pump_ripple(self, observation) -> FlowRipple:
         """Ripple of the lumped pump model, for a recording without a flow ripple."""

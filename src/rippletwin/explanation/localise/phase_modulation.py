@@ -10,21 +10,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import j0
 
 from rippletwin.calibration.frequency_continuation import fit_hypothesis, refine
-from rippletwin.case.model import FlowRipple
 from rippletwin.explanation.fit_jobs import transfer_theta
 from rippletwin.explanation.localise.shaft_orders import (
     ShaftOrders,
     analyse_shaft_orders,
     shaft_order_level,
 )
-from rippletwin.explanation.thresholds import MIN_SHAFT_ORDER_LEVEL, ROUGH_MODULATION_SHARE
-from rippletwin.harmonics import flow_harmonics, phase_modulate
+from rippletwin.explanation.thresholds import MIN_SHAFT_ORDER_LEVEL
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
 from rippletwin.twin.twin import Twin
 
-MIN_PHASE_CHANGE = 0.02  # rad at the highest order; a smaller change of the modulation is ignored
+MIN_AMPLITUDE_CHANGE = 0.01
+"""Relative change of the highest order's amplitude below which a change of the modulation is
+ignored: no nominal ripple is as accurate."""
 
 
 def estimate_phase_modulation(rig, observations: Sequence, highest_hz: float) -> ShaftOrders | None:
@@ -48,50 +49,35 @@ def estimate_phase_modulation(rig, observations: Sequence, highest_hz: float) ->
             fit = fit_hypothesis(base, (), data)
         else:
             fit = refine(base, (), data, [transfer_theta(fit, (), base)], exact=False)
-        shaft_orders = analyse_shaft_orders(
-            fit.twin, observations, highest_hz, ROUGH_MODULATION_SHARE
-        )
+        shaft_orders = analyse_shaft_orders(fit.twin, observations, highest_hz)
     return shaft_orders
 
 
 def modulation_differs(
     one: ShaftOrders | None, other: ShaftOrders | None, observations: Sequence
 ) -> bool:
-    """Whether two estimates of the modulation differ enough to change the fitted ripple."""
+    """Whether two estimates of the modulation differ enough to change the fitted ripple.
+
+    A modulation b leaves J_0(k |b|) of a piston order k, with its phase.
+    """
     first, second = _modulation_of(one), _modulation_of(other)
-    highest_order = {o.label: np.max(o.orders) for o in observations if o.orders is not None}
     return any(
-        highest_order.get(label, 0.0) * abs(first.get(label, 0.0) - second.get(label, 0.0))
-        > MIN_PHASE_CHANGE
-        for label in {*first, *second}
+        abs(np.diff([j0(np.max(o.orders) * abs(b.get(o.label, 0.0))) for b in (first, second)]))
+        > MIN_AMPLITUDE_CHANGE
+        for o in observations
+        if o.orders is not None
     )
 
 
 def with_phase_modulation(observations: Sequence, shaft_orders: ShaftOrders | None) -> list:
-    """The observations with the flow ripple of a shaft with the modulation of `shaft_orders`."""
+    """The observations with the modulation of `shaft_orders`."""
     modulation = _modulation_of(shaft_orders)
     return [
-        o
-        if o.flow_ripple is None or o.label not in modulation
-        else replace(o, flow_ripple=modulate_ripple(o.flow_ripple, modulation[o.label]))
+        replace(o, modulation=modulation[o.label]) if o.label in modulation else o
         for o in observations
     ]
 
 
 def _modulation_of(shaft_orders: ShaftOrders | None) -> Mapping[str, complex]:
-    """Modulation of each recording by its label; empty unless it is a speed fluctuation."""
-    if shaft_orders is None or shaft_orders.name != "speed_fluctuation":
-        return {}
-    return shaft_orders.modulation
-
-
-def modulate_ripple(ripple: FlowRipple, modulation: complex) -> FlowRipple:
-    """The flow ripple of a shaft that leads an even rotation by Re(b exp(j t)) rad at angle t.
-
-    b is `modulation`.
-    """
-    count = max(len(ripple.flow) // 2, 8)
-    spectrum = flow_harmonics(ripple, np.arange(count))
-    flow = phase_modulate(spectrum, modulation, 4 * count)
-    angle = 360.0 * np.arange(len(flow)) / len(flow)
-    return replace(ripple, angle_deg=angle, flow=flow, modulation=modulation)
+    """Modulation of each recording by its label; empty without a speed fluctuation."""
+    return {} if shaft_orders is None else shaft_orders.modulation

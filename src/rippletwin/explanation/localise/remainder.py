@@ -28,6 +28,7 @@ from rippletwin.explanation.thresholds import (
     EQUIVALENT_LOG_BAYES_FACTOR,
     GOOD_MODEL_ERROR,
     MIN_LOG_BAYES_FACTOR,
+    leaves_nothing,
 )
 
 
@@ -63,6 +64,8 @@ class Remainder:
 
 def find_remainder(fit: Fit, observations: Sequence) -> Remainder | None:
     """The remainder of a fit; None where the fit is as good as the data allow."""
+    if leaves_nothing(fit):
+        return None
     corrections = SmoothCorrections(fit, observations)
     elements = elements_of(fit.twin.rig, observations)
     table = corrections.by_element([*elements, *corrections.promising_positions()])

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from rippletwin.case.quantities import unit_of, write_interval, write_share, write_value
 from rippletwin.case.words import name_place
-from rippletwin.explanation.localise.shaft_orders import ShaftOrders
+from rippletwin.explanation.localise.shaft_orders import ShaftEffect, ShaftOrders
 from rippletwin.explanation.verdict.places import extent_in_words
 
 RIPPLE_ERROR_RATIO = 3.0
@@ -58,18 +58,25 @@ def ripple_sentences(observations: Sequence, fit: dict) -> list[str]:
 
 def shaft_order_sentences(shaft_orders: ShaftOrders | None) -> list[str]:
     """What the shaft orders indicate."""
-    if shaft_orders is None or shaft_orders.name is None:
+    if shaft_orders is None or not shaft_orders.effects:
         return []
-    is_speed = shaft_orders.name == "speed_fluctuation"
-    unit, interval = unit_of("rad" if is_speed else "1", "amplitude"), shaft_orders.interval
-    value = write_value(shaft_orders.value, unit, interval)
-    between = "" if interval is None else f" (95 % interval {write_interval(interval, unit)})"
-    what = (
-        f"a speed fluctuation, with a phase modulation of {value}"
-        if is_speed
-        else f"unequal pistons, by {value} of the mean flow"
-    )
-    return [
+    sentences = [
         f"The shaft orders between the piston orders have {write_share(shaft_orders.level)} of the "
-        f"ripple. They indicate {what}{between}. That resembles a fault of a single piston."
+        f"ripple.",
+        f"They indicate {' and '.join(map(_shaft_effect_in_words, shaft_orders.effects))}.",
     ]
+    if "piston_spread" in shaft_orders.names:
+        sentences.append("Unequal pistons resemble a fault of a single piston.")
+    return [" ".join(sentences)]
+
+
+def _shaft_effect_in_words(effect: ShaftEffect) -> str:
+    is_speed = effect.name == "speed_fluctuation"
+    unit = unit_of("rad" if is_speed else "1", "amplitude")
+    value = write_value(effect.value, unit, effect.interval)
+    between = ""
+    if effect.interval is not None:
+        between = f" (95 % interval {write_interval(effect.interval, unit)})"
+    if is_speed:
+        return f"a speed fluctuation, with a phase modulation of {value}{between}"
+    return f"unequal pistons, by {value} of the mean flow{between}"

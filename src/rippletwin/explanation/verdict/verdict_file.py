@@ -18,7 +18,7 @@ from rippletwin.explanation.checks.profile_intervals import (
 )
 from rippletwin.explanation.localise import residual_bands
 from rippletwin.explanation.localise.missing_immittance import is_passive, missing_immittance
-from rippletwin.explanation.localise.shaft_orders import ShaftOrders
+from rippletwin.explanation.localise.shaft_orders import ShaftEffect
 from rippletwin.explanation.localise.source_free_fits import compare_evidence
 from rippletwin.explanation.verdict.decision import (
     equivalent_places,
@@ -95,26 +95,26 @@ def _line_effects(e: Explanation, entries: list[dict]) -> list[dict]:
 
 
 def _shaft_effects(e: Explanation) -> list[dict]:
-    """The effect at shaft orders, if there is one.
+    """The effects at shaft orders.
 
     Data that contradict themselves show no effect. While something else is unexplained, shaft
     orders establish none: the twin that interprets them is incomplete.
     """
     shaft_orders = e.shaft_orders
-    if shaft_orders is None or shaft_orders.name is None or e.decision.verdict == "bad_data":
+    if shaft_orders is None or e.decision.verdict == "bad_data":
         return []
-    unexplained = e.decision.verdict == "unexplained"
-    return [_shaft_effect(shaft_orders, "supported" if unexplained else "established")]
+    support = "supported" if e.decision.verdict == "unexplained" else "established"
+    return [_shaft_effect(effect, support) for effect in shaft_orders.effects]
 
 
-def _shaft_effect(shaft_orders: ShaftOrders, support: str) -> dict:
+def _shaft_effect(effect: ShaftEffect, support: str) -> dict:
     """It has no `probability`: no evidence was calculated for it."""
-    amplitude: dict[str, Any] = {"value": shaft_orders.value}
-    if shaft_orders.interval is not None:
-        amplitude["ci95"] = list(shaft_orders.interval)
-    amplitude["unit"] = "rad" if shaft_orders.name == "speed_fluctuation" else "1"
+    amplitude: dict[str, Any] = {"value": effect.value}
+    if effect.interval is not None:
+        amplitude["ci95"] = list(effect.interval)
+    amplitude["unit"] = "rad" if effect.name == "speed_fluctuation" else "1"
     return {
-        "name": shaft_orders.name,
+        "name": effect.name,
         "element": "source",
         "parameters": {"amplitude": amplitude},
         "support": support,

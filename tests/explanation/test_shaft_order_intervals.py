@@ -8,10 +8,9 @@ import pytest
 
 from rippletwin.calibration.frequency_continuation import refine
 from rippletwin.case.model import FlowRipple, Load
-from rippletwin.explanation.localise.phase_modulation import modulate_ripple
-from rippletwin.explanation.localise.shaft_order_interval import add_amplitude_interval
+from rippletwin.explanation.localise.shaft_order_intervals import add_amplitude_intervals
 from rippletwin.explanation.localise.shaft_orders import analyse_shaft_orders
-from rippletwin.harmonics import flow_harmonics
+from rippletwin.harmonics import flow_harmonics, modulate_ripple
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
 from rippletwin.twin.twin import Twin
 from synthetic_observations import POINTS, make
@@ -90,8 +89,9 @@ def intervals(fit, covariance, blank, ripple_of, expected_name):
         o = record(rng, fit, covariance, blank, ripple_of)
         wide = replace(fit, covariance=covariance)
         shaft_orders = analyse_shaft_orders(fit.twin, [o], HIGHEST_HZ)
-        assert shaft_orders.name == expected_name
-        results.append(add_amplitude_interval(shaft_orders, wide, [o], HIGHEST_HZ, draws=40))
+        assert shaft_orders.names == (expected_name,)
+        found = add_amplitude_intervals(shaft_orders, wide, [o], HIGHEST_HZ, draws=40)
+        results.append(found.effects[0])
     return results
 
 
@@ -136,10 +136,11 @@ def test_there_is_no_interval_without_a_name_or_a_covariance(fitted):
     rng = np.random.default_rng(1)
     even = record(rng, fit, fit.covariance, blank, lambda rng, ripple: ripple)
     nothing = analyse_shaft_orders(fit.twin, [even], HIGHEST_HZ)
-    assert nothing.name is None
-    assert add_amplitude_interval(nothing, fit, [even], HIGHEST_HZ).interval is None
+    assert nothing.effects == ()
+    assert add_amplitude_intervals(nothing, fit, [even], HIGHEST_HZ) is nothing
     o = record(rng, fit, fit.covariance, blank, modulated)
     shaft_orders = analyse_shaft_orders(fit.twin, [o], HIGHEST_HZ)
     unknown = replace(fit, covariance=np.full_like(fit.covariance, np.nan))
-    assert add_amplitude_interval(shaft_orders, unknown, [o], HIGHEST_HZ).interval is None
+    found = add_amplitude_intervals(shaft_orders, unknown, [o], HIGHEST_HZ)
+    assert found.effects and all(effect.interval is None for effect in found.effects)
     assert flow_harmonics(blank.flow_ripple, np.array([1]))[0] == pytest.approx(0.0, abs=1e-9)
