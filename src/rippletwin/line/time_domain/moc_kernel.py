@@ -103,7 +103,7 @@ def _is_rigid(k, pipes):
 
 @njit(cache=True, error_model="numpy")
 def _pass_waves(share, forward, backward, next_forward, next_backward):
-    """The waves that leave interior nodes of a rigid pipe, before what friction remembers.
+    """The waves that leave interior nodes of a rigid pipe without unsteady friction.
 
     They are p +- c q of p = (up + down)/2, q = (up - down)/(2 b) with c = `share` b. Pressure and
     flow are not kept, for they follow from the waves: see `_read_flow`.
@@ -115,23 +115,15 @@ def _pass_waves(share, forward, backward, next_forward, next_backward):
         next_backward[i] = least * up + most * down
 
 
-# A loop over more than five arrays is not vectorised, so these are loops of their own.
-
-
 @njit(cache=True, error_model="numpy")
-def _lose_before(known, forward, backward):
-    """Take off what friction remembers at the end of the cells that lead to interior nodes."""
-    for i in range(1, len(known) - 2):
-        forward[i - 1] -= known[i]
-        backward[i + 1] += known[i]
-
-
-@njit(cache=True, error_model="numpy")
-def _lose_after(known, forward, backward):
-    """The same at the beginning of the cells that lead away from them."""
-    for i in range(1, len(known) - 2):
-        forward[i] -= known[i]
-        backward[i] += known[i]
+def _pass_remembered(share, known, forward, backward, next_forward, next_backward):
+    """The same with unsteady friction: at the end of the cell before a node and at the beginning of
+    that behind it the waves lose `known`. Five arrays are as many as a loop is vectorised with."""
+    most, least = 0.5 * (1.0 + share), 0.5 * (1.0 - share)
+    for i in range(1, len(forward) - 2):
+        up, down, loss = forward[i - 1], backward[i + 1], (1.0 + share) * known[i]
+        next_forward[i] = most * up + least * down - loss
+        next_backward[i] = least * up + most * down + loss
 
 
 @njit(cache=True, error_model="numpy")
@@ -261,11 +253,10 @@ def _solve_inside(k, pipes, state, waves, leaving, known, lag, give, ends):
         carried = zc - half_r - half_u * gain
         before, after = (forward[here], backward[here]), (leaving[0][here], leaving[1][here])
         if half_u > 0.0:
-            _lose_before(known[here], *before)
-        _pass_waves(carried / b, *before, *after)
-        if half_u > 0.0:
-            _lose_after(known[here], *after)
+            _pass_remembered(carried / b, known[here], *before, *after)
             _read_flow(carried, *after, known[here], flow[here], change[here])
+        else:
+            _pass_waves(carried / b, *before, *after)
     else:
         _update_wall(
             pipes.keep[k], pipes.follow[k], pipes.share[k], pressure[here],
@@ -352,8 +343,10 @@ def advance(source, nodes, pipes, junctions, state):
     count, main, steps = len(pipes.thetas), pipes.main, len(source)
     law, coefficient, outside, constant, conductance = junctions.load
     seen_p, seen_q = np.empty((len(nodes), steps)), np.empty((len(nodes), steps))
-    # (u/2)(sum z_k - G q): friction of the past at the new point
-    known, lag, give = np.zeros((3, len(state.pressure)))
+    # (u/2)(sum z_k - G q): friction of the past at the new point. Rows of one array would not do:
+    # the compiler does not know that a row is contiguous, and vectorises no loop over it.
+    known = np.zeros(len(state.pressure))
+    lag, give = np.zeros(len(state.pressure)), np.zeros(len(state.pressure))
     for k in range(count):
         give[pipes.offsets[k] : pipes.offsets[k + 1]] = pipes.parameters[k, 3]
     ends = np.zeros((2, count, 2))  # supply and slope that a pipe brings to the joint at each end
