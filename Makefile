@@ -7,7 +7,7 @@ export OMP_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 export NUMBA_NUM_THREADS = 1
 
-.PHONY: run smoke test test-long coverage lint docs-site bench pins audit clean
+.PHONY: run smoke test test-long coverage mutants lint docs-site bench pins audit clean
 
 run: .venv/ready
 	$(BIN)/snakemake --cores $(CORES)
@@ -26,6 +26,10 @@ test-long: .venv/ready
 coverage: .venv/ready
 	mkdir -p .coverage
 	$(BIN)/python -m pytest -n $(CORES) -m "not long" --cov --cov-report=term --cov-report=html:.coverage/html $(TESTS)
+
+# Faults put into the verdict's rules, the scoring and the readers, one at a time: what share the tests notice.
+mutants: .venv/ready
+	$(BIN)/python benchmarks/mutants.py
 
 lint: .venv/ready
 	$(BIN)/ruff check .

@@ -3,7 +3,14 @@
 import pytest
 
 from concealed.failures import failure
-from concealed.score import assign_claims, score_case
+from concealed.score import (
+    ACCEPTABLE_MISFIT,
+    PLAIN_CHANGE,
+    assign_claims,
+    is_where_right,
+    score_baseline,
+    score_case,
+)
 from concealed.tool import NO_BASELINES, crash_verdict
 from scored_cases import claim, effect, pair_truth, score_example, truth, verdict
 
@@ -148,3 +155,97 @@ def test_a_tool_that_ended_with_an_error_is_scored():
     row = score_case(truth(), crash_verdict(ValueError("no")), NO_BASELINES | {"seconds": 1.0})
     assert row["verdict"] == "crashed" and not row["right"] and row["alarm"]
     assert failure(row) == "not named"
+
+
+def test_an_own_name_comes_before_an_equivalent_one():
+    """One true effect, two claims that both may stand for it: that of its own name counts, though
+    the other is at its place."""
+    true = [{"name": "A", "element": "line", "position": None}]
+    equivalent = {"name": "B", "element": "line", "parameters": {}}
+    own = {"name": "A", "element": "load", "parameters": {}}
+    assert assign_claims(true, [equivalent, own], [{"A", "B"}], 5.0) == [own]
+
+
+def test_a_pick_of_a_simple_method():
+    """None raises no alarm; the true effect is right, and its place where its element is; a name of
+    one class is right too; another is an alarm that is wrong."""
+    true, classes = [effect("leak")], [["leak", "side_hole"]]
+    nothing = {"alarm": False, "right": False, "place": False, "named": ""}
+    assert score_baseline(true, None, classes) == nothing
+    for name, element, right, place in (
+        ("leak", "position", True, True),
+        ("leak", "load", True, False),
+        ("side_hole", "position", True, True),
+        ("line_volume", "position", False, False),
+    ):
+        score = score_baseline(true, {"name": name, "element": element}, classes)
+        told = {"alarm": True, "right": right, "place": place, "named": f"{name} ({element})"}
+        assert score == told
+
+
+@pytest.mark.parametrize(
+    ("misfit", "alarm"), [(ACCEPTABLE_MISFIT, False), (1.01 * ACCEPTABLE_MISFIT, True)]
+)
+def test_calibration_alone_raises_the_alarm_by_its_misfit(misfit, alarm):
+    """Beyond what is acceptable; it never names an effect."""
+    said = verdict("consistent")
+    said["fit"]["before"]["in_sample"] = misfit
+    row = score_example(truth(), said)
+    assert row["baselines"]["recalibrate"]["alarm"] is alarm
+    assert not row["baselines"]["recalibrate"]["right"]
+    assert row["baselines"]["bic"] == row["baselines"]["sparse"]
+
+
+def test_what_a_row_takes_from_the_truth():
+    """A change counts as plain from its limit on; calibration absorbs no less than nothing."""
+    assert score_example(truth(change=PLAIN_CHANGE), verdict("consistent"))["plain"]
+    assert not score_example(truth(change=0.99 * PLAIN_CHANGE), verdict("consistent"))["plain"]
+    said = verdict("consistent")
+    said["fit"]["before"]["in_sample"] = 0.6  # nominal 0.5
+    row = score_example(truth(), said, oracle_log_evidence=7.0)
+    assert row["absorbed"] == 0.0 and row["oracle_log_evidence"] == 7.0
+    assert not row["alarm"] and not row["where_right"] and row["seconds"] == 1.0
+    assert score_example(truth(), verdict("unexplained"))["alarm"]
+
+
+@pytest.mark.parametrize(
+    ("element", "position_m", "right"),
+    [
+        ("segment 2", None, True),
+        ("segment 1", None, False),
+        ("between p1 and p2", [2.9, 3.2], True),
+        ("between p1 and p2", [3.04, 3.06], True),  # 1 % of 5 m from 3.0, and from 3.1
+        ("between p1 and p2", [3.2, 3.4], False),
+        ("between p1 and p2", [2.0, 2.9], False),
+        ("load", None, False),
+    ],
+)
+def test_where_is_right_in_the_segment_or_between_the_sensors(element, position_m, right):
+    """Of a leak at 3 m, 3.1 m on the drawing, in segment 2 of a line of 5 m."""
+    said = {"mismatch": {"where": {"element": element, "position_m": position_m}}}
+    assert is_where_right([effect("leak")], said, 5.0) is right
+
+
+def test_where_is_right_at_the_element_of_an_effect_without_a_position():
+    """Of any true effect; nowhere is wrong."""
+    true = [effect("leak") | {"position": None, "element": "load"}]
+    said = {"mismatch": {"where": {"element": "load"}}}
+    assert is_where_right(true, said, 5.0) and not is_where_right([], said, 5.0)
+    assert not is_where_right(true, {"mismatch": {"where": None}}, 5.0)
+    assert not is_where_right(true, {"mismatch": {"where": {"element": "source"}}}, 5.0)
+    assert is_where_right(
+        [effect("wall") | {"position": None, "element": "line"}, *true], said, 5.0
+    )
+
+
+def test_an_interval_of_an_equivalent_name_is_not_compared():
+    """Its parameters are others. Parameters without an interval are left out."""
+    said = verdict("ambiguous", claim("side_hole", conductance=(0.0, 9.0)),
+                   equivalents=[("leak", "side_hole")])  # fmt: skip
+    assert score_example(truth(), said)["intervals_hold"] == []
+    bare = claim("leak")
+    bare["parameters"]["conductance"] = {"value": 2.0}
+    assert score_example(truth(), verdict("named", bare))["intervals_hold"] == []
+    at_ends = [claim("leak", conductance=ends) for ends in ((2.0, 3.0), (1.0, 2.0))]
+    for each in at_ends:
+        assert score_example(truth(), verdict("named", each))["intervals_hold"] == [True]

@@ -64,3 +64,49 @@ def test_a_crash_is_no_finding():
     crashed = [{"label": "unknown_00", "state": "crashed"}]
     (row,) = scored(0, true, crashed, RUN | {"misfit": None, "diagnose_s": None})
     assert not row["right"] and row["suspicion"] == -math.inf
+
+
+def test_a_row_says_where_and_when():
+    """Whether the point is that of the first healthy recording; an answer that was not given has
+    no row; time and misfit are the run's, and rows are in the order of the labels."""
+    true = truth(
+        unknown_01=("slipper", 0.08, {"slipper": 3e-8}), unknown_00=("healthy", 0.0, None),
+        unknown_02=("healthy", 0.0, None),
+    )  # fmt: skip
+    true["recordings"]["unknown_01"]["point"] = [1200.0, 9e6]
+    told = [said("unknown_01", "cylinder", 0.2), said("unknown_00", "healthy", 0.9)]
+    rows = scored(0, true, told)
+    assert [(r["label"], r["same_point"]) for r in rows] == [
+        ("unknown_00", True),
+        ("unknown_01", False),
+    ]
+    assert {(r["twin_misfit"], r["fit_s"], r["diagnose_s"]) for r in rows} == {(0.2, 30.0, 12.0)}
+    assert rows[1]["severities"] == [] and rows[1]["piston_right"] is None
+    assert rows[0]["probability"] == 0.9 and rows[1]["weakest"] == 0.04
+
+
+@pytest.mark.parametrize(("piston", "right"), [(3, True), (4, False), (None, None)])
+def test_the_piston_of_a_single_leak(piston, right):
+    true = truth(unknown_00=("slipper", 0.08, {"slipper": 3e-8}))
+    (row,) = scored(0, true, [said("unknown_00", "slipper", 0.1, piston=piston)])
+    assert row["piston_right"] is right
+
+
+@pytest.mark.parametrize(("p_value", "odds"), [(1e-3, math.log(999)), (0.9999, math.log(1 / 9))])
+def test_unlike_raises_the_suspicion_and_never_lowers_it(p_value, odds):
+    """The odds of the states are 1 to 9 against healthy; those of the p-value count where they are
+    more."""
+    true = truth(unknown_00=("cavitation", 0.4, None))
+    told = said("unknown_00", "unlike", 0.9)
+    told["unlike"]["p_value"] = p_value
+    (row,) = scored(0, true, [told])
+    assert row["suspicion"] == pytest.approx(odds)
+
+
+def test_certainty_is_a_finite_suspicion():
+    """A probability of 0 has no logarithm: both certainties still rank."""
+    true = truth(unknown_00=("healthy", 0.0, None), unknown_01=("slipper", 0.1, {"slipper": 1e-8}))
+    told = [said("unknown_00", "healthy", 1.0), said("unknown_01", "slipper", 0.0)]
+    sound, leaking = scored(0, true, told)
+    assert math.isfinite(sound["suspicion"]) and math.isfinite(leaking["suspicion"])
+    assert sound["suspicion"] < -600 and leaking["suspicion"] > 600

@@ -7,6 +7,7 @@ import pytest
 
 from made_fits import made_fit
 from rippletwin.explanation.checks.alarms import Alarms
+from rippletwin.explanation.checks.bootstrap import NullDistribution
 from rippletwin.explanation.checks.robustness import Robustness
 from rippletwin.explanation.checks.support import Support, support_level
 from rippletwin.explanation.localise.source_free_fits import compare_evidence
@@ -19,7 +20,9 @@ from rippletwin.explanation.thresholds import (
 from rippletwin.explanation.verdict.decision import (
     decide,
     equivalent_effects,
+    equivalent_places,
     posterior_probabilities,
+    rival_fits,
 )
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
@@ -161,3 +164,107 @@ def test_a_network_without_what_was_named_establishes_nothing():
         decision = decide(search, NO_ALARM, [support("established")])
         assert decision.verdict == verdict and decision.accepted is network
         assert bool(decision.supports) == (verdict == "named")
+
+
+def test_evidence_within_the_null_distribution_is_none():
+    """What cases without an effect reach as well names nothing, and the base is accepted; what
+    exceeds all of them counts."""
+    base, best = made_fit(0.0), made_fit(100.0, HOSE)
+    search = Search(base, [best], best)
+    for reached, verdict in ((200.0, "consistent"), (20.0, "named")):
+        null = NullDistribution(tuple(np.linspace(0.0, 1.0, 20) * reached))
+        decision = decide(search, NO_ALARM, [support("established")], null_distribution=null)
+        assert decision.verdict == verdict
+        assert decision.accepted is (best if verdict == "named" else base)
+
+
+@pytest.mark.parametrize(
+    ("alarms", "verdict"),
+    [
+        (replace(NO_ALARM, disagreement=(5.0, "length[1]")), "calibration_only"),
+        (replace(NO_ALARM, drift=(1e-9, "healthy")), "unexplained"),
+    ],
+)
+def test_points_that_disagree_and_halves_that_drift(alarms, verdict):
+    """Another line at each point is a matter of calibration; a recording of two states is not."""
+    base = made_fit(0.0)
+    assert decide(Search(base, [], base), alarms).verdict == verdict
+
+
+def test_a_suggestion_that_an_alarm_bears_out_stays_the_twins():
+    """Nothing is established and something is missing: the twin takes what comes nearest."""
+    base, best = made_fit(0.0), made_fit(100.0, HOSE)
+    decision = decide(Search(base, [best], best), MISFIT_RAISED, [support("suggested")])
+    assert decision.verdict == "unexplained" and decision.accepted is best
+    assert [s.level for s in decision.supports] == ["suggested"]
+
+
+ELSEWHERE = (EFFECTS["viscoelastic_wall"], Place("segment 2", 1))
+
+
+def test_one_effect_at_two_places_is_no_ambiguity():
+    """The hose is in either segment: it is named, and both places are told. The other fit is a
+    rival, for which a next recording is sought."""
+    base, best, other = made_fit(0.0), made_fit(50.0, HOSE), made_fit(49.0, ELSEWHERE)
+    search = Search(base, [best, other], best, [best, other])
+    assert equivalent_effects(search) == ()
+    assert equivalent_places(search) == (
+        ("viscoelastic_wall at segment 1", "viscoelastic_wall at segment 2"),
+    )
+    assert rival_fits(search) == [other]
+    assert decide(search, NO_ALARM, [support("established")]).verdict == "named"
+
+
+def test_no_other_place_is_told_of_another_effect():
+    """A volume that fits as well is another effect, and has no part in the places of the hose."""
+    base, best, other = made_fit(0.0), made_fit(50.0, HOSE), made_fit(49.0, VOLUME)
+    assert equivalent_places(Search(base, [best, other], best, [best, other])) == ()
+
+
+@pytest.mark.parametrize(
+    ("rival", "counts"),
+    [
+        ((HOSE, VOLUME), False),  # it has the effect itself, and one more
+        ((VOLUME, NETWORK), False),  # two in the place of one
+        ((VOLUME,), True),
+    ],
+)
+def test_a_substitute_replaces_one_effect_by_one(rival, counts):
+    """Fits of as much evidence with other numbers of effects are no substitutes."""
+    base, best, other = made_fit(0.0), made_fit(50.0, HOSE), made_fit(49.0, *rival)
+    search = Search(base, [best, other], best, [best, other])
+    assert bool(rival_fits(search)) == counts
+
+
+@pytest.mark.parametrize(
+    ("evidence", "counts"),
+    [(50.0 - EQUIVALENT_LOG_BAYES_FACTOR, False), (50.1 - EQUIVALENT_LOG_BAYES_FACTOR, True)],
+)
+def test_a_substitute_is_closer_than_twenty_to_one(evidence, counts):
+    base, best, other = made_fit(0.0), made_fit(50.0, HOSE), made_fit(evidence, VOLUME)
+    search = Search(base, [best, other], best, [best, other])
+    assert bool(rival_fits(search)) == counts
+
+
+def test_an_effect_that_is_always_there_has_no_substitute():
+    """Whatever else could do its work: it is known to be there."""
+    radiation = (EFFECTS["end_radiation"], Place("load"))
+    base, best, other = made_fit(0.0), made_fit(50.0, radiation), made_fit(49.0, VOLUME)
+    assert rival_fits(Search(base, [best, other], best, [best, other])) == []
+
+
+def test_other_positions_are_those_of_the_best_hypothesis():
+    """A position found on the way, beside effects that were left again, is none of the answer's."""
+    base, best = made_fit(0.0), made_fit(50.0, HOSE)
+    same, left = made_fit(49.0, HOSE), made_fit(49.0, HOSE, VOLUME)
+    search = Search(base, [best], best, other_positions=[same, left])
+    assert rival_fits(search) == [same]
+
+
+def test_probabilities_of_much_evidence_are_numbers():
+    """exp(evidence) overflows from 710 on. Evidence of 1e4 beside 1e4 - 1 has the probability of 1
+    beside 0, and a hypothesis that was fitted twice counts once."""
+    base, best, other = made_fit(0.0), made_fit(1e4, HOSE), made_fit(1e4 - 1.0, VOLUME)
+    search = Search(base, [best, other], best, [best, best])
+    probability = posterior_probabilities(search, best)["viscoelastic_wall"]
+    assert probability == pytest.approx(1.0 / (1.0 + np.exp(-1.0)))

@@ -1,0 +1,290 @@
+"""Which accepted effects remain, and how well each is supported: the rules on made evidence."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from made_fits import made_fit
+from rippletwin.explanation.checks import support as rules
+from rippletwin.explanation.checks.prior_sensitivity import WithoutEffect
+from rippletwin.explanation.checks.robustness import Robustness, compare_beside_corrections
+from rippletwin.explanation.checks.support import (
+    Judged,
+    Support,
+    judge_beside_network,
+    judge_effects,
+)
+from rippletwin.explanation.localise.smooth_corrections import NONE
+from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR, PULL_ALARM
+from rippletwin.twin.effects.base import Place
+from rippletwin.twin.effects.library import EFFECTS
+from rippletwin.twin.priors import lognormal, uniform
+
+HOSE = (EFFECTS["viscoelastic_wall"], Place("segment 1", 0))
+VOLUME = (EFFECTS["line_volume"], Place("position"))
+LEAK = (EFFECTS["leak"], Place("position"))
+CERTAIN = (EFFECTS["end_radiation"], Place("load"))
+NETWORK = (EFFECTS["passive_network"], Place("position", form="shunt"))
+BASE = made_fit(0.0)
+BARE = (NONE, None)
+
+
+def made_support(member, level="established", plain=50.0):
+    effect, place = member
+    return Support(effect.name, str(place), level, Robustness(plain, plain, BARE, plain), 1.0, 0.0)
+
+
+def without_each(workers, base, best):
+    """The fits without each effect: no fit is run."""
+    rests = [made_fit(1.0, *best.without(k)) for k in range(len(best.hypothesis))]
+    return tuple(WithoutEffect(rest, rest, 0.1) for rest in rests)
+
+
+# ---- robustness ----
+
+PRESENT = {BARE: 100.0, ("segment", 1): 90.0, ("shunt", 2.0): 80.0, ("shunt", 2.25): 70.0}
+
+
+def test_an_effect_is_compared_with_the_best_model_without_it():
+    """Of two models without the effect the better one counts, element by element; one that only a
+    single model has is compared with that; one that none has is left out."""
+    absent = [{BARE: 50.0, ("segment", 1): 80.0}, {BARE: 60.0, ("shunt", 2.0): 65.0}]
+    found = compare_beside_corrections(PRESENT, absent, ("segment", 1), spacing=0.1)
+    assert (found.plain, found.own) == (40.0, 10.0)
+    assert (found.element, found.least) == (("shunt", 2.0), 15.0)
+
+
+@pytest.mark.parametrize(
+    ("own", "spacing", "element", "least"),
+    [
+        (("shunt", 2.0), 0.1, ("shunt", 2.25), 60.0),  # 0.25 m away is another place
+        (("shunt", 2.0), 0.25, ("shunt", 2.25), 60.0),  # as far as the spacing is, too
+        (("shunt", 2.0), 0.26, ("segment", 1), 80.0),  # within it there is one place
+        (("series", 2.0), 0.26, ("shunt", 2.25), 60.0),  # of another kind it never is
+    ],
+)
+def test_an_effect_is_no_witness_against_itself(own, spacing, element, least):
+    """Elements within the spacing of the effect's own, of its kind, are its own."""
+    present = PRESENT | {own: PRESENT.get(own, 99.0)}
+    absent = [dict.fromkeys(present, 10.0)]
+    found = compare_beside_corrections(present, absent, own, spacing)
+    assert (found.element, found.least) == (element, least)
+    assert found.own == present[own] - 10.0
+
+
+def test_a_segment_is_only_itself():
+    """Numbers of segments are no positions: segment 2 is not within the spacing of segment 1."""
+    present = {BARE: 50.0, ("segment", 1): 40.0, ("segment", 2): 30.0}
+    found = compare_beside_corrections(
+        present, [dict.fromkeys(present, 0.0)], ("segment", 1), spacing=5.0
+    )
+    assert (found.element, found.own) == (("segment", 2), 40.0)
+
+
+# ---- effects that are only suggested ----
+
+
+@pytest.fixture
+def levels(monkeypatch):
+    """Name -> (level, plain log Bayes factor) of the effects, as the checks would find."""
+    table = {}
+
+    def judge_each(workers, best, without, halves):
+        return tuple(made_support(m, *table[m[0].name]) for m in best.hypothesis)
+
+    monkeypatch.setattr(rules, "fit_without_each_effect", without_each)
+    monkeypatch.setattr(rules, "_judge_each", judge_each)
+    return table
+
+
+def test_the_weakest_suggested_effect_is_dropped_first(levels, monkeypatch):
+    """Of two suggested effects the one of less evidence goes; the other is judged again."""
+    levels |= {
+        "viscoelastic_wall": ("suggested", 9.0),
+        "line_volume": ("suggested", 3.0),
+        "leak": ("established", 1.0),
+    }
+    judge_each, judged_at = rules._judge_each, []
+
+    def noted(workers, best, *rest):
+        judged_at.append(best.names)
+        return judge_each(workers, best, *rest)
+
+    monkeypatch.setattr(rules, "_judge_each", noted)
+    judged = judge_effects(None, BASE, made_fit(100.0, HOSE, VOLUME, LEAK))
+    assert judged_at[:2] == [
+        ("viscoelastic_wall", "line_volume", "leak"),
+        ("viscoelastic_wall", "leak"),
+    ]
+    assert judged.best.names == ("leak",)
+    assert [s.name for s in judged.supports] == ["leak"] and len(judged.without) == 1
+
+
+def test_the_last_effect_stays(levels):
+    """It says what comes nearest, though it is only suggested."""
+    levels["viscoelastic_wall"] = ("suggested", 1.0)
+    best = made_fit(100.0, HOSE)
+    judged = judge_effects(None, BASE, best)
+    assert judged.best is best and judged.supports[0].level == "suggested"
+
+
+def test_an_effect_that_is_always_there_stays(levels):
+    """Weak evidence takes no physics away that must be there; the other suggested effect goes."""
+    levels |= {"end_radiation": ("suggested", 0.0), "viscoelastic_wall": ("suggested", 5.0)}
+    judged = judge_effects(None, BASE, made_fit(100.0, CERTAIN, HOSE))
+    assert judged.best.names == ("end_radiation",)
+
+
+# ---- beside a network ----
+
+
+def judged_of(*members, levels=None):
+    best = made_fit(100.0, *members)
+    levels = levels or ["established"] * len(members)
+    supports = tuple(made_support(m, level) for m, level in zip(members, levels))
+    return Judged(best, supports, without_each(None, BASE, best))
+
+
+@pytest.fixture
+def beside(monkeypatch):
+    """Sorted names beside the network -> evidence of the network with these effects alone."""
+    table = {}
+
+    def fit_without_beside(workers, network, judged):
+        rests = [judged.best.without(k) for k in range(len(judged.best.hypothesis))]
+        return [
+            made_fit(table[tuple(sorted(e.name for e, _ in rest))], *rest, NETWORK)
+            for rest in rests
+        ]
+
+    monkeypatch.setattr(rules, "fit_without_each_effect", without_each)
+    monkeypatch.setattr(rules, "_fit_without_beside", fit_without_beside)
+    return table
+
+
+def test_an_effect_that_the_network_makes_needless_is_dropped(beside):
+    """With the network the line is better off without the volume; its support goes with it, and the
+    hose keeps its own."""
+    beside |= {("viscoelastic_wall",): 121.0, ("line_volume",): 60.0, (): 20.0}
+    network = made_fit(120.0, HOSE, VOLUME, NETWORK)
+    found, judged = judge_beside_network(None, BASE, network, judged_of(HOSE, VOLUME))
+    assert found.evidence == 121.0 and found.names == ("viscoelastic_wall", "passive_network")
+    assert judged.best.names == ("viscoelastic_wall",)
+    assert [(s.name, s.level) for s in judged.supports] == [("viscoelastic_wall", "established")]
+
+
+def test_the_first_of_two_effects_is_dropped_with_its_own_support(beside):
+    """The support that goes is that of the effect that goes."""
+    beside |= {("viscoelastic_wall",): 60.0, ("line_volume",): 121.0, (): 20.0}
+    network = made_fit(120.0, HOSE, VOLUME, NETWORK)
+    _, judged = judge_beside_network(None, BASE, network, judged_of(HOSE, VOLUME))
+    assert [s.name for s in judged.supports] == ["line_volume"]
+
+
+@pytest.mark.parametrize(
+    ("gain", "before", "after"),
+    [
+        (MIN_LOG_BAYES_FACTOR, "established", "established"),
+        (MIN_LOG_BAYES_FACTOR - 0.1, "established", "supported"),
+        (0.0, "established", "supported"),  # no loss, no gain: it stays
+        (0.0, "suggested", "suggested"),  # no level rises
+    ],
+)
+def test_an_effect_keeps_its_level_if_it_keeps_its_evidence(beside, gain, before, after):
+    """Beside the network an established effect must add what any effect must add."""
+    beside[()] = 100.0 - gain
+    network = made_fit(100.0, HOSE, NETWORK)
+    found, judged = judge_beside_network(None, BASE, network, judged_of(HOSE, levels=[before]))
+    assert found is network and judged.supports[0].level == after
+
+
+def test_a_network_takes_nothing_away_that_is_always_there(beside):
+    """Though the network is better off without it."""
+    beside[()] = 500.0
+    network = made_fit(100.0, CERTAIN, NETWORK)
+    found, judged = judge_beside_network(None, BASE, network, judged_of(CERTAIN))
+    assert found is network and judged.supports[0].level == "established"
+
+
+def test_a_network_beside_no_effect_is_kept(beside):
+    """There is nothing to leave out."""
+    network = made_fit(100.0, NETWORK)
+    found, judged = judge_beside_network(None, BASE, network, judged_of())
+    assert found is network and judged.supports == ()
+
+
+def test_each_effect_is_left_out_in_two_ways(monkeypatch):
+    """Beside the network, and beside one that begins anew without it: the better fit counts."""
+    monkeypatch.setattr(rules, "job_without_effect", lambda fit, k, base: ("kept", k))
+    monkeypatch.setattr(rules, "extension_job", lambda fit, member: ("anew", fit.names, member))
+    asked = []
+
+    def fit(jobs):
+        asked.extend(jobs)
+        return [made_fit(value) for value in (5.0, 6.0, 9.0, 2.0)]
+
+    workers = SimpleNamespace(fit=fit, base=None)
+    network = made_fit(100.0, HOSE, VOLUME, NETWORK)
+    fits = rules._fit_without_beside(workers, network, judged_of(HOSE, VOLUME))
+    assert asked == [
+        ("kept", 0), ("kept", 1),
+        ("anew", ("line_volume",), NETWORK), ("anew", ("viscoelastic_wall",), NETWORK),
+    ]  # fmt: skip
+    assert [f.evidence for f in fits] == [9.0, 6.0]
+
+
+# ---- plausible values ----
+
+
+def test_the_pull_is_that_of_the_effects_own_sizes():
+    """Largest coordinate of the effect's parameters, either way; neither a position nor another
+    effect's parameter counts."""
+    parameters = (
+        SimpleNamespace(name="leak@position.position", prior=uniform(0.0, 5.0)),
+        SimpleNamespace(name="leak@position.conductance", prior=lognormal(1e-11, 1.0)),
+        SimpleNamespace(name="leak@position.exponent", prior=lognormal(1.0, 1.0)),
+        SimpleNamespace(name="line_volume@position.volume", prior=lognormal(1e-5, 1.0)),
+    )
+    twin = SimpleNamespace(parameters=parameters, theta=np.array([9.0, -3.0, 2.0, 8.0]))
+    fit = replace(BASE, twin=twin)
+    assert rules._largest_pull(fit, "leak@position.") == 3.0
+    assert rules._largest_pull(fit, "side_branch@position.") == 0.0
+
+
+@pytest.mark.parametrize(
+    ("plain", "own", "pull", "held_out", "level"),
+    [
+        (MIN_LOG_BAYES_FACTOR, 0.0, PULL_ALARM, 1e-9, "established"),  # each at its limit
+        (MIN_LOG_BAYES_FACTOR, 0.0, PULL_ALARM, 0.0, "suggested"),  # held-out data add nothing
+        (MIN_LOG_BAYES_FACTOR, -1e-9, PULL_ALARM, 1e-9, "supported"),
+        (MIN_LOG_BAYES_FACTOR, 0.0, PULL_ALARM + 1e-9, 1e-9, "supported"),
+        (MIN_LOG_BAYES_FACTOR - 1e-9, 0.0, PULL_ALARM, 1e-9, "suggested"),
+    ],
+)
+def test_levels_at_their_limits(plain, own, pull, held_out, level):
+    """What just reaches a limit passes, but for held-out data, which must gain."""
+    robustness = Robustness(plain, MIN_LOG_BAYES_FACTOR, BARE, own)
+    assert rules.support_level(robustness, held_out, pull) == level
+
+
+def test_held_out_gains_add_over_the_folds(monkeypatch):
+    """Each effect's is the log probability with all effects less that without it, over all folds,
+    of fits to each fold's own recordings."""
+    monkeypatch.setattr(rules, "_log_predictive", lambda fit, held_out: fit.evidence * held_out)
+    asked = []
+
+    def fit(jobs):
+        asked.append([(job.observations, job.hypothesis) for job in jobs])
+        return [made_fit(value) for value in (10.0, 7.0, 9.0)]
+
+    workers = SimpleNamespace(fit=fit)
+    folds = [
+        SimpleNamespace(workers=workers, indices=(k,), held_out=share)
+        for k, share in enumerate((1.0, 2.0))
+    ]
+    best = made_fit(100.0, HOSE, VOLUME)
+    gains = rules._held_out_gains(best, without_each(None, BASE, best), folds)
+    assert gains == [9.0, 3.0]
+    assert asked == [[((k,), (HOSE, VOLUME)), ((k,), (VOLUME,)), ((k,), (HOSE,))] for k in range(2)]
