@@ -116,6 +116,7 @@ def test_the_sheet_arrives_in_the_dataclasses(tmp_path):
     (recording,) = case.healthy
     assert recording.load_pressure == 9.5e6 and recording.state_code == "H"
     np.testing.assert_allclose(recording.flow_ripple.flow, flow)
+    assert case.rig.displacement == pytest.approx(5e-4 / (recording.speed_rpm / 60.0))
     assert observe(recording, case.rig).source == "nominal"
 
 

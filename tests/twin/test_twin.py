@@ -94,10 +94,11 @@ def test_the_shaft_angle_shifts_the_recording_in_time():
 
 def test_a_twin_survives_json_to_the_last_bit():
     """Written as JSON text and read back, a twin with effects predicts the same numbers."""
-    rig = paper_rig()
+    rig = replace(paper_rig(), displacement=4e-5)
     points = three_points(rig)
-    effect = EFFECTS["viscoelastic_wall"]
-    twin = Twin(rig, points, effects=[(effect, effect.places(rig)[1])])
+    wall, pump = EFFECTS["viscoelastic_wall"], EFFECTS["source_impedance"]
+    effects = [(wall, wall.places(rig)[1]), (pump, pump.places(rig)[1])]
+    twin = Twin(rig, points, effects=effects)
     twin = twin.with_(theta=np.random.default_rng(0).standard_normal(len(twin.parameters)))
     again = twin_file.from_dict(json.loads(json.dumps(twin_file.to_dict(twin))))
     for one, two in zip(twin.predict(points), again.predict(points)):

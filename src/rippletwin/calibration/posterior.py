@@ -47,6 +47,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
+from functools import lru_cache
 
 import numpy as np
 
@@ -367,4 +368,9 @@ def _between_neighbours(grid: np.ndarray, k: int) -> np.ndarray:
     """Finer values of an ascending grid between the neighbours of its entry `k`."""
     if len(grid) == 1:
         return grid
-    return np.geomspace(grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)], FINER_ERRORS)
+    return _finer_values(float(grid[max(k - 1, 0)]), float(grid[min(k + 1, len(grid) - 1)]))
+
+
+@lru_cache(maxsize=256)
+def _finer_values(low: float, high: float) -> np.ndarray:
+    return np.geomspace(low, high, FINER_ERRORS)

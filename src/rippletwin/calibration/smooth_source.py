@@ -32,9 +32,10 @@ class SmoothSourceError:
 
     def sds(self, tau) -> np.ndarray:
         """Standard deviations (..., J) of the amplitudes for tau (...)."""
-        smooth = np.repeat(np.asarray(tau)[..., None], len(self.basis) - 1, axis=-1)
-        size = np.full((*smooth.shape[:-1], 1), self._size_sd)
-        return np.concatenate([smooth, size], axis=-1)
+        sds = np.empty((*np.shape(tau), len(self.basis)))
+        sds[..., :-1] = np.asarray(tau)[..., None]
+        sds[..., -1] = self._size_sd
+        return sds
 
     def most_likely(self, pull: np.ndarray, tau: float) -> np.ndarray:
         """Most likely error (N,) given the derivative `pull` (F,) of the log likelihood by it."""

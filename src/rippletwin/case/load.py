@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -83,6 +84,7 @@ def load_case(
         if progress is not None:
             progress("reading", done, len(chosen))
     raise_any(errors)
+    rig = replace(rig, displacement=_displacement(recordings))
     warnings = [*unusual_values(sheet_path, sheet), *band_warnings(rig, recordings)]
     return Case(folder=folder, rig=rig, recordings=tuple(recordings), warnings=tuple(warnings))
 
@@ -147,6 +149,16 @@ def _recording(folder: Path, entry: dict, rig: Rig) -> Recording:
     recording = Recording(**fields, pressure=pressure, sampling_rate_hz=rate)
     raise_any(signal_errors(recording, rig))
     return recording
+
+
+def _displacement(recordings: Sequence[Recording]) -> float | None:
+    """Flow per revolution, m3, of the stated flow ripples; None without one."""
+    stated = [
+        abs(float(np.mean(r.flow_ripple.flow))) / (r.speed_rpm / 60.0)
+        for r in recordings
+        if r.flow_ripple is not None and r.speed_rpm
+    ]
+    return float(np.mean(stated)) or None if stated else None
 
 
 def _check_mean_flow(path: Path, flow: np.ndarray, rig: Rig) -> None:

@@ -168,7 +168,11 @@ class Recording:
 
 @dataclass(frozen=True)
 class Rig:
-    """The test bench; `pump` holds the keys of rig.yaml's pump (pistons, and geometry if given)."""
+    """The test bench; `pump` holds the keys of rig.yaml's pump (pistons, and geometry if given).
+
+    `displacement`, m3 per revolution, follows from flow ripples that recordings state; None without
+    one.
+    """
 
     fluid: Fluid
     pump: dict
@@ -176,6 +180,7 @@ class Rig:
     sensors: tuple[Sensor, ...]
     load: Load
     uncertainty: Uncertainty = Uncertainty()
+    displacement: float | None = None
 
     @property
     def length(self) -> float:

@@ -76,6 +76,7 @@ def _rig(data: dict) -> Rig:
         sensors=tuple(Sensor(**s) for s in data["sensors"]),
         load=Load(**load),
         uncertainty=Uncertainty(**data["uncertainty"]),
+        displacement=data.get("displacement"),
     )
 
 

@@ -206,8 +206,7 @@ def on_line(network, position):
 
 def scale_sensor(network, index: int, factor) -> None:
     """Multiply the reading of sensor `index` by `factor` (..., F)."""
-    count = len(network.sensor_positions)
-    shape = np.broadcast_shapes(np.shape(network.sensor_factor), (count, *np.shape(factor)))
-    factors = np.array(np.broadcast_to(network.sensor_factor, shape), dtype=complex)
-    factors[index] = factors[index] * factor
+    ones = np.ones((len(network.sensor_positions), *np.shape(factor)), complex)
+    factors = network.sensor_factor * ones
+    factors[index] *= factor
     network.sensor_factor = factors

@@ -11,6 +11,10 @@ from rippletwin.twin.effects.lumped_elements import volume_compliance
 from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal
 
+VOLUME_SD = 0.7
+"""Standard deviation of the logarithm of the pump's own volume over its displacement. The chambers
+open to delivery have 0.4 to 0.75 of the displacement on the average, with dead volumes of 0.3 to 1
+of a stroke; the passages to the outlet have about as much again."""
 FORMS = ("leakage", "volume", "volume and passage")  # each has what the one before has, and more
 
 
@@ -37,13 +41,21 @@ def _compliance(state, values, place):
 def _parameters(rig, place):
     first = rig.line[0]
     area = 0.25 * np.pi * first.diameter**2
-    volume = Parameter("volume", "m3", lognormal(1e-4 * (first.diameter / 0.02) ** 3, 1.2))
+    volume = Parameter("volume", "m3", _volume_prior(rig))
     leakage = Parameter(
         "conductance", "m3/(Pa s)", lognormal(0.01 * characteristic_admittance(rig), 1.5)
     )
     passage = Parameter("inertance", "Pa s2/m3", lognormal(0.1 * rig.fluid.density / area, 1.0))
     own = {"leakage": (leakage,), "volume": (volume, leakage)}
     return own.get(place.form, (volume, leakage, passage))
+
+
+def _volume_prior(rig):
+    """Of a pump that is known by its flow ripple, all of its volume; of a simulated one, whose
+    chambers respond to the line, or an unknown one, any volume that suits the bore."""
+    if rig.displacement is not None:
+        return lognormal(rig.displacement, VOLUME_SD)
+    return lognormal(1e-4 * (rig.line[0].diameter / 0.02) ** 3, 1.2)
 
 
 def _apply_in_time(line, state, values, place):

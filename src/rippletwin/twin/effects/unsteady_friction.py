@@ -12,7 +12,7 @@ def friction_excess(s, viscosity, diameter, density):
     """Z'_unsteady - Z'_steady (..., F), Pa s/m4, at s (F,); `viscosity` and `diameter` broadcast to
     (..., 1) or are scalars."""
     rate = 4.0 * viscosity / diameter**2
-    if np.size(rate) > 1:
+    if np.ndim(viscosity):
         # A batch has few distinct nu/R^2, and friction takes long.
         distinct, inverse = np.unique(rate, return_inverse=True)
         distinct = distinct[:, None]
