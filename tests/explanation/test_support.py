@@ -288,3 +288,47 @@ def test_held_out_gains_add_over_the_folds(monkeypatch):
     gains = rules._held_out_gains(best, without_each(None, BASE, best), folds)
     assert gains == [9.0, 3.0]
     assert asked == [[((k,), (HOSE, VOLUME)), ((k,), (VOLUME,)), ((k,), (HOSE,))] for k in range(2)]
+
+
+def test_every_element_is_tried_with_and_without_an_effect(monkeypatch):
+    """Each element that any model without an effect was given, listed or promising, is given to the
+    model with all effects too; a listed one with the least margin decides, whichever it is."""
+    listed = [BARE, ("segment", 1), ("source", None), ("sensor", 0), ("load", None)]
+    promising = ("shunt", 2.0)
+    own = ("segment", 1)
+    best = made_fit(100.0, HOSE)
+    twin = SimpleNamespace(
+        rig=None,
+        theta=best.twin.theta,
+        parameters=best.twin.parameters,
+        effect_values=lambda theta: [(*HOSE, {})],
+    )
+    best = replace(best, twin=twin)
+    absent = [dict.fromkeys([*listed, promising], 0.0)]
+    replacements = {
+        "make_folds": lambda workers, halves: [],
+        "own_element": lambda *arguments: own,
+        "elements_of": lambda *arguments: listed,
+        "transfer_theta": lambda *arguments: None,
+        "position_spacing": lambda *arguments: 0.1,
+        "_held_out_gains": lambda *arguments: [1.0],
+    }
+    for name, function in replacements.items():
+        monkeypatch.setattr(rules, name, function)
+    for weakest in [*listed[2:], promising]:
+
+        def evaluate(function, jobs, weakest=weakest):
+            if function is rules.evaluate_without:
+                return [absent for _ in jobs]
+            return [{e: 1.0 if e == weakest else 50.0 for e in tried} for _, tried in jobs]
+
+        workers = SimpleNamespace(
+            map=evaluate, base=None, observations=[SimpleNamespace(frequency_hz=np.ones(2))]
+        )
+        (found,) = rules._judge_each(workers, best, without_each(None, BASE, best), None)
+        assert (found.robustness.element, found.robustness.least) == (weakest, 1.0)
+        assert (found.name, found.place, found.level) == (
+            "viscoelastic_wall",
+            "segment 1",
+            "supported",
+        )
