@@ -182,11 +182,12 @@ def _holds_position(effect: dict, interval: Sequence[float], length: float) -> b
 
 
 def intervals_hold(effect: dict, claim: dict) -> list[bool]:
-    """Whether each stated 95 % interval of a claim by the effect's own name holds the true value.
+    """Whether each stated 95 % interval of a claim by the effect's own name, at its own element,
+    holds the true value.
 
     Positions are left to `is_place_right`: they are known to the lengths' tolerance only.
     """
-    if claim["name"] != effect["name"]:
+    if (claim["name"], claim["element"]) != (effect["name"], effect["element"]):
         return []
     return [
         claim["parameters"][name]["ci95"][0] <= value <= claim["parameters"][name]["ci95"][1]

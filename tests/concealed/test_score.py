@@ -7,6 +7,7 @@ from concealed.score import (
     ACCEPTABLE_MISFIT,
     PLAIN_CHANGE,
     assign_claims,
+    intervals_hold,
     is_where_right,
     score_baseline,
     score_case,
@@ -249,3 +250,12 @@ def test_an_interval_of_an_equivalent_name_is_not_compared():
     at_ends = [claim("leak", conductance=ends) for ends in ((2.0, 3.0), (1.0, 2.0))]
     for each in at_ends:
         assert score_example(truth(), verdict("named", each))["intervals_hold"] == [True]
+
+
+def test_an_interval_at_another_element_is_not_compared():
+    """The gain of another sensor is no estimate of the true one: the place is wrong, not the value."""
+    true = effect("sensor_gain", gain_error=0.1) | {"position": None, "element": "sensor p2"}
+    for element, held in (("sensor p2", [True]), ("sensor p1", [])):
+        said = claim("sensor_gain", gain_error=(0.05, 0.2)) | {"element": element}
+        said["parameters"].pop("position", None)
+        assert intervals_hold(true, said) == held
