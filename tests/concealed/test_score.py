@@ -253,7 +253,7 @@ def test_an_interval_of_an_equivalent_name_is_not_compared():
 
 
 def test_an_interval_at_another_element_is_not_compared():
-    """The gain of another sensor is no estimate of the true one: the place is wrong, not the value."""
+    """The gain of another sensor is at the wrong place and says nothing of the true value."""
     true = effect("sensor_gain", gain_error=0.1) | {"position": None, "element": "sensor p2"}
     for element, held in (("sensor p2", [True]), ("sensor p1", [])):
         said = claim("sensor_gain", gain_error=(0.05, 0.2)) | {"element": element}

@@ -360,7 +360,8 @@ class Posterior:
 
 def _neighbours(grid: np.ndarray, value: float) -> np.ndarray:
     """The values of an ascending grid next to `value`: the nearest, one below and one above."""
-    nearest = int(np.argmin(np.abs(np.log(np.maximum(grid, 1e-9) / max(value, 1e-9)))))
+    distances = np.abs(np.log(np.maximum(grid, 1e-9) / max(value, 1e-9)))
+    nearest = int(np.argmin(np.round(distances, 9)))  # rounding does not decide half way
     return grid[max(nearest - 1, 0) : nearest + 2]
 
 
