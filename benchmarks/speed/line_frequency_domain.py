@@ -245,8 +245,8 @@ def bound(orders: np.ndarray, seconds: float) -> list[str]:
     )
     friction, sweeps = (float(np.median(parts[name])) for name in ("friction", "sweeps"))
     return [
-        f"Of {in_words(seconds)} for {len(orders)} frequencies, friction (Bessel functions at each "
-        f"frequency and segment) takes {100 * friction / seconds:.0f} %, the two sweeps along the "
-        f"line {100 * sweeps / seconds:.0f} %, and the orifice (a transform each way and pass) "
+        f"Of {in_words(seconds)} for {len(orders)} frequencies, friction (a continued fraction at "
+        f"each frequency and segment) takes {100 * friction / seconds:.0f} %, the two sweeps along "
+        f"the line {100 * sweeps / seconds:.0f} %, and the orifice (a transform each way and pass) "
         "the rest."
     ]
