@@ -208,3 +208,13 @@ def test_the_modulation_is_estimated_again_with_the_explained_line():
     assert found.shaft_orders.names == ("speed_fluctuation",)
     assert found.shaft_orders.effects[0].value == pytest.approx(6e-3, rel=0.01)
     assert abs(found.observations[0].modulation) == pytest.approx(6e-3, rel=0.01)
+
+
+@pytest.mark.filterwarnings("error")
+def test_three_pistons_have_one_pattern_only():
+    """Every deviation of three pistons looks like a modulation, so none is named, without a
+    warning of a division by the patterns that are left."""
+    twin, stated, _ = recorded(lambda r: modulate_ripple(r, 4e-3))
+    twin = Twin(replace(twin.rig, pump={"pistons": 3}), [stated], theta=twin.theta)
+    found = analyse_shaft_orders(twin, [stated], 4000.0)
+    assert found.names == ("piston_spread",)

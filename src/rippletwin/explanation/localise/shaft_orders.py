@@ -131,27 +131,36 @@ def _name_effects(
     """The effects that make the flow at shaft orders, the stronger first."""
     energy = sum(m.energy for m in modulations)
     share = 1.0 - sum(m.left for m in modulations) / max(energy, 1e-300)
-    whole = sum(np.sum(np.abs(flow.gain * flow.values) ** 2) for flow in flows)
-    modulated = spread = 0.0
-    for flow, modulation in zip(flows, modulations):
-        modulated += np.sum(np.abs(flow.gain * modulation.sidebands) ** 2)
-        rest = np.abs(flow.gain * (flow.values - modulation.sidebands)) ** 2
-        spread += np.sum(rest[_apart(flow.orders, pistons)]) / _share_apart(pistons)
-    levels = {"speed_fluctuation": modulated / whole, "piston_spread": spread / whole}
+    whole = _power(flows, [flow.values for flow in flows])
+    modulated = _power(flows, [m.sidebands for m in modulations])
     if (
-        probability_of_share(share, pistons) < MODULATION_SIGNIFICANCE
-        and levels["speed_fluctuation"] > MIN_SHAFT_ORDER_LEVEL**2
+        probability_of_share(share, pistons) >= MODULATION_SIGNIFICANCE
+        or modulated <= MIN_SHAFT_ORDER_LEVEL**2 * whole
     ):
-        strongest = sorted(levels, key=lambda name: -levels[name])
-        names = [name for name in strongest if levels[name] > MIN_SHAFT_ORDER_LEVEL**2]
-        removed: Sequence[Modulation | None] = modulations
-    else:
-        names, removed = ["piston_spread"], [None] * len(flows)
-    effects = []
-    for name in names:
-        values = [amplitude_of(name, f, m, pistons) for f, m in zip(flows, removed)]
-        effects.append(ShaftEffect(name, float(np.mean(values))))
-    return tuple(effects)
+        return (_effect("piston_spread", flows, [None] * len(flows), pistons),)
+    rests = [
+        np.where(_apart(flow.orders, pistons), flow.values - m.sidebands, 0.0)
+        for flow, m in zip(flows, modulations)
+    ]
+    spread = _power(flows, rests) / _share_apart(pistons)
+    fluctuation = _effect("speed_fluctuation", flows, modulations, pistons)
+    if spread <= MIN_SHAFT_ORDER_LEVEL**2 * whole:
+        return (fluctuation,)
+    beside = _effect("piston_spread", flows, modulations, pistons)
+    return (fluctuation, beside) if modulated >= spread else (beside, fluctuation)
+
+
+def _power(flows: Sequence[OrderFlow], amplitudes: Sequence[np.ndarray]) -> float:
+    """Square sum of the pressures that `amplitudes` (F,) of the flow make in all recordings."""
+    return sum(float(np.sum(np.abs(f.gain * a) ** 2)) for f, a in zip(flows, amplitudes))
+
+
+def _effect(
+    name: str, flows: Sequence[OrderFlow], modulations: Sequence[Modulation | None], pistons: int
+) -> ShaftEffect:
+    """An effect with its mean amplitude in all recordings."""
+    values = [amplitude_of(name, f, m, pistons) for f, m in zip(flows, modulations)]
+    return ShaftEffect(name, float(np.mean(values)))
 
 
 def probability_of_share(share: float, pistons: int) -> float:

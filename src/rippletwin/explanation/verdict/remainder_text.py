@@ -61,8 +61,8 @@ def shaft_order_sentences(shaft_orders: ShaftOrders | None) -> list[str]:
     if shaft_orders is None or not shaft_orders.effects:
         return []
     sentences = [
-        f"The shaft orders between the piston orders have {write_share(shaft_orders.level)} of the "
-        f"ripple.",
+        "The shaft orders between the piston orders have "
+        f"{write_share(shaft_orders.level)} of the ripple.",
         f"They indicate {' and '.join(map(_shaft_effect_in_words, shaft_orders.effects))}.",
     ]
     if "piston_spread" in shaft_orders.names:
