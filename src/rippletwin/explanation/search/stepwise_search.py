@@ -192,7 +192,8 @@ def _accepted_extension(best: Fit, extensions: Sequence[Fit]) -> Fit | None:
     if not best.hypothesis:
         return None
     for fit in extensions:
-        if fit.hypothesis[-1][0].certain:
+        effect, place = fit.hypothesis[-1]
+        if effect.certain(fit.twin.rig, place):
             gain = fit.evidence - best.evidence
             return fit if gain >= MIN_LOG_BAYES_FACTOR_ALWAYS_PRESENT else None
     return None
