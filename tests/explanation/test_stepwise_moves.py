@@ -29,7 +29,7 @@ VOLUME = (EFFECTS["line_volume"], Place("position"))
 VOLUME_AT_LOAD = (EFFECTS["load_volume"], Place("load"))
 VOLUME_AT_PUMP = (EFFECTS["source_impedance"], Place("source", form="volume"))
 VOLUME_AND_PASSAGE = (EFFECTS["source_impedance"], Place("source", form="volume and passage"))
-ALWAYS_PRESENT = (replace(EFFECTS["unsteady_friction"], certain=True), Place("line"))
+ALWAYS_PRESENT = (replace(EFFECTS["unsteady_friction"], certain=lambda rig, place: True), Place("line"))
 
 
 def test_every_effect_is_compared_with_its_substitutes():

@@ -96,7 +96,10 @@ def test_the_search_ends_where_what_is_added_is_dropped_again(monkeypatch):
     module = "rippletwin.explanation.search.stepwise_search"
 
     def fit(*hypothesis, evidence):
-        return SimpleNamespace(hypothesis=hypothesis, evidence=evidence, label=str(hypothesis))
+        twin = SimpleNamespace(rig=None)
+        return SimpleNamespace(
+            hypothesis=hypothesis, evidence=evidence, label=str(hypothesis), twin=twin
+        )
 
     hose, gain = fit(HOSE, evidence=100.0), fit(GAIN, evidence=101.0)
     revised = {(HOSE, GAIN): gain, (GAIN, HOSE): hose}

@@ -143,7 +143,7 @@ def exchange_effects(workers: Workers, best: Fit, single_effect_fits: Sequence[F
     jobs = [
         FitJob(hypothesis, NearFit(best))
         for k, (effect, place) in enumerate(best.hypothesis)
-        if not effect.certain(workers.base.rig, place)
+        if not effect.certain(best.twin.rig, place)
         for hypothesis in _exchanges(best.hypothesis, k, substitutes)
     ]
     fits = rank_by_evidence(workers.fit(jobs))
@@ -162,7 +162,7 @@ def fit_substitutes(workers: Workers, best: Fit, candidates: Sequence) -> list[F
     members = best.hypothesis if len(best.hypothesis) > 1 else ()
     jobs = []
     for k, (effect, place) in enumerate(members):
-        if effect.certain(workers.base.rig, place):
+        if effect.certain(best.twin.rig, place):
             continue
         alike = [c for c in candidates if c[1].element == place.element or c[0] is effect]
         jobs += [FitJob(hypothesis, NearFit(best)) for hypothesis in _exchanges(members, k, alike)]
@@ -190,7 +190,7 @@ def drop_needless_effects(workers: Workers, best: Fit) -> Fit:
             [job_without_effect(best, k, workers.base) for k in range(len(best.hypothesis))]
         )
         margins = [
-            best.evidence - fit.evidence - min_log_bayes_factor(workers.base.rig, *member)
+            best.evidence - fit.evidence - min_log_bayes_factor(best.twin.rig, *member)
             for fit, member in zip(fits, best.hypothesis)
         ]
         weakest = int(np.argmin(margins))
