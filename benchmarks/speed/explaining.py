@@ -10,8 +10,17 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
-import yaml
 
+from openwind_tubes import (
+    NOISE,
+    NOMINAL_TEMPERATURE,
+    Hole,
+    Tube,
+    air,
+    impedance,
+    with_noise,
+    write_case,
+)
 from rippletwin.case.load import load_case
 from rippletwin.explanation.explain import explain
 from speed.result import Claim, Result, Table
@@ -20,80 +29,14 @@ from speed.timing import in_words
 LENGTH, RADIUS = 0.2875, 2e-3  # m
 HOLE, HOLE_RADIUS, HEIGHT = 0.1, 1.5e-3, 1.7e-3  # m, of the true tube
 STARTS = (0.03, 0.07, 0.15, 0.2, 0.25)  # m, where the inversion is told that the hole may be
-NOISE, TEMPERATURE = 0.01, 20.0  # of the impedance; degrees Celsius
 SECONDS_A_POINT = 10.0
 EXPLAINED = "side_hole"
 
 
-def air() -> dict:
-    """Constants of air as openwind has them."""
-    import openwind
-
-    names = ("rho", "c", "mu", "Cp", "kappa", "gamma")
-    physics = openwind.continuous.Physics(TEMPERATURE, humidity=0.0)
-    return dict(zip(names, map(float, physics.get_coefs(0.0, *names))))
-
-
 def measured(frequency_hz: np.ndarray, seed: int) -> np.ndarray:
-    """Input impedance (F,) of the true tube over its characteristic one, by finite elements, with
-    noise."""
-    import openwind
-
-    tube = openwind.ImpedanceComputation(
-        frequency_hz,
-        [[0.0, LENGTH, RADIUS, RADIUS, "linear"]],
-        [["label", "position", "length", "radius"], ["hole", HOLE, HEIGHT, HOLE_RADIUS]],
-        temperature=TEMPERATURE,
-        humidity=0.0,
-        losses=True,
-        matching_volume=True,
-        radiation_category="infinite_flanged",
-    )
-    rng = np.random.default_rng(seed)
-    noise = rng.normal(size=(2, len(frequency_hz))) / np.sqrt(2)
-    impedance = tube.impedance
-    if np.max(np.abs(impedance)) > 1e5:  # not yet over the characteristic one
-        impedance = impedance / tube.Zc
-    return impedance * (1 + NOISE * (noise[0] + 1j * noise[1]))
-
-
-def write_case(folder: Path, frequency_hz: np.ndarray) -> None:
-    """A case with two runs and a data sheet that knows no hole."""
-    gas = air()
-    for k in (1, 2):
-        z = measured(frequency_hz, k)
-        np.savetxt(folder / f"run_{k}.txt", np.column_stack([frequency_hz, z.real, z.imag]))
-    sheet = {
-        "fluid": {
-            "density": gas["rho"],
-            "kinematic_viscosity": gas["mu"] / gas["rho"],
-            "heat_capacity_ratio": gas["gamma"],
-            "prandtl": gas["mu"] * gas["Cp"] / gas["kappa"],
-        },
-        "line": {
-            "segments": [
-                {"length": LENGTH, "diameter": 2 * RADIUS * 1.01, "wave_speed": 1.002 * gas["c"]}
-            ]
-        },
-        "load": {"kind": "open"},
-        "uncertainty": {
-            "length": 0.002,
-            "diameter": 0.0125,
-            "wave_speed": 0.0035,
-            "viscosity": 0.02,
-        },
-        "recordings": [
-            {
-                "file": "run_1.txt",
-                "repeats": ["run_2.txt"],
-                "kind": "input_impedance",
-                "state": "healthy",
-                "normalised": True,
-                "max_frequency_hz": float(frequency_hz[-1]),
-            }
-        ],
-    }
-    (folder / "rig.yaml").write_text(yaml.safe_dump(sheet))
+    """Input impedance (F,) of the true tube over its characteristic one, with noise."""
+    tube = Tube(LENGTH, RADIUS, (Hole(HOLE, HOLE_RADIUS, HEIGHT),))
+    return with_noise(impedance(frequency_hz, tube), np.random.default_rng(seed))
 
 
 def invert(frequency_hz: np.ndarray, start: float) -> tuple[float, float]:
@@ -115,7 +58,7 @@ def invert(frequency_hz: np.ndarray, start: float) -> tuple[float, float]:
     begin = time.process_time()
     physics = InstrumentPhysics(
         geometry,
-        TEMPERATURE,
+        NOMINAL_TEMPERATURE,
         Player(),
         losses=True,
         humidity=0.0,
@@ -144,7 +87,13 @@ def run(quick: bool = False) -> Result:
     frequency = np.linspace(100.0, 4000.0, 60 if quick else 391)
     with tempfile.TemporaryDirectory() as name, contextlib.redirect_stdout(io.StringIO()):
         folder = Path(name)
-        write_case(folder, frequency)
+        runs = [measured(frequency, seed) for seed in (1, 2)]
+        segment = {
+            "length": LENGTH,
+            "diameter": 2 * RADIUS * 1.01,
+            "wave_speed": 1.002 * air()["c"],
+        }
+        write_case(folder, frequency, runs, segment)
         case = load_case(folder)
         begin = time.process_time()
         explanation = explain(case, processes=1)
