@@ -76,7 +76,8 @@ def fit_extensions(workers: Workers, best: Fit, candidates: Sequence, progress) 
 def _fit_promising(workers: Workers, best: Fit, jobs: Sequence[FitJob], report) -> list[Fit]:
     """Fits of always-present effects, and of the jobs that promise most, in that order, until one
     of them has added as much as the next promises."""
-    certain, searched = [], []
+    certain: list[FitJob] = []
+    searched: list[FitJob] = []
     for job in jobs:
         effect, place = job.hypothesis[-1]
         (certain if effect.certain(workers.base.rig, place) else searched).append(job)
