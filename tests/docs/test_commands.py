@@ -59,6 +59,10 @@ NOT_RUN = {
         "it needs a browser",
         "python docs/figures/report.py --help",
     ),
+    "python benchmarks/third_party_tubes.py 41 tubes": (
+        "openwind is not part of the environment",
+        "python benchmarks/third_party_tubes.py --help",
+    ),
     "python benchmarks/measured_tube.py RUN_1 RUN_2 tube": (
         "the measurements are not part of the project",
         "python benchmarks/measured_tube.py --help",

@@ -12,6 +12,7 @@ from rippletwin.explanation.search import single_effects, stepwise_moves
 from rippletwin.explanation.search.single_effects import fit_single_effects
 from rippletwin.explanation.search.stepwise_moves import (
     drop_needless_effects,
+    extension_job,
     fit_extensions,
     fit_substitutes,
     simplify_effects,
@@ -29,7 +30,10 @@ VOLUME = (EFFECTS["line_volume"], Place("position"))
 VOLUME_AT_LOAD = (EFFECTS["load_volume"], Place("load"))
 VOLUME_AT_PUMP = (EFFECTS["source_impedance"], Place("source", form="volume"))
 VOLUME_AND_PASSAGE = (EFFECTS["source_impedance"], Place("source", form="volume and passage"))
-ALWAYS_PRESENT = (replace(EFFECTS["unsteady_friction"], certain=True), Place("line"))
+ALWAYS_PRESENT = (
+    replace(EFFECTS["unsteady_friction"], certain=lambda rig, place: True),
+    Place("line"),
+)
 
 
 def test_every_effect_is_compared_with_its_substitutes():
@@ -201,3 +205,39 @@ def test_candidates_are_fitted_until_one_adds_what_the_next_promises(monkeypatch
     assert asked_for(gain=28.0) == [1, 0]
     assert asked_for(gain=22.0) == [1, 0, 2, 3]
     assert asked_for(gain=-5.0) == [1, 0, 2, 3]
+
+
+def test_the_volume_of_a_pump_is_always_present_where_its_flow_is_stated():
+    """The stated flow goes into a constant pressure and leaves out the chambers; a simulated pump
+    has them. Leakage alone is then no candidate: no pump is without a volume."""
+    effect, volume = VOLUME_AT_PUMP
+    stated, simulated = replace(rig(), displacement=2e-5), rig()
+    assert effect.certain(stated, volume)
+    assert not effect.certain(stated, VOLUME_AND_PASSAGE[1])
+    assert not effect.certain(simulated, volume)
+    forms = [[place.form for place in effect.places(r)] for r in (stated, simulated)]
+    assert forms == [["volume", "volume and passage"], ["leakage", "volume", "volume and passage"]]
+
+
+def test_a_form_with_more_parameters_takes_the_place_of_the_one_with_fewer():
+    """The pump has one volume, also where a passage is added to it."""
+    job = extension_job(made_fit(0.0, HOSE, VOLUME_AT_PUMP), VOLUME_AND_PASSAGE)
+    assert job.hypothesis == (HOSE, VOLUME_AND_PASSAGE)
+
+
+def test_always_present_effects_are_fitted_whatever_they_promise(monkeypatch):
+    """A score test does not decide about them, and they leave room for others."""
+    places = [(EFFECTS["sensor_delay"], Place(f"sensor p{k}", k)) for k in range(1, 12)]
+    monkeypatch.setattr(stepwise_moves, "rank_at_exact_modes", lambda workers, best, fits: fits)
+    asked = []
+
+    def fit(jobs, report=None):
+        asked.extend(job.hypothesis[-1] for job in jobs)
+        return [made_fit(100.0, *job.hypothesis) for job in jobs]
+
+    def score(function, jobs):
+        return [(0.0, job) for job in jobs]
+
+    workers = SimpleNamespace(fit=fit, map=score, base=SimpleNamespace(rig=rig()))
+    fit_extensions(workers, made_fit(100.0, HOSE), [*places, ALWAYS_PRESENT], None)
+    assert asked == [ALWAYS_PRESENT]

@@ -5,12 +5,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from made_fits import made_fit
 from rippletwin.calibration.misfit import relative_misfit
 from rippletwin.calibration.posterior import MIN_MODEL_ERROR
 from rippletwin.explanation.checks.cross_validation import cross_validate
 from rippletwin.explanation.fit_jobs import Workers
 from rippletwin.explanation.search.stepwise_search import (
     Search,
+    _accepted_pair,
     _search_stepwise,
     resume_search,
     search_effects,
@@ -96,7 +98,11 @@ def test_the_search_ends_where_what_is_added_is_dropped_again(monkeypatch):
     module = "rippletwin.explanation.search.stepwise_search"
 
     def fit(*hypothesis, evidence):
-        return SimpleNamespace(hypothesis=hypothesis, evidence=evidence, label=str(hypothesis))
+        twin = SimpleNamespace(rig=None)
+        label = str(hypothesis)
+        return SimpleNamespace(
+            hypothesis=hypothesis, evidence=evidence, label=label, twin=twin, model_error=0.004
+        )
 
     hose, gain = fit(HOSE, evidence=100.0), fit(GAIN, evidence=101.0)
     revised = {(HOSE, GAIN): gain, (GAIN, HOSE): hose}
@@ -116,3 +122,21 @@ def test_the_search_ends_where_what_is_added_is_dropped_again(monkeypatch):
     found = _search_stepwise(None, Search(fit(evidence=0.0), [], hose), [], None)
     assert found.best is gain
     assert rounds == [hose.label, gain.label]
+
+
+def test_two_effects_that_help_only_together_are_accepted(monkeypatch):
+    """Neither adds what a name needs; the two together add what both need, or are left out. A line
+    that fits well is not searched for pairs."""
+    module = "rippletwin.explanation.search.stepwise_search"
+    best = made_fit(100.0, VOLUME, model_error=0.08)
+    weak = made_fit(105.0, VOLUME, HOSE, model_error=0.08)
+
+    def search(evidence, fit=best):
+        pair = made_fit(evidence, VOLUME, HOSE, GAIN)
+        monkeypatch.setattr(f"{module}.fit_extensions", lambda *_: [pair])
+        return _accepted_pair(None, fit, [weak], []) is pair
+
+    enough = 100.0 + 2.0 * MIN_LOG_BAYES_FACTOR
+    assert search(enough + 1.0)
+    assert not search(enough - 1.0)
+    assert not search(enough + 1.0, made_fit(100.0, VOLUME))

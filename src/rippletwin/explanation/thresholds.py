@@ -10,7 +10,8 @@ import numpy as np
 
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.posterior import MIN_MODEL_ERROR
-from rippletwin.twin.effects.base import Effect
+from rippletwin.case.model import Rig
+from rippletwin.twin.effects.base import Effect, Place
 
 # Evidence
 
@@ -62,11 +63,12 @@ MODULATION_SIGNIFICANCE = 0.02
 a modulation. It is the rate at which such a pump alone gets a speed fluctuation."""
 
 
-def min_log_bayes_factor(effect: Effect) -> float:
-    """Log evidence that an effect must add to be accepted."""
-    return MIN_LOG_BAYES_FACTOR_ALWAYS_PRESENT if effect.certain else MIN_LOG_BAYES_FACTOR
+def min_log_bayes_factor(rig: Rig, effect: Effect, place: Place) -> float:
+    """Log evidence that an effect must add to be accepted beside another."""
+    certain = effect.certain(rig, place)
+    return MIN_LOG_BAYES_FACTOR_ALWAYS_PRESENT if certain else MIN_LOG_BAYES_FACTOR
 
 
 def min_log_bayes_factor_of_newest(fit: Fit) -> float:
     """Log evidence that the newest effect of a fit must have added."""
-    return min_log_bayes_factor(fit.hypothesis[-1][0])
+    return min_log_bayes_factor(fit.twin.rig, *fit.hypothesis[-1])

@@ -82,7 +82,7 @@ def judge_effects(workers: Workers, base: Fit, best: Fit, halves: Halves | None 
         weak = [
             k
             for k, support in enumerate(supports)
-            if support.level == "suggested" and not best.hypothesis[k][0].certain
+            if support.level == "suggested" and not _is_certain(best, k)
         ]
         if not weak or len(best.hypothesis) == 1:
             return Judged(best, supports, without)
@@ -103,8 +103,8 @@ def judge_beside_network(
     while True:
         fits = _fit_without_beside(workers, network, judged)
         lost = [
-            np.inf if effect.certain else network.evidence - fit.evidence
-            for (effect, _), fit in zip(judged.best.hypothesis, fits)
+            np.inf if _is_certain(judged.best, k) else network.evidence - fit.evidence
+            for k, fit in enumerate(fits)
         ]
         if min(lost, default=0.0) >= 0.0:
             break
@@ -119,6 +119,12 @@ def judge_beside_network(
         for support, gain in zip(judged.supports, lost)
     )
     return network, replace(judged, supports=supports)
+
+
+def _is_certain(fit: Fit, k: int) -> bool:
+    """Whether effect k of a fit is always present in its rig."""
+    effect, place = fit.hypothesis[k]
+    return effect.certain(fit.twin.rig, place)
 
 
 def _fit_without_beside(workers: Workers, network: Fit, judged: Judged) -> list[Fit]:

@@ -1,7 +1,8 @@
 """First step of the search: the line without effects, the usual effects, and each other one alone.
 
 Boundary layers are in nearly every real line. A line without them fits so badly that nothing else
-can be judged. So they are tried first, and the other effects beside those that the data show.
+can be judged. So they are tried first, always-present effects beside them, and the other effects
+beside those that the data show.
 """
 
 from __future__ import annotations
@@ -24,9 +25,14 @@ from rippletwin.explanation.fit_jobs import (
 from rippletwin.explanation.search.stepwise_moves import (
     LOST_MODEL_ERROR,
     fit_extensions,
+    is_expected,
     rank_at_exact_modes,
 )
-from rippletwin.explanation.thresholds import GOOD_MODEL_ERROR, MIN_LOG_BAYES_FACTOR
+from rippletwin.explanation.thresholds import (
+    GOOD_MODEL_ERROR,
+    MIN_LOG_BAYES_FACTOR,
+    min_log_bayes_factor_of_newest,
+)
 
 DRAWS_PER_MODE = 800  # random starts around each mode below a frequency limit
 BASE_RESTARTS = 5  # best single-effect fits from whose lines the base is refitted
@@ -41,7 +47,7 @@ def fit_single_effects(
 
     The second is the base where the data show none; the fits then are of each effect alone.
     """
-    usual = [c for c in candidates if c[0].usual]
+    usual = [c for c in candidates if is_expected(workers.base.rig, *c)]
     jobs = [FitJob(()), *(FitJob((c,)) for c in usual)]
     base, *fits = workers.fit(jobs, progress_callback(progress, "usual effects", len(jobs)))
     start = _add_usual_effects(workers, base, fits)
@@ -55,13 +61,14 @@ def fit_single_effects(
 
 
 def _add_usual_effects(workers: Workers, base: Fit, fits: Sequence[Fit]) -> Fit:
-    """`base` with every usual effect that adds enough evidence; `fits` are those of one each."""
-    best, left = base, rank_by_evidence(fits)
-    while left and left[0].evidence > best.evidence + MIN_LOG_BAYES_FACTOR:
+    """`base` with every expected effect that adds enough evidence; `fits` are those of one each."""
+    best, left, needed = base, rank_by_evidence(fits), MIN_LOG_BAYES_FACTOR
+    while left and left[0].evidence > best.evidence + needed:
         best, rest = left[0], [f.hypothesis[-1] for f in left[1:]]
         left = rank_by_evidence(
             workers.fit([FitJob((*best.hypothesis, c), NearFit(best)) for c in rest])
         )
+        needed = min_log_bayes_factor_of_newest(left[0]) if left else needed
     return best
 
 

@@ -27,7 +27,8 @@ from rippletwin.explanation.thresholds import (
     MIN_LOG_BAYES_FACTOR,
     min_log_bayes_factor,
 )
-from rippletwin.twin.effects.library import is_limit, next_instance
+from rippletwin.twin.effects.base import Effect, Place
+from rippletwin.twin.effects.library import is_form_of, is_limit, next_instance
 
 MAX_EFFECTS = 4  # different ones in one hypothesis
 MAX_OF_ONE_EFFECT = 4  # at free positions
@@ -50,11 +51,12 @@ def fit_extensions(workers: Workers, best: Fit, candidates: Sequence, progress) 
     """Fits of `best` with each further candidate added, best first.
 
     None goes beyond MAX_EFFECTS and MAX_OF_ONE_EFFECT. Of an effect at a free position one more is
-    a candidate. Beside an effect that was searched for only the most promising are fitted.
+    a candidate. Beside an effect that was searched for only the most promising are fitted, and
+    those that are always present.
     """
     rig = workers.base.rig
-    jobs = [extension_job(best, c) for c in _additions(best.hypothesis, candidates)]
-    few = len(jobs) <= PROMISING or all(effect.usual for effect, _ in best.hypothesis)
+    jobs = [extension_job(best, c) for c in _additions(rig, best.hypothesis, candidates)]
+    few = len(jobs) <= PROMISING or all(is_expected(rig, *member) for member in best.hypothesis)
     report = progress_callback(
         progress, f"{len(best.hypothesis) + 1} effects", len(jobs) if few else PROMISING
     )
@@ -72,10 +74,15 @@ def fit_extensions(workers: Workers, best: Fit, candidates: Sequence, progress) 
 
 
 def _fit_promising(workers: Workers, best: Fit, jobs: Sequence[FitJob], report) -> list[Fit]:
-    """Fits of the jobs that promise most, in that order, until one of them has added as much as
-    the next promises."""
-    scored = sorted(workers.map(score_extension, jobs), key=lambda pair: -pair[0])[:PROMISING]
-    fits: list[Fit] = []
+    """Fits of always-present effects, and of the jobs that promise most, in that order, until one
+    of them has added as much as the next promises."""
+    certain: list[FitJob] = []
+    searched: list[FitJob] = []
+    for job in jobs:
+        effect, place = job.hypothesis[-1]
+        (certain if effect.certain(workers.base.rig, place) else searched).append(job)
+    scored = sorted(workers.map(score_extension, searched), key=lambda pair: -pair[0])[:PROMISING]
+    fits = workers.fit(certain, report)
     needed = MIN_PROMISE
     while scored and scored[0][0] >= needed:
         batch, scored = scored[:FITTED_TOGETHER], scored[FITTED_TOGETHER:]
@@ -84,14 +91,21 @@ def _fit_promising(workers: Workers, best: Fit, jobs: Sequence[FitJob], report) 
     return fits
 
 
-def _additions(hypothesis: Hypothesis, candidates: Sequence) -> list:
+def is_expected(rig, effect: Effect, place: Place) -> bool:
+    """Whether an effect is in nearly all lines: nobody had to search for it."""
+    return effect.usual or effect.certain(rig, place)
+
+
+def _additions(rig, hypothesis: Hypothesis, candidates: Sequence) -> list:
     """The candidates that may still be added, each as the next of its kind."""
-    names = {effect.name for effect, _ in hypothesis}
+    names = {effect.name for effect, place in hypothesis if not effect.certain(rig, place)}
     instances = [next_instance(candidate, hypothesis) for candidate in candidates]
     return [
         (effect, place)
         for effect, place in filter(None, instances)
-        if place.number <= MAX_OF_ONE_EFFECT and len(names | {effect.name}) <= MAX_EFFECTS
+        if place.number <= MAX_OF_ONE_EFFECT
+        and (effect.certain(rig, place) or len(names | {effect.name}) <= MAX_EFFECTS)
+        and not any(is_form_of(member, (effect, place), rig) for member in hypothesis)
     ]
 
 
@@ -104,8 +118,11 @@ def _exchanges(hypothesis: Hypothesis, k: int, candidates: Sequence) -> list[Hyp
 
 
 def extension_job(best: Fit, candidate) -> FitJob:
-    """The job that adds a candidate to a fit, from its mode."""
-    return FitJob((*best.hypothesis, candidate), NearFit(best))
+    """The job that adds a candidate to a fit, from its mode. The form with fewer parameters of the
+    same effect at the same element gives way to it."""
+    rig = best.twin.rig
+    kept = tuple(m for m in best.hypothesis if not is_form_of(candidate, m, rig))
+    return FitJob((*kept, candidate), NearFit(best))
 
 
 def restart_job(best: Fit, hypothesis: Hypothesis, rig) -> FitJob:
@@ -126,7 +143,8 @@ def exchange_effects(workers: Workers, best: Fit, single_effect_fits: Sequence[F
     substitutes = [f.hypothesis[-1] for f in single_effect_fits[:SUBSTITUTES_TRIED]]
     jobs = [
         FitJob(hypothesis, NearFit(best))
-        for k in range(len(best.hypothesis))
+        for k, (effect, place) in enumerate(best.hypothesis)
+        if not effect.certain(best.twin.rig, place)
         for hypothesis in _exchanges(best.hypothesis, k, substitutes)
     ]
     fits = rank_by_evidence(workers.fit(jobs))
@@ -145,7 +163,7 @@ def fit_substitutes(workers: Workers, best: Fit, candidates: Sequence) -> list[F
     members = best.hypothesis if len(best.hypothesis) > 1 else ()
     jobs = []
     for k, (effect, place) in enumerate(members):
-        if effect.certain:
+        if effect.certain(best.twin.rig, place):
             continue
         alike = [c for c in candidates if c[1].element == place.element or c[0] is effect]
         jobs += [FitJob(hypothesis, NearFit(best)) for hypothesis in _exchanges(members, k, alike)]
@@ -173,8 +191,8 @@ def drop_needless_effects(workers: Workers, best: Fit) -> Fit:
             [job_without_effect(best, k, workers.base) for k in range(len(best.hypothesis))]
         )
         margins = [
-            best.evidence - fit.evidence - min_log_bayes_factor(effect)
-            for fit, (effect, _) in zip(fits, best.hypothesis)
+            best.evidence - fit.evidence - min_log_bayes_factor(best.twin.rig, *member)
+            for fit, member in zip(fits, best.hypothesis)
         ]
         weakest = int(np.argmin(margins))
         if margins[weakest] >= 0:

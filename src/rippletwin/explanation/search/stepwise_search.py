@@ -29,6 +29,7 @@ from rippletwin.explanation.search.stepwise_moves import (
     simplify_effects,
 )
 from rippletwin.explanation.thresholds import (
+    GOOD_MODEL_ERROR,
     MIN_LOG_BAYES_FACTOR,
     MIN_LOG_BAYES_FACTOR_ALWAYS_PRESENT,
     min_log_bayes_factor_of_newest,
@@ -39,6 +40,7 @@ from rippletwin.twin.effects.base import Effect, Place
 RIVAL_MARGIN = 4.0 * MIN_LOG_BAYES_FACTOR
 """Log evidence below the best within which a resumed search refits a rival."""
 LEADING_SINGLE_EFFECTS = 6
+PAIRS_BEGUN = 2  # extensions that are too weak alone and are extended by a second effect
 SHAFT_ORDER_EFFECTS = ("piston_spread", "speed_fluctuation")
 """Effects at shaft orders that are not fitted; `localise.shaft_orders` looks for them."""
 
@@ -148,7 +150,11 @@ def _search_stepwise(
                 moved = _revise(workers, moved, candidates)
             was_there = frozenset(moved.hypothesis) in visited
             if moved is best or (exchanged is not best and was_there):
-                break  # a simpler effect is preferred to a slightly better one: no way round
+                # A simpler effect is preferred to a slightly better one: no way round.
+                pair = _accepted_pair(workers, best, extensions, candidates)
+                moved = best if pair is None else _revise(workers, pair, candidates)
+                if frozenset(moved.hypothesis) in visited:
+                    break
             best = moved
         else:
             revised = _revise(workers, extended, candidates)
@@ -173,6 +179,26 @@ def _search_stepwise(
     )
 
 
+def _accepted_pair(
+    workers: Workers, best: Fit, extensions: Sequence[Fit], candidates: Sequence
+) -> Fit | None:
+    """The best extension by two effects that add as much together as both must; None without one.
+
+    Where two effects are missing, neither may add enough without the other. The first of the two is
+    one of the best `extensions`.
+    """
+    if best.model_error <= GOOD_MODEL_ERROR:
+        return None
+    needed = best.evidence + 2.0 * MIN_LOG_BAYES_FACTOR
+    pairs = [
+        pair
+        for first in extensions[:PAIRS_BEGUN]
+        for pair in fit_extensions(workers, first, candidates, None)
+        if pair.evidence >= needed
+    ]
+    return max(pairs, key=lambda fit: fit.evidence, default=None)
+
+
 def _revise(workers: Workers, best: Fit, candidates: Sequence) -> Fit:
     """Drop and simplify effects of a new hypothesis, and refit it at its exact mode."""
     best = drop_needless_effects(workers, best)
@@ -192,7 +218,8 @@ def _accepted_extension(best: Fit, extensions: Sequence[Fit]) -> Fit | None:
     if not best.hypothesis:
         return None
     for fit in extensions:
-        if fit.hypothesis[-1][0].certain:
+        effect, place = fit.hypothesis[-1]
+        if effect.certain(fit.twin.rig, place):
             gain = fit.evidence - best.evidence
             return fit if gain >= MIN_LOG_BAYES_FACTOR_ALWAYS_PRESENT else None
     return None

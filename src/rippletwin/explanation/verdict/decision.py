@@ -142,7 +142,7 @@ def _equivalent_substitutes(search: Search) -> list[tuple[tuple[str, Place], lis
     """
     best, table = search.best, []
     for k, own in enumerate(best.hypothesis):
-        if own[0].certain:
+        if own[0].certain(best.twin.rig, own[1]):
             continue
         rest, substitutes = set(best.without(k)), []
         for fit in search.rivals:

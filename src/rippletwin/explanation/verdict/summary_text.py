@@ -123,7 +123,7 @@ def _found(
         f"{_capital(name_effect(entry['effect'].name))} is always present: it is included unless "
         "the data contradict it."
         for entry in certain
-        if entry["effect"].certain
+        if entry["effect"].certain(e.rig, entry["place"])
     ]
     return sentences
 

@@ -112,8 +112,8 @@ class Effect:
     apply_in_time   (line: TimeDomainLine, state: LineState, values, place) mutates the line; None
                 where the time domain follows from `apply` (`rippletwin.twin.time_domain_form`)
     named       False for a passive network that represents physics without a name
-    certain     always present in real lines: accepted with any other effect unless the data
-                contradict it
+    certain     (rig, place) -> whether it is always present there: accepted with any other effect
+                unless the data contradict it
     usual       in nearly all real lines: the search tries it before all others
     friction    law by which it replaces the line's, as in `series_impedance`
     limits      (name, form) of effects that this one becomes at a limit of its parameters or at an
@@ -133,7 +133,7 @@ class Effect:
     places: Callable[[Rig], tuple[Place, ...]]
     apply: Callable[[object, LineState, Mapping[str, object], Place], None]
     apply_in_time: Callable[[object, LineState, Mapping[str, float], Place], None] | None = None
-    certain: bool = False
+    certain: Callable[[Rig, Place], bool] = lambda rig, place: False
     usual: bool = False
     named: bool = True
     friction: str | None = None

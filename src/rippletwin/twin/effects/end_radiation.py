@@ -55,5 +55,5 @@ EFFECT = Effect(
     places=lambda rig: load_place(rig) if rig.load.kind == "open" else (),
     apply=_apply,
     apply_in_time=_apply_in_time,
-    certain=True,
+    certain=lambda rig, place: True,
 )

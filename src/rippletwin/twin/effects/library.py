@@ -128,6 +128,15 @@ def is_limit(special: tuple[Effect, Place], general: tuple[Effect, Place], rig) 
     return (effect.name, place.form) in _all_limits(wide)
 
 
+def is_form_of(general: tuple[Effect, Place], special: tuple[Effect, Place], rig) -> bool:
+    """Whether `general` is the same effect at the same element with more parameters.
+
+    A line has one form of it there; at free positions it may have several.
+    """
+    same = general[0] is special[0] and general[1].element != "position"
+    return same and is_limit(special, general, rig)
+
+
 def generalisations(effect: Effect, place: Place) -> list[str]:
     """Names of the other effects that become this one at a limit."""
     return [e.name for e in EFFECTS.values() if (effect.name, place.form) in _all_limits(e)]

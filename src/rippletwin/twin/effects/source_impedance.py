@@ -19,7 +19,14 @@ FORMS = ("leakage", "volume", "volume and passage")  # each has what the one bef
 
 
 def _places(rig):
-    return tuple(Place("source", form=form) for form in FORMS)
+    forms = FORMS if rig.displacement is None else FORMS[1:]
+    return tuple(Place("source", form=form) for form in forms)
+
+
+def _certain(rig, place):
+    """The stated flow of a pump goes into a constant pressure: its chambers are left out of it. Of
+    a pump that is simulated they respond to the line."""
+    return rig.displacement is not None and place.form == "volume"
 
 
 def _apply(network, state, values, place):
@@ -76,4 +83,5 @@ EFFECT = Effect(
     places=_places,
     apply=_apply,
     apply_in_time=_apply_in_time,
+    certain=_certain,
 )
