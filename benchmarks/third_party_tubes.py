@@ -7,7 +7,7 @@ alone, with one hole, with a hole and a cone, with two holes, and with a hole bu
 the walls. The data sheet knows one cylinder, whose numbers are off by their stated uncertainty. Two
 runs are explained, a third is not seen. All runs have noise and temperatures of their own. FOLDER
 gets a case of each tube and its verdict.json. Seeds from 1000 on are for development. The seed that
-is reported is 41: it is named here before it is run, and run once.
+is reported is 42: it is named here before it is run, and run once.
 """
 
 from __future__ import annotations
@@ -204,6 +204,13 @@ def main() -> None:
             *(f"{x:.1%}" for x in unseen_misfits[-1]), f"{spent:.0f} s",
         ]  # fmt: skip
         print("| " + " | ".join(cells) + " |", flush=True)
+    print_summary(scores, unseen_misfits)
+
+
+def print_summary(
+    scores: list[tuple[str, Score]], unseen_misfits: list[tuple[float, float, float]]
+) -> None:
+    """Print the scores of each kind and of all tubes, and the medians of the misfits."""
     print()
     for kind in KINDS:
         own = [result for name, result in scores if name == kind]

@@ -1,6 +1,5 @@
 """The stepwise search: what it accepts, what it rejects, and what it reaches."""
 
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -97,14 +96,7 @@ def test_the_search_ends_where_what_is_added_is_dropped_again(monkeypatch):
     the other for ever: it visits no hypothesis twice, and ends at the better one."""
     module = "rippletwin.explanation.search.stepwise_search"
 
-    def fit(*hypothesis, evidence):
-        twin = SimpleNamespace(rig=None)
-        label = str(hypothesis)
-        return SimpleNamespace(
-            hypothesis=hypothesis, evidence=evidence, label=label, twin=twin, model_error=0.004
-        )
-
-    hose, gain = fit(HOSE, evidence=100.0), fit(GAIN, evidence=101.0)
+    hose, gain = made_fit(100.0, HOSE), made_fit(101.0, GAIN)
     revised = {(HOSE, GAIN): gain, (GAIN, HOSE): hose}
     rounds = []
 
@@ -112,14 +104,14 @@ def test_the_search_ends_where_what_is_added_is_dropped_again(monkeypatch):
         rounds.append(best.label)
         assert len(rounds) < 10
         other = HOSE if best is gain else GAIN
-        return [fit(*best.hypothesis, other, evidence=best.evidence + 20.0)]
+        return [made_fit(best.evidence + 20.0, *best.hypothesis, other)]
 
     monkeypatch.setattr(f"{module}.fit_extensions", extend)
     monkeypatch.setattr(f"{module}._revise", lambda workers, best, _: revised[best.hypothesis])
     monkeypatch.setattr(f"{module}.exchange_effects", lambda workers, best, _: best)
     monkeypatch.setattr(f"{module}.move_to_best_position", lambda workers, best: (best, []))
     monkeypatch.setattr(f"{module}.fit_substitutes", lambda *_: [])
-    found = _search_stepwise(None, Search(fit(evidence=0.0), [], hose), [], None)
+    found = _search_stepwise(None, Search(made_fit(0.0), [], hose), [], None)
     assert found.best is gain
     assert rounds == [hose.label, gain.label]
 

@@ -25,7 +25,6 @@ from rippletwin.explanation.fit_jobs import (
 from rippletwin.explanation.search.stepwise_moves import (
     LOST_MODEL_ERROR,
     fit_extensions,
-    is_expected,
     rank_at_exact_modes,
 )
 from rippletwin.explanation.thresholds import (
@@ -47,7 +46,7 @@ def fit_single_effects(
 
     The second is the base where the data show none; the fits then are of each effect alone.
     """
-    usual = [c for c in candidates if is_expected(workers.base.rig, *c)]
+    usual = [c for c in candidates if c[0].is_expected(workers.base.rig, c[1])]
     jobs = [FitJob(()), *(FitJob((c,)) for c in usual)]
     base, *fits = workers.fit(jobs, progress_callback(progress, "usual effects", len(jobs)))
     start = _add_usual_effects(workers, base, fits)

@@ -27,7 +27,6 @@ from rippletwin.explanation.thresholds import (
     MIN_LOG_BAYES_FACTOR,
     min_log_bayes_factor,
 )
-from rippletwin.twin.effects.base import Effect, Place
 from rippletwin.twin.effects.library import is_form_of, is_limit, next_instance
 
 MAX_EFFECTS = 4  # different ones in one hypothesis
@@ -56,7 +55,8 @@ def fit_extensions(workers: Workers, best: Fit, candidates: Sequence, progress) 
     """
     rig = workers.base.rig
     jobs = [extension_job(best, c) for c in _additions(rig, best.hypothesis, candidates)]
-    few = len(jobs) <= PROMISING or all(is_expected(rig, *member) for member in best.hypothesis)
+    expected = [effect.is_expected(rig, place) for effect, place in best.hypothesis]
+    few = len(jobs) <= PROMISING or all(expected)
     report = progress_callback(
         progress, f"{len(best.hypothesis) + 1} effects", len(jobs) if few else PROMISING
     )
@@ -89,11 +89,6 @@ def _fit_promising(workers: Workers, best: Fit, jobs: Sequence[FitJob], report) 
         fits += workers.fit([job for _, job in batch], report)
         needed = max(MIN_PROMISE, *(f.evidence - best.evidence for f in fits))
     return fits
-
-
-def is_expected(rig, effect: Effect, place: Place) -> bool:
-    """Whether an effect is in nearly all lines: nobody had to search for it."""
-    return effect.usual or effect.certain(rig, place)
 
 
 def _additions(rig, hypothesis: Hypothesis, candidates: Sequence) -> list:

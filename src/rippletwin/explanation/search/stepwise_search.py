@@ -150,7 +150,7 @@ def _search_stepwise(
                 moved = _revise(workers, moved, candidates)
             was_there = frozenset(moved.hypothesis) in visited
             if moved is best or (exchanged is not best and was_there):
-                # A simpler effect is preferred to a slightly better one: no way round.
+                # Simplifying may lead back from an exchange: only two effects at once lead on.
                 pair = _accepted_pair(workers, best, extensions, candidates)
                 moved = best if pair is None else _revise(workers, pair, candidates)
                 if frozenset(moved.hypothesis) in visited:
@@ -190,13 +190,11 @@ def _accepted_pair(
     if best.model_error <= GOOD_MODEL_ERROR:
         return None
     needed = best.evidence + 2.0 * MIN_LOG_BAYES_FACTOR
-    pairs = [
-        pair
-        for first in extensions[:PAIRS_BEGUN]
-        for pair in fit_extensions(workers, first, candidates, None)
-        if pair.evidence >= needed
-    ]
-    return max(pairs, key=lambda fit: fit.evidence, default=None)
+    pairs: list[Fit] = []
+    for first in extensions[:PAIRS_BEGUN]:
+        pairs += fit_extensions(workers, first, candidates, None)[:1]
+    best_pair = max(pairs, key=lambda fit: fit.evidence, default=None)
+    return best_pair if best_pair is not None and best_pair.evidence >= needed else None
 
 
 def _revise(workers: Workers, best: Fit, candidates: Sequence) -> Fit:

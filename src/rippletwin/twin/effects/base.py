@@ -147,6 +147,10 @@ class Effect:
         gas = rig.fluid.heat_capacity_ratio is not None
         return self.medium == "any" or (self.medium == "gas") == gas
 
+    def is_expected(self, rig: Rig, place: Place) -> bool:
+        """Whether the effect is usual or always present: nobody has to search for it."""
+        return self.usual or self.certain(rig, place)
+
 
 def line_place(rig) -> tuple[Place, ...]:
     """The whole line."""
