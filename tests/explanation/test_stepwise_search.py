@@ -1,6 +1,5 @@
 """The stepwise search: what it accepts, what it rejects, and what it reaches."""
 
-
 import numpy as np
 import pytest
 
