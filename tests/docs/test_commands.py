@@ -59,7 +59,7 @@ NOT_RUN = {
         "it needs a browser",
         "python docs/figures/report.py --help",
     ),
-    "python benchmarks/third_party_tubes.py 42 tubes": (
+    "python benchmarks/third_party_tubes.py 43 tubes": (
         "openwind is not part of the environment",
         "python benchmarks/third_party_tubes.py --help",
     ),

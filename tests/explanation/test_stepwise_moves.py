@@ -241,3 +241,26 @@ def test_always_present_effects_are_fitted_whatever_they_promise(monkeypatch):
     workers = SimpleNamespace(fit=fit, map=score, base=SimpleNamespace(rig=rig()))
     fit_extensions(workers, made_fit(100.0, HOSE), [*places, ALWAYS_PRESENT], None)
     assert asked == [ALWAYS_PRESENT]
+
+
+def test_the_pumps_volume_takes_no_room_from_what_is_searched_for(monkeypatch):
+    """Beside it there may be four different effects, and no fifth; radiation from an open end, which
+    is searched for with the others, is one of them."""
+    monkeypatch.setattr(stepwise_moves, "rank_at_exact_modes", lambda workers, best, fits: fits)
+    four = [(EFFECTS[name], Place("line")) for name in ("unsteady_friction", "entrained_air")]
+    four += [HOSE, VOLUME]
+    gain = (EFFECTS["sensor_gain"], Place("sensor p1", 0))
+    stated = replace(rig(), displacement=2e-5)
+    asked = []
+
+    def fit(jobs, report=None):
+        asked.extend(job.hypothesis[-1] for job in jobs)
+        return []
+
+    workers = SimpleNamespace(fit=fit, base=SimpleNamespace(rig=stated))
+    fit_extensions(workers, made_fit(0.0, VOLUME_AT_PUMP, *four[:3]), [gain], None)
+    assert asked == [gain]
+    fit_extensions(workers, made_fit(0.0, VOLUME_AT_PUMP, *four), [gain], None)
+    radiation = (EFFECTS["end_radiation"], Place("load"))
+    fit_extensions(workers, made_fit(0.0, radiation, *four[:3]), [gain], None)
+    assert asked == [gain]

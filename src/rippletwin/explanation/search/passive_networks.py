@@ -53,7 +53,9 @@ def fit_passive_networks(workers: Workers, best: Fit) -> list[Fit]:
             return []
     fits = workers.fit(jobs)
     if not best.hypothesis or min(f.model_error for f in fits) > BENT_MODEL_ERROR:
-        usual = tuple(member for member in best.hypothesis if member[0].usual)
+        usual = tuple(
+            member for member in best.hypothesis if member[0].usual(best.twin.rig, member[1])
+        )
         fits += workers.fit([FitJob((*usual, network)) for network in networks])
     fits = rank_by_evidence(fits)
     fits = _refit_lost(workers, best, fits)

@@ -1,8 +1,8 @@
 """First step of the search: the line without effects, the usual effects, and each other one alone.
 
-Boundary layers are in nearly every real line. A line without them fits so badly that nothing else
-can be judged. So they are tried first, always-present effects beside them, and the other effects
-beside those that the data show.
+Boundary layers are in nearly every real line, and so are the chambers of a pump whose flow is
+stated. A line without them fits so badly that nothing else can be judged. So they are tried first,
+and the other effects beside those that the data show.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def fit_single_effects(
 
     The second is the base where the data show none; the fits then are of each effect alone.
     """
-    usual = [c for c in candidates if c[0].is_expected(workers.base.rig, c[1])]
+    usual = [c for c in candidates if c[0].usual(workers.base.rig, c[1])]
     jobs = [FitJob(()), *(FitJob((c,)) for c in usual)]
     base, *fits = workers.fit(jobs, progress_callback(progress, "usual effects", len(jobs)))
     start = _add_usual_effects(workers, base, fits)
@@ -60,7 +60,7 @@ def fit_single_effects(
 
 
 def _add_usual_effects(workers: Workers, base: Fit, fits: Sequence[Fit]) -> Fit:
-    """`base` with every expected effect that adds enough evidence; `fits` are those of one each."""
+    """`base` with every usual effect that adds enough evidence; `fits` are those of one each."""
     best, left, needed = base, rank_by_evidence(fits), MIN_LOG_BAYES_FACTOR
     while left and left[0].evidence > best.evidence + needed:
         best, rest = left[0], [f.hypothesis[-1] for f in left[1:]]

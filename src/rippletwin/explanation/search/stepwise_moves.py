@@ -55,8 +55,8 @@ def fit_extensions(workers: Workers, best: Fit, candidates: Sequence, progress) 
     """
     rig = workers.base.rig
     jobs = [extension_job(best, c) for c in _additions(rig, best.hypothesis, candidates)]
-    expected = [effect.is_expected(rig, place) for effect, place in best.hypothesis]
-    few = len(jobs) <= PROMISING or all(expected)
+    usual = all(effect.usual(rig, place) for effect, place in best.hypothesis)
+    few = len(jobs) <= PROMISING or usual
     report = progress_callback(
         progress, f"{len(best.hypothesis) + 1} effects", len(jobs) if few else PROMISING
     )
@@ -92,14 +92,21 @@ def _fit_promising(workers: Workers, best: Fit, jobs: Sequence[FitJob], report) 
 
 
 def _additions(rig, hypothesis: Hypothesis, candidates: Sequence) -> list:
-    """The candidates that may still be added, each as the next of its kind."""
-    names = {effect.name for effect, place in hypothesis if not effect.certain(rig, place)}
+    """The candidates that may still be added, each as the next of its kind.
+
+    What is known to be there before the search begins takes none of the MAX_EFFECTS.
+    """
+    names = {
+        effect.name
+        for effect, place in hypothesis
+        if not (effect.usual(rig, place) and effect.certain(rig, place))
+    }
     instances = [next_instance(candidate, hypothesis) for candidate in candidates]
     return [
         (effect, place)
         for effect, place in filter(None, instances)
         if place.number <= MAX_OF_ONE_EFFECT
-        and (effect.certain(rig, place) or len(names | {effect.name}) <= MAX_EFFECTS)
+        and len(names | {effect.name}) <= MAX_EFFECTS
         and not any(is_form_of(member, (effect, place), rig) for member in hypothesis)
     ]
 

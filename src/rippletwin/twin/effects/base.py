@@ -114,7 +114,8 @@ class Effect:
     named       False for a passive network that represents physics without a name
     certain     (rig, place) -> whether it is always present there: accepted with any other effect
                 unless the data contradict it
-    usual       in nearly all real lines: the search tries it before all others
+    usual       (rig, place) -> whether it is in nearly all real lines: the search tries it before
+                all others
     friction    law by which it replaces the line's, as in `series_impedance`
     limits      (name, form) of effects that this one becomes at a limit of its parameters or at an
                 end of the line; what those are limits of, it is too
@@ -134,7 +135,7 @@ class Effect:
     apply: Callable[[object, LineState, Mapping[str, object], Place], None]
     apply_in_time: Callable[[object, LineState, Mapping[str, float], Place], None] | None = None
     certain: Callable[[Rig, Place], bool] = lambda rig, place: False
-    usual: bool = False
+    usual: Callable[[Rig, Place], bool] = lambda rig, place: False
     named: bool = True
     friction: str | None = None
     limits: tuple[tuple[str, str | None], ...] = ()
@@ -146,10 +147,6 @@ class Effect:
         """Whether the effect exists in the rig's medium."""
         gas = rig.fluid.heat_capacity_ratio is not None
         return self.medium == "any" or (self.medium == "gas") == gas
-
-    def is_expected(self, rig: Rig, place: Place) -> bool:
-        """Whether the effect is usual or always present: nobody has to search for it."""
-        return self.usual or self.certain(rig, place)
 
 
 def line_place(rig) -> tuple[Place, ...]:

@@ -23,9 +23,9 @@ def _places(rig):
     return tuple(Place("source", form=form) for form in forms)
 
 
-def _certain(rig, place):
-    """The stated flow of a pump goes into a constant pressure: its chambers are left out of it. Of
-    a pump that is simulated they respond to the line."""
+def _is_left_out(rig, place):
+    """Whether the pump's volume is surely missing: a stated flow goes into a constant pressure, and
+    leaves out the chambers. Those of a pump that is simulated respond to the line."""
     return rig.displacement is not None and place.form == "volume"
 
 
@@ -83,5 +83,6 @@ EFFECT = Effect(
     places=_places,
     apply=_apply,
     apply_in_time=_apply_in_time,
-    certain=_certain,
+    certain=_is_left_out,
+    usual=_is_left_out,
 )

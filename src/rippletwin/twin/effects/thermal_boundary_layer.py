@@ -46,5 +46,5 @@ EFFECT = Effect(
     places=line_place,
     apply=_apply,
     apply_in_time=_apply_in_time,
-    usual=True,
+    usual=lambda rig, place: True,
 )

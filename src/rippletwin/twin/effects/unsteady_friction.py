@@ -48,5 +48,5 @@ EFFECT = Effect(
     apply=_apply,
     apply_in_time=_apply_in_time,
     friction="unsteady",
-    usual=True,
+    usual=lambda rig, place: True,
 )
