@@ -244,8 +244,8 @@ def test_always_present_effects_are_fitted_whatever_they_promise(monkeypatch):
 
 
 def test_the_pumps_volume_takes_no_room_from_what_is_searched_for(monkeypatch):
-    """Beside it there may be four different effects, and no fifth. Radiation from an open end, which
-    is searched for with the others, is one of four."""
+    """Beside it there may be four different effects, and no fifth. Radiation from an open end is
+    searched for with the others, and is one of four."""
     monkeypatch.setattr(stepwise_moves, "rank_at_exact_modes", lambda workers, best, fits: fits)
     four = [(EFFECTS[name], Place("line")) for name in ("unsteady_friction", "entrained_air")]
     four += [HOSE, VOLUME]
