@@ -13,6 +13,7 @@ import yaml
 from paper_rig import paper_rig
 from rippletwin import store
 from rippletwin.case.model import Fluid
+from rippletwin.errors import InputError
 from rippletwin.flow_sensor.estimate import band_limit
 from rippletwin.flow_sensor.line_response import line_factory
 from rippletwin.learning.training import History
@@ -179,35 +180,51 @@ def test_flow_sensor_by_either_method_finds_the_flow(tmp_path):
         assert np.sqrt(np.mean(wrong**2) / np.mean(truth**2)) < 0.03
 
 
-def test_a_compound_fault_is_both_faults_at_once(tmp_path):
-    """The state S+C1 against the pump model with both leaks given by hand; it is neither alone."""
-    rig = yaml.safe_load(RIG)
+def simulate_fault(folder, state, leak_area, pipe_length):
+    """The store that the script writes for a recording of `SAMPLES` points a revolution."""
     store.save(
         xr.Dataset(
             {"signal": ("time", np.zeros(SAMPLES))},
             attrs={"speed_hz": SPEED, "load_pressure": PRESSURE},
         ),
-        tmp_path / "recorded.zarr",
+        folder / "recorded.zarr",
     )
+    run_script(
+        "simulate_fault",
+        folder,
+        {"flow": folder / "fault.zarr"},
+        {"state": state},
+        {"leak_area": leak_area, "pipe_length": pipe_length},
+        rig=sheet(folder),
+        recordings=folder / "recorded.zarr",
+    )
+    return store.load(folder / "fault.zarr")
+
+
+def test_a_compound_fault_is_both_faults_at_once(tmp_path):
+    """The state S+C1 against the pump model with both leaks given by hand; it is neither alone."""
+    rig = yaml.safe_load(RIG)
 
     def by_hand(*faults):
         outlet, fluid = ConstantPressure(PRESSURE), Fluid(**rig["fluid"])
         return simulate(rig["pump"], fluid, 60 * SPEED, outlet, faults, SAMPLES).flow
 
-    run_script(
-        "simulate_fault",
-        tmp_path,
-        {"flow": tmp_path / "fault.zarr"},
-        {"state": "S+C1"},
-        {"leak_area": {"S": 2e-7, "C1": 3e-7}, "pipe_length": 5.0},
-        rig=sheet(tmp_path),
-        recordings=tmp_path / "recorded.zarr",
-    )
-    flow = store.load(tmp_path / "fault.zarr").source_flow.values
+    flow = simulate_fault(tmp_path, "S+C1", {"S": 2e-7, "C1": 3e-7}, 5.0).source_flow.values
     np.testing.assert_allclose(flow, by_hand(Slipper(2e-7), Cylinder(3e-7)), rtol=1e-9)
     ripple = np.std(flow)
     for alone in (Slipper(2e-7), Cylinder(3e-7)):
         assert np.std(flow - by_hand(alone)) > 0.02 * ripple
+
+
+def test_a_pipe_that_ends_before_a_sensor_is_refused(tmp_path):
+    """One line names the configuration's key, the sensor beyond the end and the least length."""
+    [sensor] = yaml.safe_load(RIG)["sensors"]
+    with pytest.raises(InputError) as refused:
+        simulate_fault(tmp_path, "H", {}, sensor["position"] - 0.01)
+    assert str(refused.value) == (
+        "config: faults.pipe_length: 0.41 m ends before sensor p1 at 0.42 m. Give at least 0.42"
+    )
+    assert not (tmp_path / "fault.zarr").exists()
 
 
 def test_compound_ripples_stand_below_their_parts(tmp_path):
