@@ -5,7 +5,7 @@ import pytest
 
 from rippletwin.calibration.frequency_continuation import fit_hypothesis, refine
 from rippletwin.calibration.posterior import MIN_MODEL_ERROR, Posterior
-from rippletwin.explanation.fit_jobs import scan_starts
+from rippletwin.explanation.fit_starts import scan_starts
 from rippletwin.twin.twin import Twin
 from synthetic_effects import AIR, HOSE, LEAK, MUCH_AIR, TRUTH, VOLUME
 from synthetic_observations import make

@@ -14,7 +14,7 @@ from rippletwin.calibration.multistart import (
 )
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.score_test import MAX_FOLLOWED, ScoreTest
-from rippletwin.explanation.fit_jobs import transfer_theta, weak_effect_starts
+from rippletwin.explanation.fit_starts import transfer_theta, weak_effect_starts
 from rippletwin.twin.twin import Twin
 from synthetic_effects import VOLUME
 from synthetic_observations import make

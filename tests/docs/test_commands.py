@@ -54,6 +54,10 @@ NOT_RUN = {
     ),
     "pip install 'rippletwin[readers]'": (NETWORK, "python -m pip install --help"),
     "pip install snakemake-executor-plugin-slurm": (NETWORK, "python -m pip install --help"),
+    "pip install snakemake-executor-plugin-kubernetes snakemake-storage-plugin-s3": (
+        NETWORK,
+        "python -m pip install --help",
+    ),
     "snakemake --report report.zip": ("it needs a finished run", "snakemake --help"),
     "python docs/figures/report.py my_case/report.html": (
         "it needs a browser",
@@ -94,9 +98,9 @@ NOT_RUN = {
 }
 """Command -> why it is not run, and the command that is run in its place."""
 
-SLURM_PROFILE_IS_READ = (
-    'python -c \'import yaml; p = yaml.safe_load(open("profiles/slurm/config.yaml"));'
-    ' assert p["executor"] == "slurm" and p["default-resources"]["mem_mb"]\''
+PROFILE_IS_READ = (
+    'python -c \'import yaml; p = yaml.safe_load(open("profiles/{0}/config.yaml"));'
+    ' assert p["executor"] == "{0}" and p["default-resources"]["mem_mb"]\''
 )
 
 
@@ -106,8 +110,9 @@ def stand_in(command: str) -> str:
         return NOT_RUN[command][1]
     if re.match(r"python benchmarks/explain_(selfcheck|confusion)\.py", command):  # HOURS
         return f"python -m py_compile {command.split()[1]}"
-    if command.startswith("snakemake --workflow-profile profiles/slurm"):  # CLUSTER
-        return SLURM_PROFILE_IS_READ
+    profile = re.match(r"snakemake --workflow-profile profiles/(slurm|kubernetes)\b", command)
+    if profile:  # CLUSTER
+        return PROFILE_IS_READ.format(profile[1])
     if command.startswith("snakemake") and "--dry-run" not in command:  # SCHEDULED
         return f"{command} --dry-run --quiet"
     return command

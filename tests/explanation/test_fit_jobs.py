@@ -16,8 +16,8 @@ from rippletwin.explanation.fit_jobs import (
     job_from,
     open_workers,
     progress_callback,
-    scan_starts,
 )
+from rippletwin.explanation.fit_starts import scan_starts
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.twin import Twin

@@ -6,7 +6,7 @@ from measured_holes import case, unseen_run
 from paths import MEASURED
 from rippletwin.calibration.frequency_continuation import fit_hypothesis
 from rippletwin.calibration.misfit import score_fit
-from rippletwin.explanation.fit_jobs import scan_starts
+from rippletwin.explanation.fit_starts import scan_starts
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
 from rippletwin.spectra.observation import observe
 from rippletwin.twin.effects.base import Place

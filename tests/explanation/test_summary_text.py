@@ -1,6 +1,7 @@
 """The verdict's sentence: what it says for each kind of verdict."""
 
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -193,7 +194,12 @@ def test_numbers_have_no_power_of_ten():
     assert "bulk modulus 1.30 GPa (data sheet 1.7 GPa)" in sentence
 
 
-def explained(verdict="named", levels=("established", "established", "supported"), **result):
+def explained(
+    verdict="named",
+    levels=("established", "established", "supported"),
+    leak=EFFECTS["leak"],
+    **result,
+):
     """The paragraphs of a verdict with a delay of two sensors and a leak between p1 and p2."""
     rig, seconds = paper_rig(), {"value": 5e-6, "ci95": [4e-6, 6e-6], "unit": "s"}
     place = {"value": 1.0, "ci95": [0.9, 1.1], "unit": "m"}
@@ -205,7 +211,6 @@ def explained(verdict="named", levels=("established", "established", "supported"
         }
         for k, sensor in enumerate(rig.sensors[:2])
     ]
-    leak = EFFECTS["leak"]
     entries.append(
         {"effect": leak, "place": leak.places(rig)[0], "parameters": {"position": place}}
     )
@@ -250,6 +255,14 @@ def test_a_named_verdict_begins_with_what_is_missing():
     assert rest[0].startswith(
         "Values, with 95 % intervals in brackets. Delay of sensor p1: 5.0 µs (4"
     )
+
+
+def test_what_is_always_present_is_not_doubted():
+    """An effect that is always there is told as included, whatever its support: the data sheet's
+    values cannot explain it away."""
+    first = explained(leak=replace(EFFECTS["leak"], certain=lambda rig, place: True))[0]
+    assert "Leak in segment 1 (0.90 to 1.10 m from the pump): always present" in first
+    assert "Supported only" not in first
 
 
 def test_a_rival_of_the_data_sheet_is_told_in_words():

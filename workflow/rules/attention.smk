@@ -20,7 +20,7 @@ rule attention:
 
 rule attention_table:
     input:
-        attention=expand(
+        attention=expand_outputs(
             rules.attention.output,
             dataset=SIMULATED,
             architecture=config["architectures"],

@@ -22,13 +22,14 @@ from config_errors import (
 from rippletwin.learning.architectures import ARCHITECTURES, CLASSES
 from rippletwin.learning.malloc_settings import MALLOC_ENVIRONMENT
 from source_files import package_files, source_files_of
+from stored_outputs import expand_outputs
 
 check_config(config, ROOT / "workflow/schemas/config.schema.yaml")
 check_severity(config["faults"])
 check_names("architectures", config["architectures"], list(ARCHITECTURES))
 
 RESULTS = config["results"]
-PAPER = os.path.relpath(ROOT / "resources/paper_accuracy.csv")
+PAPER = local(os.path.relpath(ROOT / "resources/paper_accuracy.csv"))
 
 # The virtual rig's command is found even where the environment is not activated.
 shell.prefix(f"PATH={shlex.quote(os.path.dirname(sys.executable))}:$PATH; ")
@@ -60,12 +61,12 @@ def recordings(purpose):
     virtual rig makes them."""
     if RECORDED_HERE:
         return [f"{CASE}/recordings"]
-    return [f"{CASE}/{name}" for name in case_parts.files_for(SHEET, purpose)]
+    return local([f"{CASE}/{name}" for name in case_parts.files_for(SHEET, purpose)])
 
 
 def rig_sheet():
     """rig.yaml as an input whose age does not matter: `rig_content` tells what was edited."""
-    return RIG if RECORDED_HERE else ancient(RIG)
+    return RIG if RECORDED_HERE else local(ancient(RIG))
 
 
 def rig_content(*sections, recordings=None):
@@ -135,5 +136,5 @@ def scripts_sources(script):
 
 
 def relative(files):
-    """Paths from the working directory, so that a moved project reruns nothing."""
-    return [os.path.relpath(file) for file in files]
+    """Paths from the working directory, so that a moved project reruns nothing; in no storage."""
+    return local([os.path.relpath(file) for file in files])

@@ -19,7 +19,7 @@ rule evaluate_compound:
 
 rule report_compound:
     input:
-        answers=expand(
+        answers=expand_outputs(
             rules.evaluate_compound.output,
             dataset=SIMULATED,
             architecture=config["architectures"],

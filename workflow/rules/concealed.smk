@@ -79,9 +79,11 @@ rule explain_concealed:
 
 rule commit_verdicts:
     input:
-        seals=expand(rules.conceal.output.seal, hidden=HIDDEN),
-        verdicts=expand(rules.explain_concealed.output.verdict, hidden=HIDDEN),
-        baselines=expand(rules.explain_concealed.output.baselines, hidden=HIDDEN),
+        seals=expand_outputs(rules.conceal.output.seal, hidden=HIDDEN),
+        verdicts=expand_outputs(rules.explain_concealed.output.verdict, hidden=HIDDEN),
+        baselines=expand_outputs(
+            rules.explain_concealed.output.baselines, hidden=HIDDEN
+        ),
         source=scripts_sources("commit_verdicts.py"),
     output:
         f"{CONCEALED}/commitments.json",
@@ -115,11 +117,13 @@ rule oracle_concealed:
 rule score_concealed:
     input:
         commitments=rules.commit_verdicts.output,
-        oracles=expand(rules.oracle_concealed.output, hidden=HIDDEN),
-        seals=expand(rules.conceal.output.seal, hidden=HIDDEN),
-        seal_keys=expand(rules.conceal.output.key, hidden=HIDDEN),
-        verdicts=expand(rules.explain_concealed.output.verdict, hidden=HIDDEN),
-        baselines=expand(rules.explain_concealed.output.baselines, hidden=HIDDEN),
+        oracles=expand_outputs(rules.oracle_concealed.output, hidden=HIDDEN),
+        seals=expand_outputs(rules.conceal.output.seal, hidden=HIDDEN),
+        seal_keys=expand_outputs(rules.conceal.output.key, hidden=HIDDEN),
+        verdicts=expand_outputs(rules.explain_concealed.output.verdict, hidden=HIDDEN),
+        baselines=expand_outputs(
+            rules.explain_concealed.output.baselines, hidden=HIDDEN
+        ),
         source=scripts_sources("score_concealed.py"),
     output:
         rows=f"{CONCEALED}/rows.json",

@@ -4,8 +4,10 @@ rule diagnose:
         rig=rig_sheet(),
         recordings=recordings("all"),
         twin=rules.explain.output.twin,
-        effects=config["explain"]["effects"],
-        faults=[name for name in config["faults"]["files"] if name.endswith(".py")],
+        effects=local(config["explain"]["effects"]),
+        faults=local(
+            [name for name in config["faults"]["files"] if name.endswith(".py")]
+        ),
         source=scripts_sources("diagnose.py"),
     output:
         diagnosis=report(

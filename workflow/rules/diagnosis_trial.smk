@@ -60,9 +60,11 @@ rule diagnose_population:
 
 rule commit_diagnoses:
     input:
-        seals=expand(rules.record_population.output.seal, drawn=DRAWN),
-        diagnoses=expand(rules.diagnose_population.output.diagnosis, drawn=DRAWN),
-        runs=expand(rules.diagnose_population.output.run, drawn=DRAWN),
+        seals=expand_outputs(rules.record_population.output.seal, drawn=DRAWN),
+        diagnoses=expand_outputs(
+            rules.diagnose_population.output.diagnosis, drawn=DRAWN
+        ),
+        runs=expand_outputs(rules.diagnose_population.output.run, drawn=DRAWN),
         source=scripts_sources("commit_diagnoses.py"),
     output:
         f"{TRIAL}/commitments.json",
@@ -77,10 +79,12 @@ rule commit_diagnoses:
 rule score_diagnosis_trial:
     input:
         commitments=rules.commit_diagnoses.output,
-        seals=expand(rules.record_population.output.seal, drawn=DRAWN),
-        seal_keys=expand(rules.record_population.output.key, drawn=DRAWN),
-        diagnoses=expand(rules.diagnose_population.output.diagnosis, drawn=DRAWN),
-        runs=expand(rules.diagnose_population.output.run, drawn=DRAWN),
+        seals=expand_outputs(rules.record_population.output.seal, drawn=DRAWN),
+        seal_keys=expand_outputs(rules.record_population.output.key, drawn=DRAWN),
+        diagnoses=expand_outputs(
+            rules.diagnose_population.output.diagnosis, drawn=DRAWN
+        ),
+        runs=expand_outputs(rules.diagnose_population.output.run, drawn=DRAWN),
         source=scripts_sources("score_diagnosis_trial.py"),
     output:
         rows=f"{TRIAL}/rows.json",

@@ -3,7 +3,7 @@ rule explain:
     input:
         rig=rig_sheet(),
         recordings=recordings("fit"),
-        effects=config["explain"]["effects"],
+        effects=local(config["explain"]["effects"]),
         source=scripts_sources("explain.py"),
     output:
         verdict=report(

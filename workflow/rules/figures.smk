@@ -150,7 +150,7 @@ rule plot_ranks:
 
 rule plot_attention:
     input:
-        attention=lambda wildcards: expand(
+        attention=lambda wildcards: expand_outputs(
             rules.attention.output,
             dataset=wildcards.dataset,
             architecture=of_domain(wildcards.domain),

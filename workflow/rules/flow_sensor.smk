@@ -3,7 +3,7 @@ rule flow_sensor:
     input:
         recorded=rules.cut_windows.output.windows,
         twin=twin_of,
-        effects=config["explain"]["effects"],
+        effects=local(config["explain"]["effects"]),
         source=scripts_sources("flow_sensor.py"),
     output:
         directory(f"{RESULTS}/recordings/flow_{{twin}}.zarr"),

@@ -15,11 +15,13 @@ def get_final_output():
     wanted = [rules.report_page.output]
     if HAS_PERIODIC:
         wanted.append(rules.plot_calibration.output)
-        wanted += expand(rules.plot_seeds.output, dataset=SIMULATED)
+        wanted += expand_outputs(rules.plot_seeds.output, dataset=SIMULATED)
         if PRESSURES:
             wanted.append(rules.compare_sst.output)
         if SIMULATED and STATES["compound"]:
-            wanted += expand(rules.plot_compound_seeds.output, dataset=SIMULATED)
+            wanted += expand_outputs(
+                rules.plot_compound_seeds.output, dataset=SIMULATED
+            )
     if ASKED_HERE:
         wanted.append(rules.ask_networks.output)
     if RANDOMISED and of_domain("time") and (SCORED_HERE or ASKED_HERE):
@@ -34,14 +36,16 @@ def scores():
         rules.recording_table.output,
         rules.claims.output,
         rules.plot_accuracy.output,
-        expand(rules.plot_confusion.output, dataset=CHOSEN),
+        expand_outputs(rules.plot_confusion.output, dataset=CHOSEN),
     ]
     if corrected_pairs():
         wanted.append(rules.report_cost.output)
     if SIMULATED:
         wanted += [rules.attention_table.output, rules.plot_ranks.output]
         domains = [name for name in ("time", "image") if of_domain(name)]
-        wanted += expand(rules.plot_attention.output, dataset=SIMULATED, domain=domains)
+        wanted += expand_outputs(
+            rules.plot_attention.output, dataset=SIMULATED, domain=domains
+        )
     if SIMULATED and STATES["compound"]:
         wanted.append(rules.report_compound.output)
     return wanted

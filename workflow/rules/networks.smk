@@ -26,7 +26,7 @@ rule keep_networks:
 
 rule unlike_table:
     input:
-        rates=expand(
+        rates=expand_outputs(
             rules.keep_networks.output.rates,
             dataset=RANDOMISED,
             architecture=of_domain("time"),
@@ -56,7 +56,7 @@ rule ask_networks:
     input:
         rig=rig_sheet(),
         recordings=recordings("unknown"),
-        networks=expand(
+        networks=expand_outputs(
             rules.keep_networks.output.networks,
             dataset=ASKED,
             architecture=of_domain("time"),

@@ -1,12 +1,12 @@
 # Predictions -> the accuracy table beside the paper's, and what missing physics costs.
 rule accuracy_table:
     input:
-        predictions=expand(
+        predictions=expand_outputs(
             rules.evaluate.output,
             dataset=CHOSEN,
             architecture=config["architectures"],
         ),
-        histories=expand(
+        histories=expand_outputs(
             rules.train.output.history,
             dataset=CHOSEN,
             architecture=config["architectures"],
@@ -39,7 +39,7 @@ rule accuracy_table:
 
 rule recording_table:
     input:
-        predictions=expand(
+        predictions=expand_outputs(
             rules.evaluate.output,
             dataset=CHOSEN,
             architecture=config["architectures"],
@@ -71,7 +71,7 @@ rule report_cost:
         table=rules.accuracy_table.output.table,
         verdict=rules.explain.output.verdict,
         twin=rules.explain.output.twin,
-        effects=config["explain"]["effects"],
+        effects=local(config["explain"]["effects"]),
         source=scripts_sources("report_cost.py"),
     output:
         report(

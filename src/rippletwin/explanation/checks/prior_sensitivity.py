@@ -22,9 +22,9 @@ from rippletwin.explanation.fit_jobs import (
     FitJob,
     FromTheta,
     Workers,
-    common_coordinates,
     job_without_effect,
 )
+from rippletwin.explanation.fit_starts import common_coordinates
 from rippletwin.explanation.thresholds import (
     MIN_LOG_BAYES_FACTOR,
     PULL_ALARM,

@@ -22,13 +22,8 @@ from rippletwin.calibration.shaft_angles import fit_shaft_angles
 from rippletwin.explanation.checks.cross_validation import Fold, Halves, make_folds
 from rippletwin.explanation.checks.prior_sensitivity import WithoutEffect, fit_without_each_effect
 from rippletwin.explanation.checks.robustness import Robustness, compare_beside_corrections
-from rippletwin.explanation.fit_jobs import (
-    FitJob,
-    FromTheta,
-    Workers,
-    job_without_effect,
-    transfer_theta,
-)
+from rippletwin.explanation.fit_jobs import FitJob, FromTheta, Workers, job_without_effect
+from rippletwin.explanation.fit_starts import transfer_theta
 from rippletwin.explanation.localise.smooth_corrections import (
     NONE,
     SmoothCorrections,

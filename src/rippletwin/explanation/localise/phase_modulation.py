@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import j0
 
 from rippletwin.calibration.frequency_continuation import fit_hypothesis, refine
-from rippletwin.explanation.fit_jobs import transfer_theta
+from rippletwin.explanation.fit_starts import transfer_theta
 from rippletwin.explanation.localise.shaft_orders import (
     ShaftOrders,
     analyse_shaft_orders,

@@ -12,14 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from rippletwin.calibration.fit import Fit
-from rippletwin.explanation.fit_jobs import (
-    FitJob,
-    FromTheta,
-    Workers,
-    job_from,
-    rank_by_evidence,
-    transfer_theta,
-)
+from rippletwin.explanation.fit_jobs import FitJob, FromTheta, Workers, job_from, rank_by_evidence
+from rippletwin.explanation.fit_starts import transfer_theta
 from rippletwin.explanation.search.stepwise_moves import MIN_IMPROVEMENT
 from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR
 from rippletwin.twin.effects.base import Effect, Place

@@ -20,8 +20,8 @@ from rippletwin.explanation.fit_jobs import (
     Workers,
     progress_callback,
     rank_by_evidence,
-    transfer_theta,
 )
+from rippletwin.explanation.fit_starts import transfer_theta
 from rippletwin.explanation.search.stepwise_moves import (
     LOST_MODEL_ERROR,
     fit_extensions,

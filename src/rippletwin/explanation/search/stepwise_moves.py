@@ -14,14 +14,13 @@ from rippletwin.explanation.fit_jobs import (
     FitJob,
     NearFit,
     Workers,
-    common_coordinates,
     job_from,
     job_without_effect,
     progress_callback,
     rank_by_evidence,
-    scan_starts,
     score_extension,
 )
+from rippletwin.explanation.fit_starts import common_coordinates, scan_starts
 from rippletwin.explanation.thresholds import (
     GOOD_MODEL_ERROR,
     MIN_LOG_BAYES_FACTOR,

@@ -134,12 +134,23 @@ def _level(levels: Mapping[tuple[str, str], str], entry: dict) -> str:
 
 
 def _lesser(e: Explanation, entries: Sequence[dict], levels: Mapping) -> list[str]:
-    """The effects that are supported or suggested, and what that means."""
+    """The effects that are supported or suggested, and what that means.
+
+    What is always present is not doubted, whatever these recordings say of it.
+    """
+    certain = [entry for entry in entries if entry["effect"].certain(e.rig, entry["place"])]
     sentences = []
     for level, why in LESSER.items():
-        own = [entry for entry in entries if _level(levels, entry) == level]
+        own = [
+            entry for entry in entries if _level(levels, entry) == level and entry not in certain
+        ]
         if own:
             sentences.append(f"{_capital(level)} only: {_effects(e, own)}. {why}")
+    if certain:
+        sentences.append(
+            f"{_capital(_effects(e, certain))}: always present, so included; these recordings "
+            "alone do not establish it."
+        )
     return sentences
 
 
