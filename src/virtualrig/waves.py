@@ -53,7 +53,7 @@ class State(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """The line's constants and the state's fields for the time step, n nodes of E elements in a row.
+    """The line's constants and the state's fields for the time step; n nodes of E elements a row.
 
     N = n E. Contiguous rows are what the compiler vectorises; the fields are views of the state's.
     """
