@@ -62,7 +62,9 @@ def settle_node(table, history, state, lead, wave_in, wave_lead, guess):
             gas = table[GAS_VOLUME] * (table[GAS_PRESSURE] / absolute) ** (1 / table[GAS_EXPONENT])
             stored -= gas
             compliance += gas / (absolute * table[GAS_EXPONENT])
-        root, slope = orifice_flow(p, 1e3)
+        root = slope = 0.0
+        if table[ORIFICE] != 0:
+            root, slope = orifice_flow(p, 1e3)
         opening = open_0 + open_1 * p
         out = table[LEAK] * (p - table[TANK]) + table[ORIFICE] * opening * root
         out += arm_0 + arm_1 * p + lead * stored - history[STORED]

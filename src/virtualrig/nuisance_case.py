@@ -42,9 +42,9 @@ from virtualrig.population import (
     TOLERANCE,
     make_bench,
     record_planned,
-    ripple_change,
     ripple_of,
 )
+from virtualrig.recorder import Point
 from virtualrig.rig import build
 
 GEOMETRY_SHARE = 2 / 3
@@ -181,32 +181,47 @@ def record_nuisance_case(case: NuisanceCase, folder: Path, rng: np.random.Genera
         sheet = sheet | {"pump": {"pistons": sheet["pump"]["pistons"]}}
     write_sheet(folder, sheet, entries)
     seal = drawn.true | {"nuisance": drawn.nuisance}
+    ripples = true_ripples(drawn)
     return case.truth | {
         "seal": seal,
-        "change": change_by_effects(drawn),
-        "floor": floor_of(drawn),
+        "change": change_by_effects(drawn, ripples[0]),
+        "floor": floor_of(drawn, ripples),
     }
 
 
-def floor_of(drawn: DrawnRig) -> float:
+def true_ripples(drawn: DrawnRig) -> list[np.ndarray]:
+    """Sensed ripple (sensors, records), Pa, of the true rig at every operating point as set."""
+    return [
+        settled_ripple(make_bench(drawn, drawn.true, plan.kelvin), plan.point)
+        for plan in drawn.recordings
+    ]
+
+
+def settled_ripple(bench: Bench, point: Point) -> np.ndarray:
+    """Sensed ripple (sensors, records), Pa, of a bench that settles at an operating point."""
+    orbit = bench.settle(point.speed_rpm, point.load_pressure, tolerance=TOLERANCE)
+    return ripple_of(orbit, bench.rig.sensing)
+
+
+def floor_of(drawn: DrawnRig, ripples: list[np.ndarray]) -> float:
     """Relative error that the data sheet's pump on the true rig makes at the sensors, at the shaft
-    angle that makes it least; root mean square over the operating points."""
+    angle that makes it least; root mean square over the operating points.
+
+    `ripples` are the `true_ripples`."""
     errors = []
-    for plan in drawn.recordings:
-        point, waves = plan.point, []
+    for plan, true in zip(drawn.recordings, ripples, strict=True):
         seal = seal_at(drawn.sheet, drawn.true, drawn.nuisance, plan.kelvin)
-        for pump in (seal["pump"], {}):
-            bench = Bench(build(drawn.sheet, seal | {"pump": pump}))
-            orbit = bench.settle(point.speed_rpm, point.load_pressure, tolerance=TOLERANCE)
-            waves.append(ripple_of(orbit, bench.rig.sensing))
+        nominal = settled_ripple(Bench(build(drawn.sheet, seal | {"pump": {}})), plan.point)
         pistons = drawn.sheet["pump"]["pistons"]
-        errors.append(ripple_difference(waves[1], waves[0], pistons, point))
+        errors.append(ripple_difference(nominal, true, pistons, plan.point))
     return float(np.sqrt(np.mean(np.square(errors))))
 
 
-def change_by_effects(drawn: DrawnRig) -> float:
+def change_by_effects(drawn: DrawnRig, after: np.ndarray) -> float:
     """Norm of the change of the sensors' ripple by the concealed effects over that of the ripple
-    without them, of two runs of the rig at the first operating point."""
+    without them, of two runs of the rig at the first operating point.
+
+    `after` is the true ripple there, with the effects."""
     if not _has_effects(drawn.true):
         return 0.0
     plan = drawn.recordings[0]
@@ -217,13 +232,8 @@ def change_by_effects(drawn: DrawnRig) -> float:
             for s in plain["line"]["segments"]
         ]
     }
-    orbits, sensing = [], []
-    for true in (plain, drawn.true):
-        bench = make_bench(drawn, true, plan.kelvin)
-        point = plan.point
-        orbits.append(bench.settle(point.speed_rpm, point.load_pressure, tolerance=TOLERANCE))
-        sensing.append(bench.rig.sensing)
-    return ripple_change(*orbits, *sensing)
+    before = settled_ripple(make_bench(drawn, plain, plan.kelvin), plan.point)
+    return float(np.linalg.norm(after - before) / np.linalg.norm(before))
 
 
 def _has_effects(true: dict) -> bool:

@@ -93,7 +93,7 @@ class Bench:
         (orifice coefficient) is given. Raises RuntimeError where it does not settle.
         """
         speed = 2 * np.pi * speed_rpm / 60
-        _, dt = self._steps(speed)
+        every, dt = self._steps(speed)
         line = discretise(self.rig.network, dt)
         given = self._given(speed_rpm)
         flow = 0.97 * self.rig.pump.displacement * speed_rpm / 60
@@ -108,9 +108,12 @@ class Bench:
         load[node_elements.ORIFICE] = (
             valve if valve is not None else self._valve_coefficient(flow, load_pressure)
         )
+        stations = stepper.tabulate_stations(
+            self.chambers, self.ports, speed, self._ripple, every * RECORDS, dt
+        )
         before = np.inf
         for revolution in range(1, most + 1):
-            pressure, outlet, nodal = self._run(line, given, speed, np.zeros(0), RECORDS)
+            pressure, outlet, nodal = self._run(line, given, speed, np.zeros(0), RECORDS, stations)
             residual = np.abs(pressure - before).max()
             before = pressure
             # with a given flow the valve's coefficient is known from the start
@@ -151,14 +154,17 @@ class Bench:
         every, dt = self._steps(speed)
         ahead = np.concatenate([[0.0], np.cumsum(deviation)]) * speed * every * dt
         line = discretise(self.rig.network, dt)
-        return self._run(line, self._given(speed_rpm), speed, ahead, len(deviation))[0]
+        computed = np.zeros((0, len(self.chambers), 4))
+        return self._run(line, self._given(speed_rpm), speed, ahead, len(deviation), computed)[0]
 
-    def _run(self, line, given: np.ndarray, speed: float, ahead: np.ndarray, records: int):
+    def _run(
+        self, line, given: np.ndarray, speed: float, ahead: np.ndarray, records: int, stations
+    ):
         """`stepper.run` from the present state; RuntimeError where the chambers do not converge."""
         every, dt = self._steps(speed)
         pressure, outlet, nodal, newton = stepper.run(
             line, self.nodes, self.chambers, self.ports, given, (speed, self._ripple, ahead),
-            self.state, 0, every * records, every, dt, self.sensors,
+            self.state, stations, every * records, every, dt, self.sensors,
         )  # fmt: skip
         if newton > pump.MOST_NEWTON_STEPS:
             raise RuntimeError("the pump's chambers did not converge; shorten the time step")

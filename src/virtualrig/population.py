@@ -124,17 +124,9 @@ def instrument_of(nuisance: dict) -> Instrument:
     return Instrument(offset=tuple(nuisance["offset"]), **{name: nuisance[name] for name in names})
 
 
-def ripple_change(
-    before: Orbit, after: Orbit, sensing: tuple, sensing_after: tuple | None = None
-) -> float:
-    """Norm of the change of the sensed ripple over that of the ripple before.
-
-    `sensing_after` is that of the orbit after, where the sensors change too.
-    """
-    ripples = [
-        ripple_of(before, sensing),
-        ripple_of(after, sensing if sensing_after is None else sensing_after),
-    ]
+def ripple_change(before: Orbit, after: Orbit, sensing: tuple) -> float:
+    """Norm of the change of the sensed ripple over that of the ripple before."""
+    ripples = [ripple_of(orbit, sensing) for orbit in (before, after)]
     return float(np.linalg.norm(ripples[1] - ripples[0]) / np.linalg.norm(ripples[0]))
 
 

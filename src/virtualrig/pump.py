@@ -15,6 +15,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numba import njit
 
+from virtualrig.elimination import eliminate, eliminate_arrow
+
 # columns of the chamber table
 (
     BORE, STROKE_RADIUS, DEAD_VOLUME, ANGLE, CASE_LEAK, SLIPPER, NEIGHBOUR,
@@ -200,6 +202,13 @@ def chamber_kinematics(angle, speed, chambers, ports, stations):
 
 
 @njit(cache=True)
+def compress_all(pressures, ports, squeezed):
+    """Write the chambers' compression at their `pressures`, and its slope: (pistons, 2)."""
+    for i in range(len(squeezed)):
+        squeezed[i, 0], squeezed[i, 1] = compression(pressures[i], ports)
+
+
+@njit(cache=True)
 def step_chambers(stations, history, lead, chambers, ports, outlet_lead, outlet_rest, x, matrix):
     """One implicit step of all chambers and of the outlet that they share; returns Newton steps.
 
@@ -209,15 +218,30 @@ def step_chambers(stations, history, lead, chambers, ports, outlet_lead, outlet_
     in, solution out. `stations` are those of `crank`; `matrix` (pistons + 1, pistons + 2) is
     workspace.
     """
+    squeezed = np.empty((len(chambers), 2))
+    compress_all(x, ports, squeezed)
+    return solve_chambers(
+        stations, history, lead, chambers, ports, outlet_lead, outlet_rest, x, matrix, squeezed
+    )
+
+
+@njit(cache=True)
+def solve_chambers(
+    stations, history, lead, chambers, ports, outlet_lead, outlet_rest, x, matrix, squeezed
+):
+    """`step_chambers` with `squeezed` (pistons, 2), `compress_all` at `x`: so in, and so out."""
     n = len(chambers)
     laminar = ports[LAMINAR]
+    coupled = False
+    for i in range(n):
+        coupled |= chambers[i, NEIGHBOUR] > 0
     for iteration in range(MOST_NEWTON_STEPS):
         matrix[:] = 0.0
         matrix[n, n] = outlet_lead
         matrix[n, n + 1] = outlet_rest - outlet_lead * x[n]
         for i in range(n):
             stiffness, gain, opening, inlet = stations[i]
-            strain, softness = compression(x[i], ports)
+            strain, softness = squeezed[i, 0], squeezed[i, 1]
             slope = chambers[i, CASE_LEAK]
             gain -= slope * x[i]
             if chambers[i, SLIPPER] > 0:
@@ -251,7 +275,10 @@ def step_chambers(stations, history, lead, chambers, ports, outlet_lead, outlet_
                 matrix[k, n + 1] += stations[k, 0] * across
                 matrix[k, k] += stations[k, 0] * tangent
                 matrix[k, i] -= stations[k, 0] * tangent
-        _eliminate(matrix)
+        if coupled:
+            eliminate(matrix)
+        else:
+            eliminate_arrow(matrix)
         largest = 0.0
         # near zero pressure drop a square-root orifice makes Newton's method oscillate: halve
         # every other step
@@ -259,26 +286,7 @@ def step_chambers(stations, history, lead, chambers, ports, outlet_lead, outlet_
         for i in range(n + 1):
             x[i] += damping * matrix[i, n + 1]
             largest = max(largest, abs(matrix[i, n + 1]))
+        compress_all(x, ports, squeezed)
         if largest < 1.0:
             return iteration + 1
     return MOST_NEWTON_STEPS + 1
-
-
-@njit(cache=True)
-def _eliminate(matrix):
-    """Solve in place, right-hand side in the last column; diagonally dominant, so without
-    pivots.
-    """
-    n = matrix.shape[0]
-    for k in range(n):
-        pivot = 1.0 / matrix[k, k]
-        for i in range(k + 1, n):
-            factor = matrix[i, k] * pivot
-            if factor != 0.0:
-                for j in range(k + 1, n + 1):
-                    matrix[i, j] -= factor * matrix[k, j]
-    for k in range(n - 1, -1, -1):
-        total = matrix[k, n]
-        for j in range(k + 1, n):
-            total -= matrix[k, j] * matrix[j, n]
-        matrix[k, n] = total / matrix[k, k]

@@ -10,20 +10,51 @@ from numba import njit
 
 from virtualrig.multistep import DEPTH, LEAD, combine_past
 from virtualrig.node_elements import NODE_STATES, STORED, VOLUME, settle_node
-from virtualrig.pump import AIR, chamber_kinematics, compression, step_chambers
-from virtualrig.waves import advance_waves, close_pipes, gather_at_nodes, wave_rates
+from virtualrig.pump import AIR, chamber_kinematics, compress_all, solve_chambers
+from virtualrig.waves import (
+    advance_waves,
+    close_pipes,
+    gather_at_nodes,
+    lay_in_rows,
+    node_admittances,
+    settle_faces,
+    wave_rates,
+)
 
 
 @njit(cache=True)
-def run(line, nodes, chambers, ports, source, crank, state, phase, steps, every, dt, sensors):
-    """March `steps` steps of `dt` from `state`, whose newest step is number `phase`.
+def crank_motion(turn, drift, ripple):
+    """Crank angle, rad, and its rate over the set speed, of uniform rotation to `turn` rad."""
+    angle, rate = turn, drift
+    for term in range(len(ripple)):
+        order, amplitude, shift = ripple[term]
+        angle += amplitude / order * np.sin(order * turn + shift)
+        rate += drift * amplitude * np.cos(order * turn + shift)
+    return angle, rate
 
-    `crank` is (speed in rad/s, ripple, wander). The crank angle is `speed * phase * dt` plus wander
-    plus ripple. The ripple (terms, 3) has order, relative amplitude of the speed, and phase of each
-    term. The wander is (0,), or (steps // every + 1,) rad by which the crank leads uniform rotation
-    at each record. `source` (M,), m3/s, is a flow into node 0 over one revolution, in proportion to
-    the crank's speed and in addition to the pump's; `chambers` may be empty. `sensors` is
-    (element, (count, n) interpolation rows). Every `every` steps a record is kept.
+
+@njit(cache=True)
+def tabulate_stations(chambers, ports, speed, ripple, steps, dt):
+    """`stations` of `run` for steps 1 to `steps`: (steps, pistons, 4), as every revolution has."""
+    stations = np.empty((steps, len(chambers), 4))
+    for step in range(1, steps + 1):
+        angle, rate = crank_motion(speed * (step * dt), 1.0, ripple)
+        chamber_kinematics(angle, speed * rate, chambers, ports, stations[step - 1])
+    return stations
+
+
+@njit(cache=True)
+def run(line, nodes, chambers, ports, source, crank, state, stations, steps, every, dt, sensors):
+    """March `steps` steps of `dt` from `state`, in which the crank angle is zero.
+
+    `crank` is (speed in rad/s, ripple, wander). The crank angle after `step` steps is
+    `speed * step * dt` plus wander plus ripple. The ripple (terms, 3) has order, relative amplitude
+    of the speed, and phase of each term. The wander is (0,), or (steps // every + 1,) rad by which
+    the crank leads uniform rotation at each record. `stations` is of `tabulate_stations` where the
+    speed does not wander; with no rows it is computed. `source` (M,), m3/s, is a flow into node 0
+    over one revolution, in proportion to the crank's speed and in addition to the pump's;
+    `chambers` may be empty. `sensors` is (element, (count, n) interpolation rows). Every `every`
+    steps a record is kept.
 
     Returns sensor pressures (count, records), flow into the line at x = 0 (records,), pressures
     of the nodes (nodes, records), and the greatest number of Newton steps that the chambers took.
@@ -38,52 +69,58 @@ def run(line, nodes, chambers, ports, source, crank, state, phase, steps, every,
     outlet = np.zeros(steps // every)
     nodal = np.zeros((n_nodes, steps // every))
     flux_p, flux_q = np.zeros((2, elements)), np.zeros((2, elements))
-    wave_in, wave_lead = np.zeros(n_nodes), np.zeros(n_nodes)
+    flat = lay_in_rows(line, state, dt)
+    wave_in, wave_lead = np.zeros(n_nodes), node_admittances(line, n_nodes)
+    stored = state.node.reshape((DEPTH, NODE_STATES * n_nodes))
     history = np.zeros((NODE_STATES, n_nodes))
+    past = history.reshape(NODE_STATES * n_nodes)
     chamber_history = np.zeros(pistons)
     x = np.zeros(pistons + 1)
     matrix = np.zeros((pistons + 1, pistons + 2))
-    stations = np.zeros((pistons, 4))
+    squeezed = np.zeros((pistons, 2))
+    compress_all(state.chamber_pressure, ports, squeezed)
+    computed = len(stations) == 0
+    station = np.zeros((pistons, 4))
     newton = 0
     for step in range(1, steps + 1):
-        ring = (phase % DEPTH, (phase - 1) % DEPTH, (phase - 2) % DEPTH, (phase - 3) % DEPTH)
+        ring = ((step - 1) % DEPTH, (step - 2) % DEPTH, (step - 3) % DEPTH, step % DEPTH)
         last, before, now = ring[0], ring[1], ring[3]
-        advance_waves(line, state, ring, dt)
-        phase += 1
-        gather_at_nodes(line, state, now, flux_p, flux_q, wave_in, wave_lead)
-        turn, drift = speed * (phase * dt), 1.0
+        advance_waves(line, flat, ring, dt)
+        settle_faces(line, state, now, flux_p, flux_q)
+        gather_at_nodes(line, state, now, wave_in)
+        turn, drift = speed * (step * dt), 1.0
         if len(wander):
             k = (step - 1) // every
             slope = (wander[k + 1] - wander[k]) / every
             turn += wander[k] + slope * (step - k * every)
             drift += slope / (speed * dt)
-        angle, rate = turn, drift
-        for term in range(len(ripple)):
-            order, amplitude, shift = ripple[term]
-            angle += amplitude / order * np.sin(order * turn + shift)
-            rate += drift * amplitude * np.cos(order * turn + shift)
         place = turn / (2 * np.pi) % 1.0 * len(source)
         low = int(place) % len(source)
         share = place - int(place)
         given = source[low] * (1 - share) + source[(low + 1) % len(source)] * share
         given *= drift
-        combine_past(state.node, ring)
-        for s in range(NODE_STATES):
-            for node in range(n_nodes):
-                history[s, node] = state.node[now, s, node] / dt
+        combine_past(stored, ring)
+        newest = stored[now]
+        for i in range(len(past)):
+            past[i] = newest[i] / dt
         if pistons > 0:
             if ports[AIR] == 0:
                 for i in range(pistons):
                     x[i] = 2 * state.chamber[last, i] - state.chamber[before, i]
+                compress_all(x, ports, squeezed)
             else:
                 x[:pistons] = state.chamber_pressure
             combine_past(state.chamber, ring)
             for i in range(pistons):
                 chamber_history[i] = state.chamber[now, i] / dt
             x[pistons] = state.node_pressure[0]
-            chamber_kinematics(angle, speed * rate, chambers, ports, stations)
-            used = step_chambers(
-                stations,
+            if computed:
+                angle, rate = crank_motion(turn, drift, ripple)
+                chamber_kinematics(angle, speed * rate, chambers, ports, station)
+            else:
+                station = stations[step - 1]
+            used = solve_chambers(
+                station,
                 chamber_history,
                 lead,
                 chambers,
@@ -92,10 +129,11 @@ def run(line, nodes, chambers, ports, source, crank, state, phase, steps, every,
                 wave_in[0] + given + history[STORED, 0],
                 x,
                 matrix,
+                squeezed,
             )
             newton = max(newton, used)
             for i in range(pistons):
-                state.chamber[now, i] = compression(x[i], ports)[0]
+                state.chamber[now, i] = squeezed[i, 0]
                 state.chamber_pressure[i] = x[i]
             state.node_pressure[0] = x[pistons]
             state.node[now, STORED, 0] = nodes[0, VOLUME] * x[pistons]
@@ -106,7 +144,7 @@ def run(line, nodes, chambers, ports, source, crank, state, phase, steps, every,
                 state.node_pressure[node],
             )  # fmt: skip
         close_pipes(line, state, now, flux_p, flux_q)
-        wave_rates(line, state, now, flux_p, flux_q)
+        wave_rates(line, flat, state, now, flux_p, flux_q)
         if step % every == 0:
             for s in range(count):
                 for i in range(n):

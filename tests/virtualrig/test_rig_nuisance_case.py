@@ -11,6 +11,7 @@ from virtualrig.nuisance_case import (
     floor_of,
     nuisance_effects,
     record_nuisance_case,
+    true_ripples,
 )
 
 COUNT, COMMIT, NUMBER = 60, "fixed", 1
@@ -79,4 +80,5 @@ def test_the_case_folder_says_nothing_of_the_truth(tmp_path, geometry):
         "discharge_coefficient": case.rig.sheet["pump"]["discharge_coefficient"],
     }  # fmt: skip
     right = type(case.rig)(case.rig.sheet, case.rig.true, same, case.rig.recordings)
-    assert floor_of(right) < 0.1 * truth["floor"] and np.isfinite(truth["floor"])
+    assert np.isfinite(truth["floor"])
+    assert floor_of(right, true_ripples(right)) < 0.1 * truth["floor"]
