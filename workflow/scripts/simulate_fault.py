@@ -10,20 +10,11 @@ import xarray as xr
 from job import open_log
 from rippletwin import store
 from rippletwin.case.load import load_case
-from rippletwin.errors import InputError
 from rippletwin.pump.named_states import simulate_state
 
 report_progress = open_log(snakemake)
 params = snakemake.params
 rig = load_case(Path(snakemake.input.rig).parent, states=()).rig
-last = max(rig.sensors, key=lambda sensor: sensor.position)
-if params.pipe_length < last.position:
-    raise InputError(
-        "config",
-        "faults.pipe_length",
-        f"{params.pipe_length} m ends before sensor {last.name} at {last.position} m",
-        f"Give at least {last.position}",
-    )
 recorded = store.load(snakemake.input.recordings)
 in_pipe, source = simulate_state(
     rig,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from rippletwin.case.model import Rig, Segment
+from rippletwin.errors import InputError
 from rippletwin.pump.faults import Cylinder, Slipper
 from rippletwin.pump.outlets import ConstantPressure, Pipe
 from rippletwin.pump.simulation import PumpRipple, simulate
@@ -40,8 +41,9 @@ def simulate_state(
     the rig's back pressure. A faulty pump meets this orifice, so its mean pressure is lower. The
     second ripple is the flow into a constant pressure, which with the capacitance of the chambers
     can drive any line.
-    Raises ValueError for a sensor beyond the pipe's end.
+    Raises InputError for a sensor beyond the pipe's end.
     """
+    _require_sensors_in_pipe(rig, pipe_length)
 
     def ripple(outlet, faults=None) -> PumpRipple:
         return simulate(rig.pump, rig.fluid, speed_rpm, outlet, faults, samples)
@@ -56,3 +58,15 @@ def simulate_state(
         orifice = in_pipe.orifice
         in_pipe = ripple(Pipe(pipe, positions, orifice=orifice, back_pressure=behind), faults)
     return in_pipe, ripple(ConstantPressure(load_pressure), faults)
+
+
+def _require_sensors_in_pipe(rig: Rig, pipe_length: float) -> None:
+    """Raises InputError if the pipe of the fault data ends before a sensor."""
+    last = max(rig.sensors, key=lambda sensor: sensor.position)
+    if pipe_length < last.position:
+        raise InputError(
+            "config",
+            "faults.pipe_length",
+            f"{pipe_length} m ends before sensor {last.name} at {last.position} m",
+            f"Give at least {last.position}",
+        )
