@@ -10,16 +10,15 @@ largest resident memory that the kernel counted for it are printed.
 from __future__ import annotations
 
 import argparse
-import os
-import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import h5py
 import numpy as np
 import yaml
+
+from measured_command import run_measured
 
 SPEED_HZ, PISTONS, HARMONICS = 1000 / 60, 9, 24
 BLOCK = 2**20  # samples written at once
@@ -75,13 +74,9 @@ def main() -> None:
         samples = int(60 * options.minutes * options.rate)
         write_recording(case / "long.h5", samples, options.rate, options.sensors)
         (case / "rig.yaml").write_text(yaml.safe_dump(sheet(options.sensors)))
-        begin = time.perf_counter()
-        run = subprocess.Popen([sys.executable, "-m", "rippletwin", "check", folder])
-        _, status, used = os.wait4(run.pid, 0)
-        run.returncode = os.waitstatus_to_exitcode(status)
-        wall = time.perf_counter() - begin
-    print(f"{wall:.1f} s, CPU {used.ru_utime + used.ru_stime:.1f} s, {used.ru_maxrss / 1e6:.2f} GB")
-    sys.exit(run.returncode)
+        taken = run_measured([sys.executable, "-m", "rippletwin", "check", folder])
+    print(f"{taken.wall_s:.1f} s, CPU {taken.cpu_s:.1f} s, {taken.peak_kib / 1e6:.2f} GB")
+    sys.exit(taken.returncode)
 
 
 if __name__ == "__main__":

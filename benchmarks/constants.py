@@ -69,7 +69,7 @@ def explain_case(setting: str, case: Path, out: Path) -> None:
 
 def score(trial: Path, out: Path, setting: str, cases: list[str]) -> dict:
     """Counts over the cases: see the columns of `table`."""
-    from concealed.score import score_case
+    from concealed.score import named_effects, score_case
     from virtualrig.seal import open_seal_file
 
     rows = []
@@ -80,7 +80,7 @@ def score(trial: Path, out: Path, setting: str, cases: list[str]) -> dict:
         )
         truth = open_seal_file(trial / "seals" / f"{case}.json", trial / "keys" / case)
         row = score_case(truth, verdict, baselines)
-        established = [name for name in row["named"].split(" + ") if name]
+        established = named_effects(verdict)
         wrong = [name for name in row["wrong"].split(" + ") if name]
         z = [abs(each["z"]) for each in row["line_errors"]["corrected"]]
         rows.append(

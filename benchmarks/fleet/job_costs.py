@@ -7,12 +7,12 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryFile
 
 import rippletwin
+from measured_command import run_measured
 from rippletwin.case.load import load_case
 
 RIPPLETWIN = (sys.executable, "-m", "rippletwin")
@@ -26,27 +26,18 @@ def run_command(command: Sequence[str]) -> dict[str, float]:
     """
     threads = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
     with TemporaryFile() as printed:
-        began = time.monotonic()
-        process = subprocess.Popen(
+        taken = run_measured(
             command, stdout=printed, stderr=subprocess.STDOUT, env={**os.environ, **threads}
         )
-        _, status, usage = os.wait4(process.pid, 0)
-        wall = time.monotonic() - began
-        process.returncode = os.waitstatus_to_exitcode(status)
-        if process.returncode:
+        if taken.returncode:
             printed.seek(0)
             told = printed.read().decode(errors="replace")[-2000:]
-            raise RuntimeError(f"{' '.join(command)} ended with {process.returncode}: {told}")
+            raise RuntimeError(f"{' '.join(command)} ended with {taken.returncode}: {told}")
     return {
-        "cpu_s": round(usage.ru_utime + usage.ru_stime, 2),
-        "wall_s": round(wall, 2),
-        "peak_mb": round(usage.ru_maxrss * resource_unit() / 1e6),
+        "cpu_s": round(taken.cpu_s, 2),
+        "wall_s": round(taken.wall_s, 2),
+        "peak_mb": round(taken.peak_kib * 1024 / 1e6),
     }
-
-
-def resource_unit() -> int:
-    """Bytes of one unit of ru_maxrss."""
-    return 1 if sys.platform == "darwin" else 1024
 
 
 def measure(case: Path, out: Path, repeats: int) -> dict:

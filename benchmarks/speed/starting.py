@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 import tempfile
@@ -13,6 +12,7 @@ import numpy as np
 import yaml
 
 from check_long_recording import sheet, write_recording
+from measured_command import run_measured
 from speed.result import Claim, Result, Table
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -40,16 +40,14 @@ def started_seconds(code: str, arguments: list[str], rounds: int) -> np.ndarray:
     """Processor seconds (rounds,) of a line of Python, in a new process each time."""
     taken = []
     for _ in range(rounds + 1):  # the first reads files that are not in the page cache
-        run = subprocess.Popen(
+        run = run_measured(
             [sys.executable, "-c", code, *arguments],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        _, status, used = os.wait4(run.pid, 0)
-        run.returncode = os.waitstatus_to_exitcode(status)
         if run.returncode:
             raise RuntimeError(f"{code!r} {' '.join(arguments)} ended with {run.returncode}")
-        taken.append(used.ru_utime + used.ru_stime)
+        taken.append(run.cpu_s)
     return np.array(taken[1:])
 
 

@@ -42,6 +42,7 @@ from virtualrig.population import (
     TOLERANCE,
     make_bench,
     record_planned,
+    ripple_change,
     ripple_of,
 )
 from virtualrig.recorder import Point
@@ -233,7 +234,7 @@ def change_by_effects(drawn: DrawnRig, after: np.ndarray) -> float:
         ]
     }
     before = settled_ripple(make_bench(drawn, plain, plan.kelvin), plan.point)
-    return float(np.linalg.norm(after - before) / np.linalg.norm(before))
+    return ripple_change(before, after)
 
 
 def _has_effects(true: dict) -> bool:

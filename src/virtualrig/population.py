@@ -105,7 +105,7 @@ def change_of_state(
     sensing = bench.rig.sensing
     changed = plan.line is not None
     healthy = settle(make_bench(drawn, drawn.true, plan.kelvin) if changed else bench, ())
-    change = weakest = ripple_change(healthy, orbit, sensing)
+    change = weakest = ripple_change(ripple_of(healthy, sensing), ripple_of(orbit, sensing))
     if len(plan.faults) > 1:
         alone = [settle(bench, (fault,)) for fault in plan.faults]
         scale = ripple_norm(healthy, sensing)
@@ -124,10 +124,9 @@ def instrument_of(nuisance: dict) -> Instrument:
     return Instrument(offset=tuple(nuisance["offset"]), **{name: nuisance[name] for name in names})
 
 
-def ripple_change(before: Orbit, after: Orbit, sensing: tuple) -> float:
-    """Norm of the change of the sensed ripple over that of the ripple before."""
-    ripples = [ripple_of(orbit, sensing) for orbit in (before, after)]
-    return float(np.linalg.norm(ripples[1] - ripples[0]) / np.linalg.norm(ripples[0]))
+def ripple_change(before: np.ndarray, after: np.ndarray) -> float:
+    """Norm of the change of a sensed ripple (sensors, records) over that of the ripple before."""
+    return float(np.linalg.norm(after - before) / np.linalg.norm(before))
 
 
 def ripple_norm(orbit: Orbit, sensing: tuple, less: Orbit | None = None) -> float:

@@ -35,7 +35,7 @@ def crank_motion(turn, drift, ripple):
 
 @njit(cache=True)
 def tabulate_stations(chambers, ports, speed, ripple, steps, dt):
-    """`stations` of `run` for steps 1 to `steps`: (steps, pistons, 4), as every revolution has."""
+    """`stations` of `run` for steps 1 to `steps`: (steps, pistons, 4), of any revolution."""
     stations = np.empty((steps, len(chambers), 4))
     for step in range(1, steps + 1):
         angle, rate = crank_motion(speed * (step * dt), 1.0, ripple)

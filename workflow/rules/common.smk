@@ -30,6 +30,7 @@ check_names("architectures", config["architectures"], list(ARCHITECTURES))
 
 RESULTS = config["results"]
 PAPER = local(os.path.relpath(ROOT / "resources/paper_accuracy.csv"))
+EFFECT_FILES = local(config["explain"]["effects"])  # a user's own, in no storage
 
 # The virtual rig's command is found even where the environment is not activated.
 shell.prefix(f"PATH={shlex.quote(os.path.dirname(sys.executable))}:$PATH; ")

@@ -3,7 +3,7 @@ rule explain:
     input:
         rig=rig_sheet(),
         recordings=recordings("fit"),
-        effects=local(config["explain"]["effects"]),
+        effects=EFFECT_FILES,
         source=scripts_sources("explain.py"),
     output:
         verdict=report(

@@ -3,7 +3,7 @@ rule flow_sensor:
     input:
         recorded=rules.cut_windows.output.windows,
         twin=twin_of,
-        effects=local(config["explain"]["effects"]),
+        effects=EFFECT_FILES,
         source=scripts_sources("flow_sensor.py"),
     output:
         directory(f"{RESULTS}/recordings/flow_{{twin}}.zarr"),

@@ -5,7 +5,7 @@ rule propagate:
         healthy=f"{RESULTS}/faults/H.zarr",
         recordings=rules.cut_windows.output.windows,
         twin=twin_of,
-        effects=local(config["explain"]["effects"]),
+        effects=EFFECT_FILES,
         source=scripts_sources("propagate.py"),
     output:
         directory(f"{RESULTS}/propagated/{{twin}}/{{state}}.zarr"),

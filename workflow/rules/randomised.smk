@@ -3,7 +3,7 @@ rule randomised_signals:
     input:
         recorded=rules.cut_windows.output.windows,
         twin=lambda wildcards: twin_of(DATASETS[wildcards.dataset]),
-        effects=local(config["explain"]["effects"]),
+        effects=EFFECT_FILES,
         source=scripts_sources("randomised_signals.py"),
     output:
         learnt=directory(f"{RESULTS}/randomised/{{dataset}}/learnt.zarr"),

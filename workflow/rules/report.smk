@@ -71,7 +71,7 @@ rule report_cost:
         table=rules.accuracy_table.output.table,
         verdict=rules.explain.output.verdict,
         twin=rules.explain.output.twin,
-        effects=local(config["explain"]["effects"]),
+        effects=EFFECT_FILES,
         source=scripts_sources("report_cost.py"),
     output:
         report(

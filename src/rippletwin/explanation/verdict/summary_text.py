@@ -123,9 +123,13 @@ def _found(
         f"{_capital(name_effect(entry['effect'].name))} is always present: it is included unless "
         "the data contradict it."
         for entry in certain
-        if entry["effect"].certain(e.rig, entry["place"])
+        if _is_always_present(e, entry)
     ]
     return sentences
+
+
+def _is_always_present(e: Explanation, entry: dict) -> bool:
+    return entry["effect"].certain(e.rig, entry["place"])
 
 
 def _level(levels: Mapping[tuple[str, str], str], entry: dict) -> str:
@@ -138,17 +142,16 @@ def _lesser(e: Explanation, entries: Sequence[dict], levels: Mapping) -> list[st
 
     What is always present is not doubted, whatever these recordings say of it.
     """
-    certain = [entry for entry in entries if entry["effect"].certain(e.rig, entry["place"])]
+    always = [entry for entry in entries if _is_always_present(e, entry)]
+    doubted = [entry for entry in entries if not _is_always_present(e, entry)]
     sentences = []
     for level, why in LESSER.items():
-        own = [
-            entry for entry in entries if _level(levels, entry) == level and entry not in certain
-        ]
+        own = [entry for entry in doubted if _level(levels, entry) == level]
         if own:
             sentences.append(f"{_capital(level)} only: {_effects(e, own)}. {why}")
-    if certain:
+    if always:
         sentences.append(
-            f"{_capital(_effects(e, certain))}: always present, so included; these recordings "
+            f"{_capital(_effects(e, always))}: always present, so included; these recordings "
             "alone do not establish it."
         )
     return sentences
