@@ -23,6 +23,7 @@ GROUPS = {
     "single effects": ("single", "indistinguishable"),
     "pairs": ("pair",),
     "outside the library": ("outside",),
+    "all": tuple(KINDS),
 }
 
 
@@ -85,6 +86,7 @@ def _origin(rows: list[dict], origin: dict) -> list[str]:
     counts = Counter(row["kind"] for row in rows)
     changed = " The tool has changes that are not committed." if origin["not_committed"] else ""
     seconds = np.array([row["seconds"] for row in rows])
+    points = np.array([row["points"] for row in rows])
     return [
         f"{len(rows)} cases, drawn from tree `{origin['commit'][:12]}` and trial number "
         f"{origin['number']} by `snakemake concealed`.{changed} The protocol is in "
@@ -93,7 +95,9 @@ def _origin(rows: list[dict], origin: dict) -> list[str]:
         *_table(("kind", "cases", "what"),
                 [(f"`{kind}`", str(counts[kind]), what) for kind, what in KINDS.items()]),
         f"The tool took {np.median(seconds):.0f} s a case (median, one process; "
-        f"{seconds.min():.0f} to {seconds.max():.0f} s).",
+        f"{seconds.min():.0f} to {seconds.max():.0f} s, 95 % of the cases at most "
+        f"{np.quantile(seconds, 0.95):.0f} s) and {np.median(seconds / points):.0f} s for each "
+        "operating point (median).",
         "",
     ]  # fmt: skip
 

@@ -79,6 +79,15 @@ def test_every_kind_counts_in_its_own_scores(rows):
     assert rates["Effects outside the library: established, not there"] == Rate(1, 1)
 
 
+def test_established_effects_are_counted_over_all_kinds(rows):
+    """Five leaks are established; those where none is concealed and outside the library are not
+    there. Both single effects change the ripple by 10 % or more, and one is named."""
+    rates = {score.what: score.rate for score in score_table(rows)}
+    assert rates["Established effects: truly there"] == Rate(3, 5)
+    large = "Single effects that change the ripple by 10 % or more: effect or its class named"
+    assert rates[large] == Rate(1, 2)
+
+
 def test_bins_hold_every_case_once(rows):
     """Counts over the bins of change and of probability add up to the cases; a probability of one
     lies in the last bin."""

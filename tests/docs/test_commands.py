@@ -63,6 +63,14 @@ NOT_RUN = {
         "it needs a browser",
         "python docs/figures/report.py --help",
     ),
+    "python benchmarks/concealed_errors.py results/concealed": (
+        "it needs a finished trial",
+        "python benchmarks/concealed_errors.py --help",
+    ),
+    "python benchmarks/constants.py results/concealed constants --cases 8": (
+        "it needs a finished trial",
+        "python benchmarks/constants.py --help",
+    ),
     "python benchmarks/third_party_tubes.py 43 tubes": (
         "openwind is not part of the environment",
         "python benchmarks/third_party_tubes.py --help",
