@@ -35,7 +35,7 @@ CONSTANTS = {
         "CORRELATION_HZ",
     ),
     "amplitude of a free correction": ("explanation.localise.smooth_corrections", "AMPLITUDES"),
-    "least model error": ("calibration.posterior", "MIN_MODEL_ERROR"),
+    "least model error": ("calibration.error_sizes", "MIN_MODEL_ERROR"),
     "error of the ripple's size": ("calibration.posterior", "SIZE_SD"),
     "error of products of harmonics": ("calibration.posterior", "PRODUCT_ERROR"),
     "smoothness of the ripple's error": ("calibration.smooth_source", "CORRELATION_HZ"),

@@ -28,7 +28,7 @@ def test_constants_derived_from_a_scaled_one_follow():
         f"import sys; sys.path.insert(0, {str(BENCHMARKS)!r})\n"
         "from scaled_constants import scale_constant\n"
         "scale_constant('rippletwin.calibration.posterior', 'MIN_MODEL_ERROR', 0.5)\n"
-        "from rippletwin.calibration.posterior import MODEL_ERRORS\n"
+        "from rippletwin.calibration.error_sizes import MODEL_ERRORS\n"
         "from rippletwin.explanation.thresholds import GOOD_MODEL_ERROR\n"
         "from rippletwin.explanation.checks import alarms\n"
         "print(MODEL_ERRORS[0], GOOD_MODEL_ERROR, alarms.MIN_MODEL_ERROR)"

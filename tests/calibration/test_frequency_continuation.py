@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.frequency_continuation import fit_hypothesis, refine
-from rippletwin.calibration.posterior import MIN_MODEL_ERROR, Posterior
+from rippletwin.calibration.posterior import Posterior
 from rippletwin.explanation.fit_starts import scan_starts
 from rippletwin.twin.twin import Twin
 from synthetic_effects import AIR, HOSE, LEAK, MUCH_AIR, TRUTH, VOLUME

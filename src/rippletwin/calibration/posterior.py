@@ -1,20 +1,27 @@
 """Error model of explaining: smooth source errors, a least model error, derivatives.
 
-The errors are noise with a covariance C, a relative model error delta common to all sensors, and
-the error of a nominal source, relative and along the prediction h, in two parts:
+The readings are d = S h + e. h is what the line makes of a nominal source, and S is the factor by
+which the real source differs from it. e is noise with a covariance C and a relative model error
+delta common to all sensors. At each frequency
 
-    E[e e^H] = C + (delta^2 m + lambda^2 n) I + (sigma^2 I + tau^2 K) o g h (g h)^H + s^2 h h^H
+    S = [1 + g (exp(eps) - 1)] (1 + g w),
 
-m is the mean square of the measured harmonic over the sensors. sigma is the part of the source's
-error that differs from harmonic to harmonic. tau is the part that is smooth in frequency, as a
-wrong bulk modulus or port timing makes it where these are no parameters of the twin. Between
-frequencies f and f' of recordings o and p
+with two errors. w differs from harmonic to harmonic, with standard deviation sigma. eps is smooth
+in frequency, as unstated relief grooves or free air, a wrong bulk modulus or port timing make it.
+It is complex: an error of amplitude and of phase. Between frequencies f and f' of recordings o and
+p its covariance is
 
-    K = [1 + (1 + f f'/f0^2) exp(-(f - f')^2/(2 l^2))] (1/2 + 1/2 [o = p]),     f0 = l = 1 kHz.
+    tau^2 [1 + (1 + f f'/f0^2) exp(-(f - f')^2/(2 l^2))] (1/2 + 1/2 [o = p]) + s^2, f0 = l = 1 kHz.
 
 * One part is the same at all frequencies: the size of the ripple may be wrong.
-* One part grows with frequency: an error of timing is an error of phase.
+* One part grows with frequency: an error of timing is an error of phase, and edges of ports that
+  are less sharp than stated take most from the highest harmonics.
 * Half of both is common to all operating points: the same pump is modelled wrongly.
+
+eps stands in an exponent because a source is often several times smaller than the nominal one. Were
+it a normal error of the nominal source, that would have to be large to allow for it, and the
+likeliest line would be the one that makes of the nominal source the least ripple: with a pump's
+volume that is too large, and a pipe before it that is too short.
 
 A smooth error resembles an effect at the pump, friction or a hose. Without tau the standard
 deviations of those effects would be several times too small, and an effect at the pump would be
@@ -35,49 +42,60 @@ n is the mean square over the sensors of what an orifice's products of harmonics
 prediction. They are wrong by lambda, several times more than the harmonics themselves, and come
 from the load and not along h.
 
-The covariance is that of the prediction, in the sum of squares and in the log determinant. With the
-data in its place in the first a shrinking model would fit anything. With the data in its place in
-the second the likeliest prediction would be too large, by the factor 1 + sigma^2 where the source's
-error is all there is. Explaining adds a least delta and the choice to be source-free: sigma is
-infinite, which projects amplitude and phase of the source out at every frequency. All observations
-stand side by side.
+S is expanded about the most likely smooth error, S = mean + factor (g eps + g w), so that eps and w
+are integrated out in closed form:
+
+    d - mean h ~ N(0, C + (delta^2 m + lambda^2 n) I + (sigma^2 I + tau^2 K) o p p^H), p = g factor h,
+
+m is the mean square of the measured harmonic over the sensors, K the covariance above. The
+expansion and this covariance are held where the errors were estimated last, and a descent
+estimates them after each step: iteratively reweighted least squares (Jorgensen 2012, Encyclopedia
+of Environmetrics). A descent that could change the covariance would make the prediction small,
+because that makes the errors of its source small. Explaining adds a least delta and the choice to
+be source-free: sigma is infinite, which projects amplitude and phase of the source out at every
+frequency. All observations stand side by side.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from rippletwin.calibration.error_costs import error_costs
 from rippletwin.calibration.error_model import ObservedRipple
+from rippletwin.calibration.error_sizes import ErrorSizes, most_likely_sizes
 from rippletwin.calibration.likelihood import to_predicted_quantity
-from rippletwin.calibration.smooth_source import SmoothSourceError, source_scale
+from rippletwin.calibration.smooth_source import SmoothSourceError, SourceExpansion, source_scale
+from rippletwin.calibration.source_expansion import (
+    SourceData,
+    most_likely_expansion,
+    whiten_with_source,
+)
 from rippletwin.calibration.whitening import NoiseBasis, Whitening, as_real
 from rippletwin.spectra.frequency_selection import select_below
 from rippletwin.twin.forward_jacobian import STEP, DifferentiableForward
 
-MIN_MODEL_ERROR = 0.004
-"""Least relative model error. However small the noise, no twin of a real line is better: the speed
-wanders while harmonics are averaged, the orifice's exponent is not exactly 1/2, a mesh is finite.
-"""
-
-MODEL_ERRORS = np.geomspace(MIN_MODEL_ERROR, 1.5, 9)
-SOURCE_SDS = np.array([0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0])
-"""Values of sigma. Relief grooves and free air that a data sheet does not state change a ripple by
-20 to 80 % (docs/explanation/pump.md). The least is below what any pump model reaches: a sigma that
-is larger than the truth would make the likeliest prediction too small."""
-SMOOTH_SDS = np.array([0.003, 0.01, 0.03, 0.1, 0.3])  # values of tau
 FIRST_SOURCE_SD = 0.03  # before any residual is known
-FINER_ERRORS = 7  # values between two neighbours of a grid
 SIZE_SD, SIZE_SD_OF_PUMP = 0.03, 0.01  # s, and s where the pump's numbers are parameters
 PRODUCT_ERROR = 0.2  # lambda
+TINY = 1e-300
+SOURCE_STEPS = 8  # towards the most likely smooth error, before and after its size is estimated
 
-DETERMINANT_OFFSET = 50.0
-"""A frequency, added to the log determinant to make it half a square. It is above what a free
-source takes away, and leaves the curvature to the other residuals."""
+
+class _Held(NamedTuple):
+    """What a descent does not change between two estimates of the errors.
+
+    prediction   (S, F), rotated: the covariance is that of it
+    source       (F,) the most likely source over the nominal one
+    offset       (S, F), rotated: expected readings less source times prediction
+    """
+
+    prediction: np.ndarray
+    source: np.ndarray
+    offset: np.ndarray
 
 
 class Posterior:
@@ -125,6 +143,9 @@ class Posterior:
         )
         # By which sigma is multiplied: nothing is unknown of a known source, all of a free one.
         self._source_scale = np.where(self._known, 0.0, np.where(self._free, np.inf, self._scale))
+        self._expansion = self._smooth.without_error()
+        self._held: _Held | None = None
+        self._kept: tuple[ErrorSizes, Whitening] | None = None  # that covariance at some sizes
         self.count = 2 * (self.values.size - int(np.sum(self._free)))
         self._pressures = all(o.kind != "input_impedance" for o in data)
 
@@ -133,11 +154,18 @@ class Posterior:
         self._rotated = self._rotate(values)
         self.power = np.mean(np.abs(values) ** 2, axis=0)
 
+    def make_errors_independent(self, prediction: np.ndarray) -> None:
+        """Add the smooth part of the source's error to the independent part, at a prediction."""
+        self.source_sd = float(np.hypot(self.source_sd, self.smooth_sd))
+        self.smooth_sd, self._expansion = 0.0, self._smooth.without_error()
+        self._hold(prediction)
+
     def with_values(self, values: np.ndarray) -> Posterior:
         """The same error model, at the present errors, of other measured `values` (S, F), given in
         the quantity that is predicted. It shares the forward model."""
         other = copy(self)
         other._set_values(values)
+        other._kept = None
         return other
 
     def below(self, max_frequency_hz: float) -> Posterior:
@@ -178,30 +206,51 @@ class Posterior:
         """Residuals (..., S, F) of unit variance and the log determinant of their covariance.
 
         Leading dimensions of `prediction` (..., S, F) are those of many predictions. The
-        covariance then is that of the first.
+        covariance is that where the errors were estimated last; before any estimate, that of the
+        first prediction.
         """
         whitening = self._whitening(prediction[(0,) * (prediction.ndim - 2)])
-        return whitening.apply(self._rotated - self._rotate(prediction)), whitening.log_determinant
+        return whitening.apply(self._residual(prediction)), whitening.log_determinant
 
-    def constant_log_determinant(self) -> float:
-        """What of the log determinant does not depend on the prediction; it is in no residual of
-        `linearise`."""
-        offset = DETERMINANT_OFFSET * len(self.power)
-        return float(np.sum(np.log(self._variance(self.model_error)))) - offset
+    def _residual(self, prediction: np.ndarray) -> np.ndarray:
+        """Rotated readings less the expected ones, (..., S, F)."""
+        h = self._rotate(prediction)
+        if self._held is None:
+            return self._rotated - self._expansion.mean * h
+        return self._rotated - self._held.offset - self._held.source * h
 
     def _variance(self, model_error) -> np.ndarray:
         """Variance (..., S, F) of the readings without the share of the source."""
         return self._noise.variances + self._products + model_error**2 * self.power
 
-    def _whitening(self, prediction: np.ndarray) -> Whitening:
-        """Whitening by the covariance that a prediction (S, F) implies."""
-        return Whitening(
-            self._rotate(prediction),
+    def _source_data(self, rotated_prediction: np.ndarray) -> SourceData:
+        return SourceData(
+            self._rotated,
+            rotated_prediction,
             np.sqrt(self._variance(self.model_error)),
             self.source_sd * self._source_scale,
-            self._smooth.frequencies,
-            self._smooth.sds(self.smooth_sd)[:, None] * self._smooth.basis,
+            self._smooth,
+            self.smooth_sd,
         )
+
+    def _whitening(self, prediction: np.ndarray) -> Whitening:
+        """Whitening by the covariance that is held, or by that of a prediction (S, F)."""
+        if self._held is None:
+            data = self._source_data(self._rotate(prediction))
+            return whiten_with_source(data, self._expansion)
+        sizes = ErrorSizes(self.smooth_sd, self.source_sd, self.model_error)
+        if self._kept is None or self._kept[0] != sizes:
+            data = self._source_data(self._held.prediction)
+            self._kept = sizes, whiten_with_source(data, self._expansion)
+        return self._kept[1]
+
+    def _hold(self, prediction: np.ndarray) -> None:
+        """Hold source and covariance of a prediction (S, F)."""
+        self._held = self._kept = None
+        whitening, h = self._whitening(prediction), self._rotate(prediction)
+        whitened = whitening.apply(self._residual(prediction))
+        source = self._source(prediction, whitening, whitened, independent=False)
+        self._held = _Held(h, source, (self._expansion.mean - source) * h)
 
     def draw(self, prediction: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Values (S, F) drawn from the error model around a prediction.
@@ -214,9 +263,10 @@ class Posterior:
 
         h = self.best_source(prediction)
         relative = np.where(self._known | self._free, 0.0, self.source_sd * self._scale)
-        source = 1.0 + relative * normal(h.shape[1])
         sds = self._smooth.sds(self.smooth_sd)
-        source[self._smooth.frequencies] += (sds * normal(len(sds))) @ self._smooth.basis
+        smooth = self._smooth.expand(sds * normal(len(sds)))
+        source = smooth.mean + smooth.factor * self._smooth.relative_error(smooth.amplitudes)
+        source = source * (1.0 + relative * normal(h.shape[1]))
         error = np.sqrt(self._variance(self.model_error)) * normal(*h.shape)
         return source * h + np.einsum("fsk,kf->sf", np.conj(self._noise.rotation), error)
 
@@ -234,42 +284,56 @@ class Posterior:
         linear = self.forward.linear_load(theta)
         if linear is not None:
             self._products = PRODUCT_ERROR**2 * np.mean(np.abs(prediction - linear) ** 2, axis=0)
-        h = self._rotate(prediction)
-        any_nominal = len(self._smooth.frequencies) > 0
-        grids = [
-            SMOOTH_SDS if any_nominal else np.zeros(1),
-            SOURCE_SDS if any_nominal else SOURCE_SDS[:1],
-            MODEL_ERRORS,
-        ]
-        errors = [self.smooth_sd, self.source_sd, self.model_error]
-        if near:
-            grids = [_neighbours(grid, value) for grid, value in zip(grids, errors)]
-        best = self._likeliest_errors(h, grids, scale)
-        errors = [float(grid[k]) for grid, k in zip(grids, best)]
-        for axis in (2, 1, 0):  # then each alone, between its neighbours on the grid
-            finer = [np.array([value]) for value in errors]
-            finer[axis] = _between_neighbours(grids[axis], best[axis])
-            errors[axis] = float(finer[axis][self._likeliest_errors(h, finer, scale)[axis]])
-        self.smooth_sd, self.source_sd, self.model_error = errors
+        self._held = self._kept = None
+        if not near:
+            self._expansion = self._first_expansion(prediction)
+            self._estimate_sizes(prediction, scale, near=False)
+            self._expand_source(prediction, SOURCE_STEPS)
+        self._estimate_sizes(prediction, scale, near=True)
+        self._expand_source(prediction, 1 if near else SOURCE_STEPS)
         self.model_error = min(self.model_error, self.max_model_error)
+        self._hold(prediction)
 
-    def _likeliest_errors(self, h: np.ndarray, grids: Sequence, scale: float) -> tuple[int, ...]:
-        """Indices of the likeliest tau, sigma and delta of three `grids`."""
-        taus, sds, model_errors = grids
-        cost = error_costs(
-            self._rotated - h,
-            h,
-            self._noise.variances + self._products,
-            self.power,
-            self._source_scale,
-            self._smooth.frequencies,
-            self._smooth.basis,
-            model_errors,
-            sds,
-            self._smooth.sds(taus),
-            scale,
-        )
-        return tuple(int(k) for k in np.unravel_index(np.argmin(cost), cost.shape))
+    def _first_expansion(self, prediction: np.ndarray) -> SourceExpansion:
+        """The expansion about the smooth part of the source that the readings alone suggest."""
+        if not len(self._smooth.frequencies):
+            return self._smooth.without_error()
+        variance = self._variance(self.model_error)
+        size = np.sum(np.abs(self._rotate(prediction)) ** 2 / variance, axis=0)
+        ratio = self._best_amplitude(prediction)
+        own = np.maximum(size * np.abs(ratio) ** 2, TINY)
+        return self._smooth.expand_near(ratio, 1.0 / own)
+
+    def _expand_source(self, prediction: np.ndarray, steps: int) -> None:
+        """Move the expansion to the most likely smooth error, in at most `steps` steps."""
+        if len(self._smooth.frequencies):
+            data = self._source_data(self._rotate(prediction))
+            self._expansion = most_likely_expansion(data, self._expansion, steps)
+
+    def _estimate_sizes(self, prediction: np.ndarray, scale: float, near: bool) -> None:
+        """Set the sizes of the errors to their most likely values at the present expansion."""
+        h, residual = self._rotate(prediction), self._residual(prediction)
+
+        def costs(grids):
+            taus, sds, model_errors = grids
+            return error_costs(
+                residual,
+                h * self._expansion.factor,
+                self._noise.variances + self._products,
+                self.power,
+                self._source_scale,
+                self._smooth.frequencies,
+                self._smooth.basis,
+                model_errors,
+                sds,
+                self._smooth.sds(taus),
+                scale,
+            )
+
+        present = ErrorSizes(self.smooth_sd, self.source_sd, self.model_error)
+        any_nominal = len(self._smooth.frequencies) > 0
+        sizes = most_likely_sizes(costs, present, any_nominal, near)
+        self.smooth_sd, self.source_sd, self.model_error = sizes
 
     @property
     def needs_full_jacobian(self) -> bool:
@@ -284,9 +348,8 @@ class Posterior:
     def linearise(self, theta: np.ndarray, prediction: np.ndarray, besides=None):
         """Residual r (N,) and its Jacobian J (N, P) at the present errors.
 
-        The first 2 S F residuals are the whitened ones, of unit variance. The next is that of the
-        log determinant. theta follows where it has a prior. The gradient of the `objective` is
-        J^T r, and half the square sum is the objective without `constant_log_determinant`.
+        The first 2 S F residuals are the whitened ones, of unit variance. theta follows where it
+        has a prior. Half the square sum is the objective without the log determinant.
 
         besides   (B, S, F) further directions of the prediction, B more columns of the Jacobian
         """
@@ -307,23 +370,16 @@ class Posterior:
     def whiten_slopes(
         self, prediction: np.ndarray, slopes: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Residual (2 S F + 1,) and its derivatives (B, 2 S F + 1) at the present errors, given
-        those (B, S, F) of the prediction.
-
-        The last residual is sqrt(2 L + const), L the part of the log determinant that depends on
-        the prediction: half its square is L.
-        """
+        """Residual (2 S F,) and its derivatives (B, 2 S F) at the present errors, given those
+        (B, S, F) of the prediction."""
         whitening = self._whitening(prediction)
-        whitened = whitening.apply(self._rotated - self._rotate(prediction))
-        # The sum of squares is the least over the error of the source. Its gradient therefore is
-        # that with the source fixed at its most likely value, which multiplies every derivative.
-        moved = slopes * self._source(prediction, whitening, whitened)
-        columns = -as_real(whitening.apply(self._rotate(moved))).reshape(len(slopes), -1)
-        offset = DETERMINANT_OFFSET * len(self.power)
-        last = np.sqrt(2.0 * (whitening.source_log_determinant + offset))
-        last_column = whitening.determinant_slopes(self._rotate(slopes)) / last
-        residual = np.append(as_real(whitened).ravel(), last)
-        return residual, np.column_stack([columns, last_column])
+        whitened = whitening.apply(self._residual(prediction))
+        if self._held is None:
+            source = self._source(prediction, whitening, whitened, independent=False)
+        else:
+            source = self._held.source
+        columns = -as_real(whitening.apply(self._rotate(slopes * source)))
+        return as_real(whitened).ravel(), columns.reshape(len(slopes), -1)
 
     def best_source(self, prediction: np.ndarray) -> np.ndarray:
         """The prediction with every free source at its most likely amplitude, (S, F)."""
@@ -332,46 +388,35 @@ class Posterior:
     def most_likely_source(self, prediction: np.ndarray) -> np.ndarray:
         """Most likely source (F,) relative to that of the prediction, at the present errors."""
         whitening = self._whitening(prediction)
-        whitened = whitening.apply(self._rotated - self._rotate(prediction))
-        return self._source(prediction, whitening, whitened)
+        return self._source(prediction, whitening, whitening.apply(self._residual(prediction)))
 
-    def _source(self, prediction, whitening: Whitening, whitened: np.ndarray) -> np.ndarray:
-        """Most likely source (F,) relative to that of the prediction, given whitened residuals."""
-        pull = np.sum(np.conj(self._rotate(prediction)) * whitening.adjoint(whitened), axis=0)
-        error = (self.source_sd * self._scale) ** 2 * pull
-        error[self._smooth.frequencies] += self._smooth.most_likely(pull, self.smooth_sd)
-        source = 1.0 + np.where(self._known, 0.0, error)
+    def _source(
+        self, prediction, whitening: Whitening, whitened: np.ndarray, independent: bool = True
+    ) -> np.ndarray:
+        """Most likely source (F,) relative to that of the prediction, given whitened residuals.
+
+        independent   whether with its error that is independent from harmonic to harmonic
+        """
+        expansion = self._expansion
+        h = self._rotate(prediction) * expansion.factor
+        pull = np.sum(np.conj(h) * whitening.adjoint(whitened), axis=0)
+        error = self._smooth.relative_error(self._smooth.most_likely(pull, self.smooth_sd))
+        if independent:
+            error += np.where(self._known, 0.0, (self.source_sd * self._scale) ** 2 * pull)
+        source = expansion.mean + expansion.factor * error
         return self._with_free_amplitudes(source, prediction)
 
     def _with_free_amplitudes(self, source: np.ndarray, prediction: np.ndarray) -> np.ndarray:
         """`source` (F,), with that of a free source at its most likely amplitude."""
         if not self._free.any():
             return source
-        weight = 1.0 / self._variance(self.model_error)
-        h = self._rotate(prediction)
-        amplitude = np.sum(weight * np.conj(h) * self._rotated, 0) / np.maximum(
-            np.sum(weight * np.abs(h) ** 2, 0), 1e-300
-        )
-        return np.where(self._free, amplitude, source)
+        return np.where(self._free, self._best_amplitude(prediction), source)
+
+    def _best_amplitude(self, prediction: np.ndarray) -> np.ndarray:
+        """Factor (F,) of the source at each frequency with which a prediction fits best."""
+        weight, h = 1.0 / self._variance(self.model_error), self._rotate(prediction)
+        size = np.maximum(np.sum(weight * np.abs(h) ** 2, axis=0), TINY)
+        return np.sum(weight * np.conj(h) * self._rotated, axis=0) / size
 
     def _rotate(self, x: np.ndarray) -> np.ndarray:
         return self._noise.rotate(x)
-
-
-def _neighbours(grid: np.ndarray, value: float) -> np.ndarray:
-    """The values of an ascending grid next to `value`: the nearest, one below and one above."""
-    distances = np.abs(np.log(np.maximum(grid, 1e-9) / max(value, 1e-9)))
-    nearest = int(np.argmin(np.round(distances, 9)))  # rounding does not decide half way
-    return grid[max(nearest - 1, 0) : nearest + 2]
-
-
-def _between_neighbours(grid: np.ndarray, k: int) -> np.ndarray:
-    """Finer values of an ascending grid between the neighbours of its entry `k`."""
-    if len(grid) == 1:
-        return grid
-    return _finer_values(float(grid[max(k - 1, 0)]), float(grid[min(k + 1, len(grid) - 1)]))
-
-
-@lru_cache(maxsize=256)
-def _finer_values(low: float, high: float) -> np.ndarray:
-    return np.geomspace(low, high, FINER_ERRORS)

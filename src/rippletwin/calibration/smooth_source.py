@@ -2,21 +2,42 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 CORRELATION_HZ = 1000.0  # l and f0 of `posterior`
 MIN_HARMONIC = 0.01
 """Share of the strongest harmonic below which a harmonic of the source is uncertain by more than
 its own share."""
+LEAST_RATIO = 0.01  # of a measured to the nominal harmonic: below, noise may make it nothing
+FIRST_SMOOTH_SD, FIRST_INDEPENDENT_SD = 0.3, 0.1
+"""tau and sigma before any are estimated: those of pumps whose relief grooves and free air the data
+sheet does not state."""
 MIN_EIGENVALUE = 1e-3  # share of the kernel's largest eigenvalue; smaller ones are left out
 
 
+@dataclass(frozen=True)
+class SourceExpansion:
+    """The factor of a source with a smooth error, to first order about a value eps_0 of it:
+
+        1 + g (exp(eps) - 1) = mean + factor g eps,   factor = exp(eps_0).
+
+    amplitudes     (J,) complex, those of eps_0
+    factor, mean   (F,) complex; 1 at a frequency without a smooth error
+    """
+
+    amplitudes: np.ndarray
+    factor: np.ndarray
+    mean: np.ndarray
+
+
 class SmoothSourceError:
-    """Relative error of nominal sources: smooth parts of standard deviation tau, and one of size.
+    """Errors eps of nominal sources: smooth ones of standard deviation tau, and one of size.
 
     frequencies   (N,) indices of the frequencies that have it
-    basis         (J, N) amplitudes of unit variance times `sds` to relative errors; the last is the
-                  size of the ripple
+    basis         (J, N) amplitudes of unit variance times `sds` to relative errors g eps; the last
+                  is the size of the ripple
 
     frequency_hz, recording, scale   (F,) of all frequencies; scale is g
     nominal                          (F,) mask of those with a nominal source
@@ -26,9 +47,10 @@ class SmoothSourceError:
     def __init__(self, frequency_hz, recording, nominal, scale, size_sd: float):
         self.frequencies = np.flatnonzero(nominal)
         smooth = smooth_basis(frequency_hz[nominal], recording[nominal])
-        size = np.ones((1, smooth.shape[1]))
-        self.basis = np.concatenate([scale[nominal] * smooth, size])
-        self._size_sd = size_sd
+        self._functions = np.concatenate([smooth, np.ones((1, smooth.shape[1]))])
+        self._recording = np.asarray(recording)[nominal]
+        self._scale, self._size_sd, self._count = scale[nominal], size_sd, len(nominal)
+        self.basis = self._scale * self._functions
 
     def sds(self, tau) -> np.ndarray:
         """Standard deviations (..., J) of the amplitudes for tau (...)."""
@@ -38,9 +60,46 @@ class SmoothSourceError:
         return sds
 
     def most_likely(self, pull: np.ndarray, tau: float) -> np.ndarray:
-        """Most likely error (N,) given the derivative `pull` (F,) of the log likelihood by it."""
-        amplitudes = self.sds(tau) ** 2 * (self.basis @ pull[self.frequencies])
-        return self.basis.T @ amplitudes
+        """Most likely amplitudes (J,) given the derivative `pull` (F,) of the log likelihood by the
+        relative error."""
+        return self.sds(tau) ** 2 * (self.basis @ pull[self.frequencies])
+
+    def relative_error(self, amplitudes: np.ndarray) -> np.ndarray:
+        """g eps (F,) of amplitudes (J,)."""
+        error = np.zeros(self._count, complex)
+        error[self.frequencies] = amplitudes @ self.basis
+        return error
+
+    def expand(self, amplitudes: np.ndarray) -> SourceExpansion:
+        """The expansion about the error of amplitudes (J,)."""
+        factor, mean = np.ones((2, self._count), complex)
+        error = amplitudes @ self._functions
+        factor[self.frequencies] = np.exp(error)
+        mean[self.frequencies] = 1.0 - self._scale * (1.0 - np.exp(error) * (1.0 - error))
+        return SourceExpansion(amplitudes, factor, mean)
+
+    def without_error(self) -> SourceExpansion:
+        """The expansion about no error."""
+        return self.expand(np.zeros(len(self.basis), complex))
+
+    def expand_near(self, ratio: np.ndarray, variance: np.ndarray) -> SourceExpansion:
+        """The expansion about the smooth part of the measured over the nominal source.
+
+        ratio, variance   (F,) complex ratio and its relative variance
+
+        Along each recording the phase is continued from harmonic to harmonic: without that, the
+        error of a source that turns by more than half a turn would be taken for a small one.
+        """
+        at = self.frequencies
+        ratio = 1.0 + (ratio[at] - 1.0) / self._scale
+        phase = np.angle(ratio)
+        for recording in np.unique(self._recording):
+            own = self._recording == recording
+            phase[own] = np.unwrap(phase[own])
+        error = np.log(np.maximum(np.abs(ratio), LEAST_RATIO)) + 1j * phase
+        columns = self._functions / (FIRST_INDEPENDENT_SD**2 + variance[at])
+        precision = columns @ self._functions.T + np.diag(self.sds(FIRST_SMOOTH_SD) ** -2.0)
+        return self.expand(np.linalg.solve(precision, columns @ error))
 
 
 def smooth_basis(frequency_hz: np.ndarray, recording: np.ndarray) -> np.ndarray:

@@ -34,7 +34,7 @@ from functools import partial
 
 from threadpoolctl import threadpool_limits
 
-from rippletwin.calibration.posterior import MIN_MODEL_ERROR
+from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.case.model import Case, Recording, Rig
 from rippletwin.errors import InputError
 from rippletwin.explanation.checks.alarms import fit_each_observation, read_alarms

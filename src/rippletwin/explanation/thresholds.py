@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit
-from rippletwin.calibration.posterior import MIN_MODEL_ERROR
 from rippletwin.case.model import Rig
 from rippletwin.twin.effects.base import Effect, Place
 

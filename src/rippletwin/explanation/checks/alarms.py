@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
+from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit
-from rippletwin.calibration.posterior import MIN_MODEL_ERROR
 from rippletwin.explanation.fit_jobs import FitJob, FromTheta, Workers
 from rippletwin.explanation.localise.smooth_corrections import (
     NONE,

@@ -25,7 +25,8 @@ from functools import cached_property
 
 import numpy as np
 
-from rippletwin.calibration.posterior import FIRST_SOURCE_SD, MIN_MODEL_ERROR, Posterior
+from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
+from rippletwin.calibration.posterior import FIRST_SOURCE_SD, Posterior
 from rippletwin.case.model import Rig
 from rippletwin.explanation.search.stepwise_search import applicable_candidates
 from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR, MIN_LOG_BAYES_FACTOR
