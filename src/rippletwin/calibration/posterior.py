@@ -4,7 +4,7 @@ The readings are d = S h + e. h is what the line makes of a nominal source, and 
 which the real source differs from it. e is noise with a covariance C and a relative model error
 delta common to all sensors. At each frequency
 
-    S = [1 + g (exp(eps) - 1)] (1 + g w),
+    S = exp(eps) (1 + g w),
 
 with two errors. w differs from harmonic to harmonic, with standard deviation sigma. eps is smooth
 in frequency, as unstated relief grooves or free air, a wrong bulk modulus or port timing make it.
@@ -42,13 +42,13 @@ n is the mean square over the sensors of what an orifice's products of harmonics
 prediction. They are wrong by lambda, several times more than the harmonics themselves, and come
 from the load and not along h.
 
-S is expanded about the most likely smooth error, S = mean + factor (g eps + g w), so that eps and w
+S is expanded about the most likely smooth error, S = mean + factor (eps + g w), so that eps and w
 are integrated out in closed form:
 
-    d - mean h ~ N(0, C + (delta^2 m + lambda^2 n) I + (sigma^2 I + tau^2 K) o p p^H), p = g factor h,
+    d - mean h ~ N(0, C + (delta^2 m + lambda^2 n) I + (sigma^2 g^2 I + K) o p p^H),   p = factor h.
 
-m is the mean square of the measured harmonic over the sensors, K the covariance above. The
-expansion and this covariance are held where the errors were estimated last, and a descent
+m is the mean square of the measured harmonic over the sensors, K the covariance of eps. The smooth
+source and this covariance are held where the errors were estimated last, and a descent
 estimates them after each step: iteratively reweighted least squares (Jorgensen 2012, Encyclopedia
 of Environmetrics). A descent that could change the covariance would make the prediction small,
 because that makes the errors of its source small. Explaining adds a least delta and the choice to
@@ -138,7 +138,6 @@ class Posterior:
             self.forward.frequency_hz,
             self.forward.recording,
             nominal,
-            self._scale,
             SIZE_SD_OF_PUMP if twin.uncertain_pump else SIZE_SD,
         )
         # By which sigma is multiplied: nothing is unknown of a known source, all of a free one.
@@ -265,7 +264,7 @@ class Posterior:
         relative = np.where(self._known | self._free, 0.0, self.source_sd * self._scale)
         sds = self._smooth.sds(self.smooth_sd)
         smooth = self._smooth.expand(sds * normal(len(sds)))
-        source = smooth.mean + smooth.factor * self._smooth.relative_error(smooth.amplitudes)
+        source = smooth.mean + smooth.factor * self._smooth.error(smooth.amplitudes)
         source = source * (1.0 + relative * normal(h.shape[1]))
         error = np.sqrt(self._variance(self.model_error)) * normal(*h.shape)
         return source * h + np.einsum("fsk,kf->sf", np.conj(self._noise.rotation), error)
@@ -400,7 +399,7 @@ class Posterior:
         expansion = self._expansion
         h = self._rotate(prediction) * expansion.factor
         pull = np.sum(np.conj(h) * whitening.adjoint(whitened), axis=0)
-        error = self._smooth.relative_error(self._smooth.most_likely(pull, self.smooth_sd))
+        error = self._smooth.error(self._smooth.most_likely(pull, self.smooth_sd))
         if independent:
             error += np.where(self._known, 0.0, (self.source_sd * self._scale) ** 2 * pull)
         source = expansion.mean + expansion.factor * error

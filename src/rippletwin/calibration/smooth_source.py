@@ -21,7 +21,7 @@ MIN_EIGENVALUE = 1e-3  # share of the kernel's largest eigenvalue; smaller ones 
 class SourceExpansion:
     """The factor of a source with a smooth error, to first order about a value eps_0 of it:
 
-        1 + g (exp(eps) - 1) = mean + factor g eps,   factor = exp(eps_0).
+        exp(eps) = mean + factor eps,   factor = exp(eps_0),   mean = factor (1 - eps_0).
 
     amplitudes     (J,) complex, those of eps_0
     factor, mean   (F,) complex; 1 at a frequency without a smooth error
@@ -36,21 +36,20 @@ class SmoothSourceError:
     """Errors eps of nominal sources: smooth ones of standard deviation tau, and one of size.
 
     frequencies   (N,) indices of the frequencies that have it
-    basis         (J, N) amplitudes of unit variance times `sds` to relative errors g eps; the last
-                  is the size of the ripple
+    basis         (J, N) amplitudes of unit variance times `sds` to errors eps; the last is the size
+                  of the ripple
 
-    frequency_hz, recording, scale   (F,) of all frequencies; scale is g
-    nominal                          (F,) mask of those with a nominal source
-    size_sd                          standard deviation s of the size
+    frequency_hz, recording   (F,) of all frequencies
+    nominal                   (F,) mask of those with a nominal source
+    size_sd                   standard deviation s of the size
     """
 
-    def __init__(self, frequency_hz, recording, nominal, scale, size_sd: float):
+    def __init__(self, frequency_hz, recording, nominal, size_sd: float):
         self.frequencies = np.flatnonzero(nominal)
         smooth = smooth_basis(frequency_hz[nominal], recording[nominal])
-        self._functions = np.concatenate([smooth, np.ones((1, smooth.shape[1]))])
+        self.basis = np.concatenate([smooth, np.ones((1, smooth.shape[1]))])
         self._recording = np.asarray(recording)[nominal]
-        self._scale, self._size_sd, self._count = scale[nominal], size_sd, len(nominal)
-        self.basis = self._scale * self._functions
+        self._size_sd, self._count = size_sd, len(nominal)
 
     def sds(self, tau) -> np.ndarray:
         """Standard deviations (..., J) of the amplitudes for tau (...)."""
@@ -64,19 +63,16 @@ class SmoothSourceError:
         relative error."""
         return self.sds(tau) ** 2 * (self.basis @ pull[self.frequencies])
 
-    def relative_error(self, amplitudes: np.ndarray) -> np.ndarray:
-        """g eps (F,) of amplitudes (J,)."""
+    def error(self, amplitudes: np.ndarray) -> np.ndarray:
+        """eps (F,) of amplitudes (J,); 0 at a frequency without a smooth error."""
         error = np.zeros(self._count, complex)
         error[self.frequencies] = amplitudes @ self.basis
         return error
 
     def expand(self, amplitudes: np.ndarray) -> SourceExpansion:
         """The expansion about the error of amplitudes (J,)."""
-        factor, mean = np.ones((2, self._count), complex)
-        error = amplitudes @ self._functions
-        factor[self.frequencies] = np.exp(error)
-        mean[self.frequencies] = 1.0 - self._scale * (1.0 - np.exp(error) * (1.0 - error))
-        return SourceExpansion(amplitudes, factor, mean)
+        error = self.error(amplitudes)
+        return SourceExpansion(amplitudes, np.exp(error), np.exp(error) * (1.0 - error))
 
     def without_error(self) -> SourceExpansion:
         """The expansion about no error."""
@@ -91,14 +87,14 @@ class SmoothSourceError:
         error of a source that turns by more than half a turn would be taken for a small one.
         """
         at = self.frequencies
-        ratio = 1.0 + (ratio[at] - 1.0) / self._scale
+        ratio = ratio[at]
         phase = np.angle(ratio)
         for recording in np.unique(self._recording):
             own = self._recording == recording
             phase[own] = np.unwrap(phase[own])
         error = np.log(np.maximum(np.abs(ratio), LEAST_RATIO)) + 1j * phase
-        columns = self._functions / (FIRST_INDEPENDENT_SD**2 + variance[at])
-        precision = columns @ self._functions.T + np.diag(self.sds(FIRST_SMOOTH_SD) ** -2.0)
+        columns = self.basis / (FIRST_INDEPENDENT_SD**2 + variance[at])
+        precision = columns @ self.basis.T + np.diag(self.sds(FIRST_SMOOTH_SD) ** -2.0)
         return self.expand(np.linalg.solve(precision, columns @ error))
 
 

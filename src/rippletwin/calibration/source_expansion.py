@@ -73,7 +73,7 @@ def whiten_with_source(data: SourceData, expansion: SourceExpansion) -> Whitenin
 def _cost(data: SourceData, alone: Whitening, expansion: SourceExpansion) -> float:
     """Minus the log posterior of a smooth error but for a constant, the covariance of all else
     being that of `alone`; infinite where it is not finite."""
-    error = data.smooth.relative_error(expansion.amplitudes)
+    error = data.smooth.error(expansion.amplitudes)
     source = expansion.mean + expansion.factor * error
     r = alone.apply(data.values - data.prediction * source)
     prior = expansion.amplitudes / data.smooth.sds(data.tau)
