@@ -88,7 +88,8 @@ def test_gradient_is_that_of_the_objective(source_free):
 def test_the_likeliest_size_of_a_prediction_is_the_true_one(attenuation):
     """The true line predicts ripples whose source is wrong: by a smooth error, and because it loses
     a share that grows with frequency, up to 70 % at 4 kHz. Over twelve draws the size of the
-    prediction that is likeliest is 1 on average."""
+    prediction that is likeliest is 1 on average. With an error that is normal and not in an
+    exponent it is 0.98, 0.79 and 0.51."""
     shares, sizes = np.linspace(0.9, 1.1, 41), []
     for seed in range(12):
         _, observations, truth = make(np.random.default_rng(seed), source=0.1, noise=1.0)
@@ -96,7 +97,7 @@ def test_the_likeliest_size_of_a_prediction_is_the_true_one(attenuation):
         observations = [replace(o, values=o.values * x) for o, x in zip(observations, lost)]
         posterior = Posterior(truth, observations)
         h, size = posterior.predict(truth.theta), 1.0
-        for _ in range(5):
+        for _ in range(12):
             posterior.estimate_errors(size * h, truth.theta)
             costs = [posterior.objective(truth.theta, size * share * h) for share in shares]
             size *= shares[int(np.argmin(costs))]
