@@ -64,10 +64,10 @@ def descend(
         if not accepted:
             break
         damping = max(damping / DAMPING_FALL, MIN_DAMPING)
-        theta, prediction = new, new_prediction
+        theta, prediction, gain, value = new, new_prediction, value - new_value, new_value
         if errors:
             model.estimate_errors(prediction, theta, near=True)
-        last, value = value, min(new_value, model.objective(theta, prediction))
-        if last - value < converged:
+            value = model.objective(theta, prediction)
+        if gain < converged:
             break
     return theta, value

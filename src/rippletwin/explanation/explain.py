@@ -60,6 +60,11 @@ from rippletwin.explanation.localise.shaft_order_intervals import add_amplitude_
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders, analyse_shaft_orders
 from rippletwin.explanation.localise.source_free_fits import refit_source_free
 from rippletwin.explanation.search.passive_networks import accepted_network, fit_passive_networks
+from rippletwin.explanation.search.sheet_tolerance import (
+    scale_tolerances,
+    tolerance_scale,
+    with_coordinates_of,
+)
 from rippletwin.explanation.search.stepwise_search import Search, resume_search, search_effects
 from rippletwin.explanation.verdict.decision import decide
 from rippletwin.explanation.verdict.explanation import Explanation
@@ -72,6 +77,7 @@ from rippletwin.twin.twin import Twin
 HIGHEST_HZ = 4000.0  # of the harmonics that are fitted
 MAX_MODEL_ERROR_FOR_COUPLING = 10.0 * MIN_MODEL_ERROR
 """Relative model error above which pressure and flow at the pump are too uncertain."""
+MAX_RESUMED = 2  # times
 
 Progress = Callable[[str, int, int], None]
 
@@ -126,7 +132,7 @@ def explain_observations(
     else:
         search = _search(state, processes, progress)
         state, search = _search_again(state, search, observations, processes, progress)
-        state, search = _search_with_coupled_pump(state, search, processes, progress)
+        state, search = _resume_search(state, search, processes, progress)
     base, data = state.base, state.observations
     early, late = _select_fitted(early, rig, data), _select_fitted(late, rig, data)
     halves = (early[0], late[0]) if len(data) == 1 and late else None
@@ -269,19 +275,28 @@ def _search_again(
     return state, _search(state, processes, progress)
 
 
-def _search_with_coupled_pump(
+def _resume_search(
     state: _State, search: Search, processes: int, progress: Progress | None
 ) -> tuple[_State, Search]:
-    """Step 6: let a simulated pump respond to the line's pressure, and resume the search."""
-    if search.best.model_error >= MAX_MODEL_ERROR_FOR_COUPLING:
+    """Step 6: let a simulated pump respond to the line's pressure, widen the data sheet's
+    tolerances by what the fit shows, and resume the search."""
+    coupled = None
+    if search.best.model_error < MAX_MODEL_ERROR_FOR_COUPLING:
+        coupled = couple_pump_to_line(search.best.twin, state.observations)
+    scale = tolerance_scale(search.best)
+    if coupled is None and scale == 1.0:
         return state, search
-    coupled = couple_pump_to_line(search.best.twin, state.observations)
-    if coupled is None:
-        return state, search
-    base = Twin(state.base.rig, coupled, uncertain_pump=True, changing_state=True)
-    with open_workers(base, coupled, processes) as workers:
-        search = resume_search(workers, search, progress)
-    return _State(base, coupled, state.modulation), search
+    data = coupled or state.observations
+    for _ in range(MAX_RESUMED):
+        rig = scale_tolerances(state.base.rig, scale)
+        base = Twin(rig, data, uncertain_pump=True, changing_state=True)
+        with open_workers(base, data, processes) as workers:
+            search = resume_search(workers, with_coordinates_of(search, base), progress)
+        state = _State(base, data, state.modulation)
+        scale = tolerance_scale(search.best)  # the response of the pump may have hidden it
+        if scale == 1.0:
+            break
+    return state, search
 
 
 def _select_fitted(

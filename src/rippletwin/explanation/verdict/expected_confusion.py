@@ -164,7 +164,7 @@ class _Rival:
         """Log evidence that this twin is expected to lose where these (S, F) are the readings."""
         posterior = self._posterior.with_values(readings)
         r, columns = posterior.whiten_slopes(self.readings, self._slopes)
-        r, columns = r[:-1], columns[:, :-1] * self._scale[:, None]  # the last is no reading
+        columns = columns * self._scale[:, None]
         projection = columns @ r
         absorbed = np.linalg.solve(np.eye(len(projection)) + columns @ columns.T, projection)
         return 0.5 * float(max(r @ r - projection @ absorbed, 0.0))
