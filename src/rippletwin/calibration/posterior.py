@@ -284,19 +284,38 @@ class Posterior:
         if linear is not None:
             self._products = PRODUCT_ERROR**2 * np.mean(np.abs(prediction - linear) ** 2, axis=0)
         self._held = self._kept = None
-        if not near:
-            self._expansion = self._first_expansion(prediction)
-            self._estimate_sizes(prediction, scale, near=False)
-            self._expand_source(prediction, SOURCE_STEPS)
-        self._estimate_sizes(prediction, scale, near=True)
-        self._expand_source(prediction, 1 if near else SOURCE_STEPS)
+        if near:
+            self._settle_errors(prediction, scale, 1)
+        else:
+            self._choose_errors(prediction, scale)
         self.model_error = min(self.model_error, self.max_model_error)
         self._hold(prediction)
 
-    def _first_expansion(self, prediction: np.ndarray) -> SourceExpansion:
+    def _choose_errors(self, prediction: np.ndarray, scale: float) -> None:
+        """Settle the errors from a source without a smooth error, and from what the readings alone
+        suggest of it; the likelier ones are kept."""
+        starts = [self._smooth.without_error()]
+        if len(self._smooth.frequencies):
+            starts.append(self._expansion_by_readings(prediction))
+        found = []
+        for start in starts:
+            self._expansion = start
+            self._estimate_sizes(prediction, scale, near=False)
+            self._expand_source(prediction, SOURCE_STEPS)
+            self._settle_errors(prediction, scale, SOURCE_STEPS)
+            r, log_determinant = self.whitened(prediction)
+            sizes = self.smooth_sd, self.source_sd, self.model_error
+            cost = scale * float(np.sum(np.abs(r) ** 2)) + log_determinant
+            found.append((cost, self._expansion, sizes))
+        _, self._expansion, sizes = min(found, key=lambda each: each[0])
+        self.smooth_sd, self.source_sd, self.model_error = sizes
+
+    def _settle_errors(self, prediction: np.ndarray, scale: float, steps: int) -> None:
+        self._estimate_sizes(prediction, scale, near=True)
+        self._expand_source(prediction, steps)
+
+    def _expansion_by_readings(self, prediction: np.ndarray) -> SourceExpansion:
         """The expansion about the smooth part of the source that the readings alone suggest."""
-        if not len(self._smooth.frequencies):
-            return self._smooth.without_error()
         variance = self._variance(self.model_error)
         size = np.sum(np.abs(self._rotate(prediction)) ** 2 / variance, axis=0)
         ratio = self._best_amplitude(prediction)
