@@ -47,7 +47,12 @@ from rippletwin.explanation.checks.prior_sensitivity import (
 )
 from rippletwin.explanation.checks.profile_intervals import add_profile_intervals
 from rippletwin.explanation.checks.sensor_wiring import find_swapped_sensors
-from rippletwin.explanation.checks.support import Judged, judge_beside_network, judge_effects
+from rippletwin.explanation.checks.support import (
+    Judged,
+    judge_beside_network,
+    judge_effects,
+    withhold_where_much_remains,
+)
 from rippletwin.explanation.fit_jobs import FitJob, PlainCalibration, open_workers
 from rippletwin.explanation.localise.free_corrections import locate_mismatch
 from rippletwin.explanation.localise.phase_modulation import (
@@ -148,6 +153,7 @@ def explain_observations(
             if network is not None and set(judged.best.hypothesis) <= set(network.hypothesis):
                 network, judged = judge_beside_network(workers, search.base, network, judged)
                 search = replace(search, best=judged.best, passive_networks=[network, *networks])
+            judged = withhold_where_much_remains(judged, accepted_network(search) or search.best)
             contradiction = find_swapped_sensors(base, data, search)
         # Steps 11 to 14: checks
         point_fits = fit_each_observation(workers, search.base)

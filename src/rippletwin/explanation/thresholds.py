@@ -31,6 +31,11 @@ GOOD_MODEL_ERROR = 1.25 * MIN_MODEL_ERROR
 """Relative model error up to which no effect can improve a fit noticeably. It saves work: beside
 such a fit no network is tried. No name depends on it."""
 
+MUCH_MODEL_ERROR = 0.05
+"""Relative model error above which only a usual effect is established. The checks of an effect
+allow for an error elsewhere to first order. Where physics is left out that makes more than a few
+per cent, an effect that is not there may pass them."""
+
 GOOD_RIPPLE_ERROR = 0.05
 """Relative error of the nominal ripple up to which the same holds. A line that lacks an element
 leaves to the pump what it cannot fit: with two sensors each harmonic has one equation more than the
