@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rippletwin.calibration.posterior import SIZE_SD, Posterior
+from rippletwin.calibration.posterior import Posterior
+from rippletwin.calibration.reading_errors import SIZE_SD
 from rippletwin.calibration.smooth_source import source_scale
 from synthetic_observations import POINTS, make
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
-from rippletwin.calibration.posterior import FIRST_SOURCE_SD, Posterior
+from rippletwin.calibration.posterior import Posterior
+from rippletwin.calibration.reading_errors import FIRST_SOURCE_SD
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Uncertainty
 from rippletwin.case.recording_advice import BAND_HZ
 from rippletwin.explanation.explain import HIGHEST_HZ

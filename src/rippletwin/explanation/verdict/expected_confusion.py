@@ -26,7 +26,8 @@ from functools import cached_property
 import numpy as np
 
 from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
-from rippletwin.calibration.posterior import FIRST_SOURCE_SD, Posterior
+from rippletwin.calibration.posterior import Posterior
+from rippletwin.calibration.reading_errors import FIRST_SOURCE_SD
 from rippletwin.case.model import Rig
 from rippletwin.explanation.search.stepwise_search import applicable_candidates
 from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR, MIN_LOG_BAYES_FACTOR
