@@ -46,6 +46,7 @@ from rippletwin.explanation.checks.prior_sensitivity import (
     compare_without_each_effect,
 )
 from rippletwin.explanation.checks.profile_intervals import add_profile_intervals
+from rippletwin.explanation.checks.sensor_tolerance import add_sensor_tolerance
 from rippletwin.explanation.checks.sensor_wiring import find_swapped_sensors
 from rippletwin.explanation.checks.support import (
     Judged,
@@ -172,6 +173,8 @@ def explain_observations(
         sensitivity: tuple[PriorSensitivity, ...] = ()
         if decision.supports:
             sensitivity = compare_without_each_effect(workers, search.best, judged.without)
+    accepted = add_sensor_tolerance(decision.accepted, data)
+    decision = replace(decision, accepted=accepted)
     # Steps 17 and 18: where the mismatch is
     location = locate_mismatch(search.base, data)
     remainder = None if contradiction else find_remainder(decision.accepted, data)
