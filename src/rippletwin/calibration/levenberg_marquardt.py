@@ -29,7 +29,8 @@ def descend(
     """Mode near theta (P,) and minus the log posterior there; infinite where theta is not valid.
 
     fixed      indices of the parameters that stay
-    errors     whether the errors of `model` are estimated again after each step
+    errors     whether the errors of `model` are estimated again after each step; if not, only its
+               most likely source follows
     converged  gain of a step below which it is the last
     damping    of the first step, relative to the diagonal of the Hessian
 
@@ -41,6 +42,8 @@ def descend(
         return theta, np.inf
     if errors:
         model.estimate_errors(prediction, theta)
+    else:
+        model.follow_source(prediction)
     value = model.objective(theta, prediction)
     for _ in range(max_steps):
         r, jacobian = model.linearise(theta, prediction)
@@ -67,7 +70,9 @@ def descend(
         theta, prediction, gain, value = new, new_prediction, value - new_value, new_value
         if errors:
             model.estimate_errors(prediction, theta, near=True)
-            value = model.objective(theta, prediction)
+        else:
+            model.follow_source(prediction)
+        value = model.objective(theta, prediction)
         if gain < converged:
             break
     return theta, value

@@ -182,6 +182,10 @@ class Posterior:
             self._errors.products = PRODUCT_ERROR**2 * _mean_square(prediction - linear)
         self._errors.estimate(self._rotate(prediction), scale, near, self.max_model_error)
 
+    def follow_source(self, prediction: np.ndarray) -> None:
+        """Set the most likely source to that of a prediction; the sizes of the errors stay."""
+        self._errors.follow(self._rotate(prediction))
+
     @property
     def needs_full_jacobian(self) -> bool:
         """Whether derivatives with a frozen compliance end a descent too far from the mode."""

@@ -76,7 +76,7 @@ from rippletwin.calibration.whitening import NoiseBasis, Whitening
 FIRST_SOURCE_SD = 0.03  # before any residual is known
 FIRST_SIZES = ErrorSizes(smooth=0.0, source=FIRST_SOURCE_SD, model=0.1)
 SIZE_SD, SIZE_SD_OF_PUMP = 0.03, 0.01  # s, and s where the pump's numbers are parameters
-SOURCE_STEPS = 8  # towards the most likely smooth error, before and after its size is estimated
+SOURCE_STEPS = 8  # at most, towards the most likely smooth error
 TINY = 1e-300
 
 
@@ -190,11 +190,19 @@ class ReadingErrors:
         """
         self._held = self._kept = None
         if near:
-            self._settle(h, scale, 1)
+            self._settle(h, scale)
         else:
             self._choose(h, scale)
         self.sizes = self.sizes._replace(model=min(self.sizes.model, max_model_error))
         self._hold(h)
+
+    def follow(self, h: np.ndarray) -> None:
+        """Move the smooth error to its most likely value at a prediction, and hold it: the sizes
+        stay. Nothing before the first estimate."""
+        if self._held is not None:
+            self._held = self._kept = None
+            self._expand(h)
+            self._hold(h)
 
     def make_independent(self, h: np.ndarray) -> None:
         """Add the smooth part of the source's error to the independent part."""
@@ -219,17 +227,20 @@ class ReadingErrors:
         for start in starts:
             self._expansion = start
             self._estimate_sizes(h, scale, near=False)
-            self._expand(h, SOURCE_STEPS)
-            self._settle(h, scale, SOURCE_STEPS)
+            self._expand(h)
+            self._estimate_sizes(h, scale, near=True)
+            self._settle(h, scale)
             whitening = self.whitening(h)
             square = float(np.sum(np.abs(whitening.apply(self.residual(h))) ** 2))
             cost = scale * square + whitening.log_determinant
             found.append((cost, self._expansion, self.sizes))
         _, self._expansion, self.sizes = min(found, key=lambda each: each[0])
 
-    def _settle(self, h: np.ndarray, scale: float, steps: int) -> None:
+    def _settle(self, h: np.ndarray, scale: float) -> None:
+        """Move the smooth error, and then the sizes, to their most likely values nearby. In this
+        order: an error that belongs to another prediction would make all sizes large."""
+        self._expand(h)
         self._estimate_sizes(h, scale, near=True)
-        self._expand(h, steps)
 
     def _expansion_by_readings(self, h: np.ndarray) -> SourceExpansion:
         """The expansion about the smooth part of the source that the readings alone suggest."""
@@ -237,11 +248,11 @@ class ReadingErrors:
         ratio = self._best_amplitude(h)
         return self._smooth.expand_near(ratio, 1.0 / np.maximum(size * np.abs(ratio) ** 2, TINY))
 
-    def _expand(self, h: np.ndarray, steps: int) -> None:
-        """Move the expansion to the most likely smooth error, in at most `steps` steps."""
-        if len(self._smooth.frequencies):
+    def _expand(self, h: np.ndarray) -> None:
+        """Move the expansion to the most likely smooth error."""
+        if len(self._smooth.frequencies) and self.sizes.smooth > 0.0:
             data = self._source_data(h)
-            self._expansion = most_likely_expansion(data, self._expansion, steps)
+            self._expansion = most_likely_expansion(data, self._expansion, SOURCE_STEPS)
 
     def _estimate_sizes(self, h: np.ndarray, scale: float, near: bool) -> None:
         """Set the sizes to their most likely values at the present expansion."""
