@@ -42,6 +42,12 @@ CONSTANTS = {
     "state of a recording": ("twin.parameters", "RECORDING_STATE_SD"),
     "priors of the pump's numbers": ("twin.parameters", "PUMP_SDS"),
     "prior of the pump's volume": ("twin.effects.source_impedance", "VOLUME_SD"),
+    "model error above which only usual effects are established": (
+        "explanation.thresholds",
+        "MUCH_MODEL_ERROR",
+    ),
+    "gain of a sensor": ("explanation.checks.sensor_tolerance", "GAIN_SD"),
+    "lag of a sensor": ("explanation.checks.sensor_tolerance", "LAG_SD"),
     "priors of the free data sheet": ("explanation.checks.prior_sensitivity", "WIDENING"),
 }
 """Constants that decide: what each is, its module below `rippletwin`, its name there."""
