@@ -50,10 +50,11 @@ def add_sensor_tolerance(fit: Fit, observations: Sequence) -> Fit:
     exact = np.linalg.inv(hessian[:count, :count])
     wide = np.linalg.inv(hessian)[:count, :count]
     growth = np.sqrt(np.maximum(np.diag(wide) / np.diag(exact), 1.0))
-    ends = {
-        k: tuple(float(theta[k] + growth[k] * (end - theta[k])) for end in pair)
-        for k, pair in fit.interval_ends.items()
-    }
+
+    def grown(k: int, end: float) -> float:
+        return float(theta[k] + growth[k] * (end - theta[k]))
+
+    ends = {k: (grown(k, low), grown(k, high)) for k, (low, high) in fit.interval_ends.items()}
     return replace(fit, covariance=fit.covariance + wide - exact, interval_ends=ends)
 
 
