@@ -35,13 +35,19 @@ CONSTANTS = {
         "CORRELATION_HZ",
     ),
     "amplitude of a free correction": ("explanation.localise.smooth_corrections", "AMPLITUDES"),
-    "least model error": ("calibration.posterior", "MIN_MODEL_ERROR"),
-    "error of the ripple's size": ("calibration.posterior", "SIZE_SD"),
+    "least model error": ("calibration.error_sizes", "MIN_MODEL_ERROR"),
+    "error of the ripple's size": ("calibration.reading_errors", "SIZE_SD"),
     "error of products of harmonics": ("calibration.posterior", "PRODUCT_ERROR"),
     "smoothness of the ripple's error": ("calibration.smooth_source", "CORRELATION_HZ"),
     "state of a recording": ("twin.parameters", "RECORDING_STATE_SD"),
     "priors of the pump's numbers": ("twin.parameters", "PUMP_SDS"),
     "prior of the pump's volume": ("twin.effects.source_impedance", "VOLUME_SD"),
+    "model error above which only usual effects are established": (
+        "explanation.thresholds",
+        "MUCH_MODEL_ERROR",
+    ),
+    "gain of a sensor": ("explanation.checks.sensor_tolerance", "GAIN_SD"),
+    "lag of a sensor": ("explanation.checks.sensor_tolerance", "LAG_SD"),
     "priors of the free data sheet": ("explanation.checks.prior_sensitivity", "WIDENING"),
 }
 """Constants that decide: what each is, its module below `rippletwin`, its name there."""

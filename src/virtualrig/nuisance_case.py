@@ -5,6 +5,7 @@ ways that no parameter of the tool has. A concealed effect comes on top. Both ar
 tool that names nuisance physics which is there is right.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -45,8 +46,10 @@ from virtualrig.population import (
     ripple_change,
     ripple_of,
 )
+from virtualrig.pump import Pump
 from virtualrig.recorder import Point
 from virtualrig.rig import build
+from virtualrig.source import outlet_compliance
 
 GEOMETRY_SHARE = 2 / 3
 """Of the cases whose data sheet gives the pump's geometry; the others give the number of pistons
@@ -112,8 +115,31 @@ def draw_nuisance_case(count: int, commit: str, number: int | str, index: int) -
         "geometry": geometry,
         "mesh": None,
     }
+    if not geometry:
+        truth["effects"] = _with_chambers(truth["effects"], sheet, true, nuisance, points)
     true = _with_effects(sheet, true, nuisance, effects)
     return NuisanceCase(DrawnRig(sheet, true, nuisance, plans), geometry, truth)
+
+
+def _with_chambers(
+    effects: list[dict], sheet: dict, true: dict, nuisance: dict, points: Sequence[Point]
+) -> list[dict]:
+    """Effects of the truth; the volume of a `source_impedance` contains the chambers' compliance,
+    as a volume of the first segment's liquid.
+
+    The data sheet states a flow into a constant pressure, which leaves the chambers out. What the
+    line then has at the pump is both.
+    """
+    density, wave_speed = sheet["fluid"]["density"], true["line"]["segments"][0]["wave_speed"]
+    pump = Pump(**(sheet["pump"] | true_pump(sheet["pump"], nuisance)))
+    pressure = float(np.mean([point.load_pressure for point in points]))
+    chambers = outlet_compliance(pump, density, pressure) * density * wave_speed**2
+    return [
+        effect | {"parameters": {"volume": effect["parameters"]["volume"] + chambers}}
+        if effect["name"] == "source_impedance"
+        else effect
+        for effect in effects
+    ]
 
 
 def nuisance_effects(sheet: dict, true: dict, nuisance: dict, geometry: bool) -> list[dict]:

@@ -25,6 +25,7 @@ SAMPLES = 18432
 """A revolution; linear interpolation between them errs by 0.1 % at 5 kHz."""
 
 _REVOLUTIONS = 3
+_ANGLES = 720  # of a revolution, for a mean over it
 _OUTLET_CONDUCTANCE = 1e3  # m3/s/Pa: keeps the outlet within a fraction of a pascal
 
 
@@ -46,6 +47,22 @@ def constant_pressure_flow(
     if newton > MOST_NEWTON_STEPS:
         raise RuntimeError("the pump's chambers did not converge")
     return flow
+
+
+def outlet_compliance(pump: Pump, density: float, pressure: float) -> float:
+    """Compliance, m3/Pa, of the chambers open to the outlet, on the average over a revolution.
+
+    A flow into a constant `pressure` (Pa) leaves it out; against a line it is a volume at the
+    pump.
+    """
+    chambers, ports = pump_tables(pump, density)
+    slope, total = compression(pressure, ports)[1], 0.0
+    for turn in 2 * np.pi * np.arange(_ANGLES) / _ANGLES:
+        stations = np.zeros((len(chambers), 4))
+        chamber_kinematics(turn, 0.0, chambers, ports, stations)
+        is_open = stations[:, 2] > 0.0
+        total += float(np.sum(slope / stations[is_open, 0]))
+    return total / _ANGLES
 
 
 @njit(cache=True)

@@ -27,8 +27,8 @@ def test_constants_derived_from_a_scaled_one_follow():
     code = (
         f"import sys; sys.path.insert(0, {str(BENCHMARKS)!r})\n"
         "from scaled_constants import scale_constant\n"
-        "scale_constant('rippletwin.calibration.posterior', 'MIN_MODEL_ERROR', 0.5)\n"
-        "from rippletwin.calibration.posterior import MODEL_ERRORS\n"
+        "scale_constant('rippletwin.calibration.error_sizes', 'MIN_MODEL_ERROR', 0.5)\n"
+        "from rippletwin.calibration.error_sizes import MODEL_ERRORS\n"
         "from rippletwin.explanation.thresholds import GOOD_MODEL_ERROR\n"
         "from rippletwin.explanation.checks import alarms\n"
         "print(MODEL_ERRORS[0], GOOD_MODEL_ERROR, alarms.MIN_MODEL_ERROR)"
@@ -39,8 +39,8 @@ def test_constants_derived_from_a_scaled_one_follow():
 
 def test_a_module_that_is_imported_already_is_refused():
     """Proves that a setting cannot be lost silently."""
-    with pytest.raises(ValueError, match=r"posterior: imported before"):
-        scale_constant("rippletwin.calibration.posterior", "MIN_MODEL_ERROR", 2.0)
+    with pytest.raises(ValueError, match=r"error_sizes: imported before"):
+        scale_constant("rippletwin.calibration.error_sizes", "MIN_MODEL_ERROR", 2.0)
 
 
 def test_all_kinds_of_constants_are_scaled():

@@ -59,17 +59,14 @@ def test_the_root_is_that_of_numpy(source):
 
 
 def test_square_and_determinant_are_those_of_the_dense_covariance():
-    """adjoint(apply(x)) is C^-1 x, and the log determinant and its slopes are those of C."""
+    """adjoint(apply(x)) is C^-1 x, and the log determinant is that of C."""
     arguments = make([1.0, 0.0, 0.4, 0.1, 2.0])
-    h, covariance, whitening = arguments[0], dense(*arguments), Whitening(*arguments)
+    covariance, whitening = dense(*arguments), Whitening(*arguments)
     x = complex_normal(np.random.default_rng(6), SENSORS, FREQUENCIES)
     solved = np.linalg.solve(covariance, x.ravel()).reshape(x.shape)
     assert np.allclose(whitening.adjoint(whitening.apply(x)), solved, rtol=1e-11)
     log_determinant = np.linalg.slogdet(covariance)[1]
     assert whitening.log_determinant == pytest.approx(log_determinant, rel=1e-12)
-    moved = [Whitening(h + t * x, *arguments[1:]).log_determinant for t in (1e-5, -1e-5)]
-    slope = whitening.determinant_slopes(x[None])[0]
-    assert slope == pytest.approx((moved[0] - moved[1]) / 2e-5, rel=1e-6)
 
 
 def test_without_a_smooth_error_frequencies_are_apart():

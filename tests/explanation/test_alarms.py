@@ -143,7 +143,8 @@ def test_the_misfit_alarm_is_what_the_best_correction_adds(monkeypatch):
 
     monkeypatch.setattr(rules, "SmoothCorrections", Corrections)
     monkeypatch.setattr(rules, "elements_of", lambda rig, observations: ["listed"])
-    base = SimpleNamespace(twin=SimpleNamespace(rig=None, parameters=(), theta=()))
+    rig = SimpleNamespace(tolerance_scale=1.0)
+    base = SimpleNamespace(twin=SimpleNamespace(rig=rig, parameters=(), theta=()))
     assert read_alarms(base, [], [], [], [], 0.0).misfit == 30.0
 
 

@@ -33,13 +33,13 @@ def test_draws_have_the_covariance_of_the_error_model(fitted):
     posterior = Posterior(fit.twin, observations)
     prediction = posterior.predict(fit.twin.theta)
     posterior.estimate_errors(prediction, fit.twin.theta)
-    metric, rng = posterior._whitening(prediction), np.random.default_rng(0)
-    white = np.array(
-        [
-            metric.apply(posterior._rotate(posterior.draw(prediction, rng) - prediction))
-            for _ in range(200)
-        ]
-    )
+    metric, rng = Posterior(fit.twin, observations), np.random.default_rng(0)
+    for name in ("sizes", "products"):
+        setattr(metric._errors, name, getattr(posterior._errors, name))
+    drawn = np.array([posterior.draw(prediction, rng) for _ in range(200)])
+    # The covariance is that of the first prediction: whitened differences from it.
+    residuals = metric.whitened(np.concatenate([prediction[None], drawn]))[0]
+    white = residuals[0] - residuals[1:]
     assert np.mean(np.abs(white) ** 2) == pytest.approx(1.0, abs=0.02)
     assert np.max(np.mean(np.abs(white) ** 2, axis=0)) < 1.6
     assert abs(np.mean(white)) < 0.02

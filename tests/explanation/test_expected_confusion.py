@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rippletwin.calibration.posterior import FIRST_SOURCE_SD, MIN_MODEL_ERROR, Posterior
+from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
+from rippletwin.calibration.posterior import Posterior
+from rippletwin.calibration.reading_errors import FIRST_SOURCE_SD
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Uncertainty
 from rippletwin.case.recording_advice import BAND_HZ
 from rippletwin.explanation.explain import HIGHEST_HZ

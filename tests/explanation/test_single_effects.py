@@ -15,8 +15,8 @@ from synthetic_observations import POINTS, make
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_little_air_gets_the_evidence_of_the_truth(seed):
     """There is 0.15 % of air and one operating point. The line without air absorbs nearly all of
-    the air's influence (1) or most of it (2). The search nevertheless gives the air the log
-    evidence of a fit from the truth."""
+    the air's influence (1) or most of it (2). The search nevertheless gives the air at least the
+    log evidence of a fit from the truth."""
     values = TRUTH | {"entrained_air@line.gas_fraction": 1.5e-3}
     one = {"sensors": 2, "points": POINTS[:1], "source": 0.005, "noise": 500.0}
     bench, data, truth = make(np.random.default_rng(seed), AIR, values, **one)
@@ -24,4 +24,4 @@ def test_a_little_air_gets_the_evidence_of_the_truth(seed):
     known = refine(workers.base, AIR, data, [truth.theta])
     base, _, (air,) = fit_single_effects(workers, AIR)
     assert known.evidence - base.evidence > MIN_LOG_BAYES_FACTOR
-    assert air.evidence == pytest.approx(known.evidence, abs=0.5)
+    assert air.evidence > known.evidence - 0.5

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from made_fits import made_fit
+from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.misfit import relative_misfit
-from rippletwin.calibration.posterior import MIN_MODEL_ERROR
 from rippletwin.explanation.checks.cross_validation import cross_validate
 from rippletwin.explanation.fit_jobs import Workers
 from rippletwin.explanation.search.stepwise_search import (

@@ -26,6 +26,7 @@ HOSE = (EFFECTS["viscoelastic_wall"], Place("segment 1", 0))
 VOLUME = (EFFECTS["line_volume"], Place("position"))
 LEAK = (EFFECTS["leak"], Place("position"))
 CERTAIN = (EFFECTS["end_radiation"], Place("load"))
+FRICTION = (EFFECTS["unsteady_friction"], Place("line"))
 NETWORK = (EFFECTS["passive_network"], Place("position", form="shunt"))
 BASE = made_fit(0.0)
 BARE = (NONE, None)
@@ -213,6 +214,19 @@ def test_a_network_beside_no_effect_is_kept(beside):
     network = made_fit(100.0, NETWORK)
     found, judged = judge_beside_network(None, BASE, network, judged_of())
     assert found is network and judged.supports == ()
+
+
+@pytest.mark.parametrize(
+    ("model_error", "levels"),
+    [(0.05, ["established", "established"]), (0.051, ["supported", "established"])],
+)
+def test_where_much_remains_only_a_usual_effect_is_established(model_error, levels):
+    """Above 5 % of model error the hose is no more than supported. Unsteady friction, which is in
+    nearly every line, keeps its level, and so does all at 5 %."""
+    judged = judged_of(HOSE, FRICTION)
+    explanation = replace(judged.best, model_error=model_error)
+    found = rules.withhold_where_much_remains(judged, explanation)
+    assert [support.level for support in found.supports] == levels
 
 
 def test_each_effect_is_left_out_in_two_ways(monkeypatch):

@@ -3,7 +3,7 @@
 import pytest
 
 from virtualrig.pump import Pump
-from virtualrig.source import constant_pressure_flow
+from virtualrig.source import constant_pressure_flow, outlet_compliance
 
 
 @pytest.mark.parametrize("bulk_modulus", [1.3e9, 0.65e9])
@@ -21,3 +21,13 @@ def test_mean_flow_is_displacement_less_leakage_and_compression(bulk_modulus):
     expected = pump.displacement * speed_hz - leakage - compression
     assert compression > 0.01 * expected
     assert flow == pytest.approx(expected, abs=0.05 * compression)
+
+
+def test_half_of_the_chambers_are_a_compliance_at_the_outlet():
+    """A chamber is open for half a turn less the overlap. Over that half its mean volume is the
+    dead volume and half a stroke, by hand."""
+    pump = Pump(dead_volume=2e-6, port_overlap_deg=4.0)
+    stroke = pump.displacement / pump.pistons
+    open_chambers = pump.pistons * (180.0 - 4.0) / 360.0
+    expected = open_chambers * (pump.dead_volume + 0.5 * stroke) / pump.bulk_modulus
+    assert outlet_compliance(pump, 870.0, 9.5e6) == pytest.approx(expected, rel=0.01)

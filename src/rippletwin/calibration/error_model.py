@@ -71,6 +71,9 @@ class ErrorModel(Protocol):
         With `near` values next to the present ones suffice.
         """
 
+    def follow_source(self, prediction: Prediction) -> None:
+        """Set what else is estimated of the source beside the sizes of its errors."""
+
     def objective(self, theta: np.ndarray, prediction: Prediction) -> float:
         """Minus the log posterior but for a constant; infinite where it is not valid."""
 

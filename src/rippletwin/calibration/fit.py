@@ -111,8 +111,8 @@ def posterior_at_fit(
     model_error   by default that of the fit
     """
     posterior = Posterior(fit.twin, observations, None, fit.source_free)
-    posterior.estimate_errors(posterior.predict(fit.twin.theta), fit.twin.theta)
-    posterior.source_sd = float(np.hypot(posterior.source_sd, posterior.smooth_sd))
-    posterior.smooth_sd = 0.0
+    prediction = posterior.predict(fit.twin.theta)
+    posterior.estimate_errors(prediction, fit.twin.theta)
+    posterior.make_errors_independent(prediction)
     posterior.model_error = fit.model_error if model_error is None else model_error
     return posterior

@@ -29,7 +29,8 @@ def descend(
     """Mode near theta (P,) and minus the log posterior there; infinite where theta is not valid.
 
     fixed      indices of the parameters that stay
-    errors     whether the errors of `model` are estimated again after each step
+    errors     whether the errors of `model` are estimated again after each step; if not, only its
+               most likely source follows
     converged  gain of a step below which it is the last
     damping    of the first step, relative to the diagonal of the Hessian
 
@@ -41,6 +42,8 @@ def descend(
         return theta, np.inf
     if errors:
         model.estimate_errors(prediction, theta)
+    else:
+        model.follow_source(prediction)
     value = model.objective(theta, prediction)
     for _ in range(max_steps):
         r, jacobian = model.linearise(theta, prediction)
@@ -64,10 +67,12 @@ def descend(
         if not accepted:
             break
         damping = max(damping / DAMPING_FALL, MIN_DAMPING)
-        theta, prediction = new, new_prediction
+        theta, prediction, gain, value = new, new_prediction, value - new_value, new_value
         if errors:
             model.estimate_errors(prediction, theta, near=True)
-        last, value = value, min(new_value, model.objective(theta, prediction))
-        if last - value < converged:
+        else:
+            model.follow_source(prediction)
+        value = model.objective(theta, prediction)
+        if gain < converged:
             break
     return theta, value

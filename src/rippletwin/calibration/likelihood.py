@@ -186,6 +186,9 @@ class Likelihood:
             sigmas = sigmas[source : source + 1]
         self.model_error = min(self.model_error, self.max_model_error)
 
+    def follow_source(self, prediction: Sequence[np.ndarray]) -> None:
+        """Nothing: an error of the source is integrated out at every prediction."""
+
     def use_full_jacobian(self, theta: np.ndarray) -> None:
         """From here on derivatives near theta include those of nonlinear load and compliance."""
         if self._pressures and self.forward.has_nonlinear_compliance:

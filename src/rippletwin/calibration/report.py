@@ -19,11 +19,18 @@ from rippletwin.twin.unknown_load import LoadCurve
 LOAD_ROWS_STEP = 8  # frequencies of the load's curve from one row to the next
 
 
+UNEVENNESS = 0.0015
+"""Relative standard deviation of a segment's wave speed as one number for all of it: it falls by
+0.3 % a kelvin (Gholizadeh, Burton and Schoenau 2011, Int. J. Fluid Power 12(3):5), and a line is
+half a kelvin warmer in places."""
+
+
 def segment_table(calibration: Calibration) -> list[dict]:
     """Delay L/a (s) and characteristic impedance rho a/A (Pa s/m3) of each segment.
 
     Waves depend on these two, so the data determine them better than a, D and L alone. Standard
-    deviations are of first order in the logarithms, with their covariance.
+    deviations are of first order in the logarithms, with their covariance. That of a delay is at
+    least UNEVENNESS: along a segment the wave speed is not one number.
     """
     twin, covariance = calibration.twin, calibration.covariance
     v = twin.arrays(twin.theta)
@@ -39,7 +46,9 @@ def segment_table(calibration: Calibration) -> list[dict]:
             {
                 "segment": k + 1,
                 "delay": float(delay),
-                "delay_sd": float(delay * _root(delay_weights, log_covariance)),
+                "delay_sd": float(
+                    delay * np.hypot(_root(delay_weights, log_covariance), UNEVENNESS)
+                ),
                 "impedance": float(impedance),
                 "impedance_sd": float(impedance * _root(impedance_weights, log_covariance)),
             }

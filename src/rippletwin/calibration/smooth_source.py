@@ -2,33 +2,54 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 CORRELATION_HZ = 1000.0  # l and f0 of `posterior`
 MIN_HARMONIC = 0.01
 """Share of the strongest harmonic below which a harmonic of the source is uncertain by more than
 its own share."""
+LEAST_RATIO = 0.01  # of a measured to the nominal harmonic: below, noise may make it nothing
+FIRST_SMOOTH_SD, FIRST_INDEPENDENT_SD = 0.3, 0.1
+"""tau and sigma before any are estimated: those of pumps whose relief grooves and free air the data
+sheet does not state."""
 MIN_EIGENVALUE = 1e-3  # share of the kernel's largest eigenvalue; smaller ones are left out
 
 
-class SmoothSourceError:
-    """Relative error of nominal sources: smooth parts of standard deviation tau, and one of size.
+@dataclass(frozen=True)
+class SourceExpansion:
+    """The factor of a source with a smooth error, to first order about a value eps_0 of it:
 
-    frequencies   (N,) indices of the frequencies that have it
-    basis         (J, N) amplitudes of unit variance times `sds` to relative errors; the last is the
-                  size of the ripple
+        exp(eps) = mean + factor eps,   factor = exp(eps_0),   mean = factor (1 - eps_0).
 
-    frequency_hz, recording, scale   (F,) of all frequencies; scale is g
-    nominal                          (F,) mask of those with a nominal source
-    size_sd                          standard deviation s of the size
+    amplitudes     (J,) complex, those of eps_0
+    factor, mean   (F,) complex; 1 at a frequency without a smooth error
     """
 
-    def __init__(self, frequency_hz, recording, nominal, scale, size_sd: float):
+    amplitudes: np.ndarray
+    factor: np.ndarray
+    mean: np.ndarray
+
+
+class SmoothSourceError:
+    """Errors eps of nominal sources: smooth ones of standard deviation tau, and one of size.
+
+    frequencies   (N,) indices of the frequencies that have it
+    basis         (J, N) amplitudes of unit variance times `sds` to errors eps; the last is the size
+                  of the ripple
+
+    frequency_hz, recording   (F,) of all frequencies
+    nominal                   (F,) mask of those with a nominal source
+    size_sd                   standard deviation s of the size
+    """
+
+    def __init__(self, frequency_hz, recording, nominal, size_sd: float):
         self.frequencies = np.flatnonzero(nominal)
         smooth = smooth_basis(frequency_hz[nominal], recording[nominal])
-        size = np.ones((1, smooth.shape[1]))
-        self.basis = np.concatenate([scale[nominal] * smooth, size])
-        self._size_sd = size_sd
+        self.basis = np.concatenate([smooth, np.ones((1, smooth.shape[1]))])
+        self._recording = np.asarray(recording)[nominal]
+        self._size_sd, self._count = size_sd, len(nominal)
 
     def sds(self, tau) -> np.ndarray:
         """Standard deviations (..., J) of the amplitudes for tau (...)."""
@@ -38,9 +59,43 @@ class SmoothSourceError:
         return sds
 
     def most_likely(self, pull: np.ndarray, tau: float) -> np.ndarray:
-        """Most likely error (N,) given the derivative `pull` (F,) of the log likelihood by it."""
-        amplitudes = self.sds(tau) ** 2 * (self.basis @ pull[self.frequencies])
-        return self.basis.T @ amplitudes
+        """Most likely amplitudes (J,) given the derivative `pull` (F,) of the log likelihood by the
+        relative error."""
+        return self.sds(tau) ** 2 * (self.basis @ pull[self.frequencies])
+
+    def error(self, amplitudes: np.ndarray) -> np.ndarray:
+        """eps (F,) of amplitudes (J,); 0 at a frequency without a smooth error."""
+        error = np.zeros(self._count, complex)
+        error[self.frequencies] = amplitudes @ self.basis
+        return error
+
+    def expand(self, amplitudes: np.ndarray) -> SourceExpansion:
+        """The expansion about the error of amplitudes (J,)."""
+        error = self.error(amplitudes)
+        return SourceExpansion(amplitudes, np.exp(error), np.exp(error) * (1.0 - error))
+
+    def without_error(self) -> SourceExpansion:
+        """The expansion about no error."""
+        return self.expand(np.zeros(len(self.basis), complex))
+
+    def expand_near(self, ratio: np.ndarray, variance: np.ndarray) -> SourceExpansion:
+        """The expansion about the smooth part of the measured over the nominal source.
+
+        ratio, variance   (F,) complex ratio and its relative variance
+
+        Along each recording the phase is continued from harmonic to harmonic: without that, the
+        error of a source that turns by more than half a turn would be taken for a small one.
+        """
+        at = self.frequencies
+        ratio = ratio[at]
+        phase = np.angle(ratio)
+        for recording in np.unique(self._recording):
+            own = self._recording == recording
+            phase[own] = np.unwrap(phase[own])
+        error = np.log(np.maximum(np.abs(ratio), LEAST_RATIO)) + 1j * phase
+        columns = self.basis / (FIRST_INDEPENDENT_SD**2 + variance[at])
+        precision = columns @ self.basis.T + np.diag(self.sds(FIRST_SMOOTH_SD) ** -2.0)
+        return self.expand(np.linalg.solve(precision, columns @ error))
 
 
 def smooth_basis(frequency_hz: np.ndarray, recording: np.ndarray) -> np.ndarray:

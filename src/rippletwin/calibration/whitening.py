@@ -33,9 +33,6 @@ class NoiseBasis:
 class Whitening:
     """Multiplication by an inverse root of the covariance sd^2 + source^2 h h^H + smooth part.
 
-    source_log_determinant   log determinant of the covariance over that of sd^2 alone: what the
-                             source's error adds, the only part that depends on h
-
     h         (S, F) prediction
     sd        (S, F) standard deviations of what is independent between sensors
     source    (F,) relative error of the source at each frequency; 0 known, inf free
@@ -48,24 +45,14 @@ class Whitening:
 
     def __init__(self, h, sd, source, nominal=NO_FREQUENCIES, basis=NO_BASIS):
         self._sd, self._nominal = sd, nominal
-        self._u, self._diagonal, self._left, self._right, self._pull, volume = prepare(
+        self._u, self._diagonal, self._left, self._right, self._volume = prepare(
             np.ascontiguousarray(h), sd, source, nominal, basis
         )
-        self.source_log_determinant = volume
 
     @cached_property
     def log_determinant(self) -> float:
         """Log determinant of the covariance; of a free source only the volume that is left."""
-        return 2.0 * float(np.sum(np.log(self._sd))) + self.source_log_determinant
-
-    def determinant_slopes(self, slopes: np.ndarray) -> np.ndarray:
-        """Derivatives (B,) of the log determinant, given those (B, S, F) of h.
-
-        d log det C = tr(C^-1 dC), with C = sd^2 + h S h^H and S the covariance of the source's
-        relative errors, is 2 Re sum P conj(h) dh / sd^2, P the variances that the readings leave
-        of those errors.
-        """
-        return 2.0 * (slopes.reshape(len(slopes), -1) @ np.conj(self._pull).ravel()).real
+        return 2.0 * float(np.sum(np.log(self._sd))) + self._volume
 
     def apply(self, x: np.ndarray) -> np.ndarray:
         """x (..., S, F) multiplied by the inverse root."""

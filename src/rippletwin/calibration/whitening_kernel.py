@@ -29,13 +29,11 @@ def prepare(h, sd, source, nominal, basis):
     u               (S, F)
     diagonal        (F,) of M
     left, right     (J, N): the rest of M is right^T left at the frequencies `nominal`
-    pull            (S, F), of which conj(pull) dh is half the change of the log determinant
     log determinant of the source's part
     """
     sensors, count = h.shape
     u, diagonal = np.empty_like(h), np.empty(count)
     size, stretch = np.empty(count), np.empty(count)
-    left_over, scale = np.empty(count), np.zeros(count)  # variances that the readings leave
     volume = 0.0
     for f in range(count):
         total = power = 0.0
@@ -48,26 +46,19 @@ def prepare(h, sd, source, nominal, basis):
             stretch[f] = 1.0
             diagonal[f] = 1.0 / size[f]
             volume += np.log(size[f] / power)
-            # The amplitude's scale is that of h, which takes away what its size adds.
-            left_over[f], scale[f] = 1.0 / size[f], 1.0 / power
         else:
             stretch[f] = 1.0 + source[f] ** 2 * size[f]
             diagonal[f] = (1.0 - 1.0 / np.sqrt(stretch[f])) / size[f]
             volume += np.log(stretch[f])
-            left_over[f] = source[f] ** 2 / stretch[f]
     left, right = np.zeros(basis.shape), np.zeros(basis.shape)
     if np.any(basis != 0.0):
-        volume += _prepare_smooth(size, stretch, nominal, basis, left, right, left_over)
-    pull = np.empty_like(h)
-    for s in range(sensors):
-        for f in range(count):
-            pull[s, f] = u[s, f] * (left_over[f] / sd[s, f] - scale[f] * sd[s, f])
-    return u, diagonal, left, right, pull, volume
+        volume += _prepare_smooth(size, stretch, nominal, basis, left, right)
+    return u, diagonal, left, right, volume
 
 
 @njit(cache=True, error_model="numpy")
-def _prepare_smooth(size, stretch, nominal, basis, left, right, left_over):
-    """Set `left` and `right`, add to `left_over`, and return the log determinant.
+def _prepare_smooth(size, stretch, nominal, basis, left, right):
+    """Set `left` and `right`, and return the log determinant.
 
     Whitened by all else, the smooth error is B c with unit c: I + B B^H in the span of B.
     """
@@ -92,7 +83,6 @@ def _prepare_smooth(size, stretch, nominal, basis, left, right, left_over):
                 along += turn[j, i] * columns[n, j]
             left[i, n] = along / stretch[f] * reduce
             right[i, n] = along / np.sqrt(stretch[f])
-            left_over[f] += along**2 / (1.0 + size_i) / stretch[f] ** 2
     return volume
 
 

@@ -171,7 +171,7 @@ class Rig:
     """The test bench; `pump` holds the keys of rig.yaml's pump (pistons, and geometry if given).
 
     `displacement`, m3 per revolution, follows from flow ripples that recordings state; None without
-    one.
+    one. `uncertainty` is `tolerance_scale` times what the data sheet states.
     """
 
     fluid: Fluid
@@ -181,6 +181,7 @@ class Rig:
     load: Load
     uncertainty: Uncertainty = Uncertainty()
     displacement: float | None = None
+    tolerance_scale: float = 1.0
 
     @property
     def length(self) -> float:

@@ -34,7 +34,7 @@ from functools import partial
 
 from threadpoolctl import threadpool_limits
 
-from rippletwin.calibration.posterior import MIN_MODEL_ERROR
+from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.case.model import Case, Recording, Rig
 from rippletwin.errors import InputError
 from rippletwin.explanation.checks.alarms import fit_each_observation, read_alarms
@@ -46,8 +46,14 @@ from rippletwin.explanation.checks.prior_sensitivity import (
     compare_without_each_effect,
 )
 from rippletwin.explanation.checks.profile_intervals import add_profile_intervals
+from rippletwin.explanation.checks.sensor_tolerance import add_sensor_tolerance
 from rippletwin.explanation.checks.sensor_wiring import find_swapped_sensors
-from rippletwin.explanation.checks.support import Judged, judge_beside_network, judge_effects
+from rippletwin.explanation.checks.support import (
+    Judged,
+    judge_beside_network,
+    judge_effects,
+    withhold_where_much_remains,
+)
 from rippletwin.explanation.fit_jobs import FitJob, PlainCalibration, open_workers
 from rippletwin.explanation.localise.free_corrections import locate_mismatch
 from rippletwin.explanation.localise.phase_modulation import (
@@ -60,6 +66,11 @@ from rippletwin.explanation.localise.shaft_order_intervals import add_amplitude_
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders, analyse_shaft_orders
 from rippletwin.explanation.localise.source_free_fits import refit_source_free
 from rippletwin.explanation.search.passive_networks import accepted_network, fit_passive_networks
+from rippletwin.explanation.search.sheet_tolerance import (
+    scale_tolerances,
+    tolerance_scale,
+    with_coordinates_of,
+)
 from rippletwin.explanation.search.stepwise_search import Search, resume_search, search_effects
 from rippletwin.explanation.verdict.decision import decide
 from rippletwin.explanation.verdict.explanation import Explanation
@@ -72,6 +83,7 @@ from rippletwin.twin.twin import Twin
 HIGHEST_HZ = 4000.0  # of the harmonics that are fitted
 MAX_MODEL_ERROR_FOR_COUPLING = 10.0 * MIN_MODEL_ERROR
 """Relative model error above which pressure and flow at the pump are too uncertain."""
+MAX_RESUMED = 2  # times
 
 Progress = Callable[[str, int, int], None]
 
@@ -126,7 +138,7 @@ def explain_observations(
     else:
         search = _search(state, processes, progress)
         state, search = _search_again(state, search, observations, processes, progress)
-        state, search = _search_with_coupled_pump(state, search, processes, progress)
+        state, search = _resume_search(state, search, processes, progress)
     base, data = state.base, state.observations
     early, late = _select_fitted(early, rig, data), _select_fitted(late, rig, data)
     halves = (early[0], late[0]) if len(data) == 1 and late else None
@@ -142,6 +154,7 @@ def explain_observations(
             if network is not None and set(judged.best.hypothesis) <= set(network.hypothesis):
                 network, judged = judge_beside_network(workers, search.base, network, judged)
                 search = replace(search, best=judged.best, passive_networks=[network, *networks])
+            judged = withhold_where_much_remains(judged, accepted_network(search) or search.best)
             contradiction = find_swapped_sensors(base, data, search)
         # Steps 11 to 14: checks
         point_fits = fit_each_observation(workers, search.base)
@@ -160,6 +173,8 @@ def explain_observations(
         sensitivity: tuple[PriorSensitivity, ...] = ()
         if decision.supports:
             sensitivity = compare_without_each_effect(workers, search.best, judged.without)
+    accepted = add_sensor_tolerance(decision.accepted, data)
+    decision = replace(decision, accepted=accepted)
     # Steps 17 and 18: where the mismatch is
     location = locate_mismatch(search.base, data)
     remainder = None if contradiction else find_remainder(decision.accepted, data)
@@ -269,19 +284,28 @@ def _search_again(
     return state, _search(state, processes, progress)
 
 
-def _search_with_coupled_pump(
+def _resume_search(
     state: _State, search: Search, processes: int, progress: Progress | None
 ) -> tuple[_State, Search]:
-    """Step 6: let a simulated pump respond to the line's pressure, and resume the search."""
-    if search.best.model_error >= MAX_MODEL_ERROR_FOR_COUPLING:
+    """Step 6: let a simulated pump respond to the line's pressure, widen the data sheet's
+    tolerances by what the fit shows, and resume the search."""
+    coupled = None
+    if search.best.model_error < MAX_MODEL_ERROR_FOR_COUPLING:
+        coupled = couple_pump_to_line(search.best.twin, state.observations)
+    scale = tolerance_scale(search.best)
+    if coupled is None and scale == 1.0:
         return state, search
-    coupled = couple_pump_to_line(search.best.twin, state.observations)
-    if coupled is None:
-        return state, search
-    base = Twin(state.base.rig, coupled, uncertain_pump=True, changing_state=True)
-    with open_workers(base, coupled, processes) as workers:
-        search = resume_search(workers, search, progress)
-    return _State(base, coupled, state.modulation), search
+    data = coupled or state.observations
+    for _ in range(MAX_RESUMED):
+        rig = scale_tolerances(state.base.rig, scale)
+        base = Twin(rig, data, uncertain_pump=True, changing_state=True)
+        with open_workers(base, data, processes) as workers:
+            search = resume_search(workers, with_coordinates_of(search, base), progress)
+        state = _State(base, data, state.modulation)
+        scale = tolerance_scale(search.best)  # the response of the pump may have hidden it
+        if scale == 1.0:
+            break
+    return state, search
 
 
 def _select_fitted(

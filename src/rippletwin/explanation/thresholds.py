@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit
-from rippletwin.calibration.posterior import MIN_MODEL_ERROR
 from rippletwin.case.model import Rig
 from rippletwin.twin.effects.base import Effect, Place
 
@@ -30,6 +30,11 @@ FALSE_ALARM_RATE = 0.02  # of cases without an effect, for the threshold of a bo
 GOOD_MODEL_ERROR = 1.25 * MIN_MODEL_ERROR
 """Relative model error up to which no effect can improve a fit noticeably. It saves work: beside
 such a fit no network is tried. No name depends on it."""
+
+MUCH_MODEL_ERROR = 0.05
+"""Relative model error above which only a usual effect is established. The checks of an effect
+allow for an error elsewhere to first order. Where physics is left out that makes more than a few
+per cent, an effect that is not there may pass them."""
 
 GOOD_RIPPLE_ERROR = 0.05
 """Relative error of the nominal ripple up to which the same holds. A line that lacks an element

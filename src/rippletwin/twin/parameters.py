@@ -48,6 +48,11 @@ class Parameter:
         """Value in `unit` at coordinate u."""
         return self.prior.value(u)
 
+    @property
+    def is_sheet_number(self) -> bool:
+        """Whether the data sheet states its tolerance."""
+        return self.name.partition("[")[0] in SHEET_NUMBERS
+
     def value_sd(self, u: float, u_sd: float) -> float:
         """Standard deviation in `unit` of a coordinate known as u +- u_sd (first order)."""
         h = 1e-4
@@ -69,6 +74,8 @@ def coordinates(parameters: Sequence[Parameter], by_name: Mapping[str, float]) -
     )
 
 
+SHEET_NUMBERS = ("wave_speed", "diameter", "length", "position", "viscosity", "load")
+"""Parameters, without their index, whose tolerance the data sheet states."""
 GUESSED_LOAD_SD = 1.0  # relative, of the load where its mean flow is guessed (`operating_point`)
 PORT_TIMING_SD = 1.0  # deg, of the port plate's angle to the swash plate
 PUMP_SDS = {

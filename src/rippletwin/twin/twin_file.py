@@ -77,6 +77,7 @@ def _rig(data: dict) -> Rig:
         load=Load(**load),
         uncertainty=Uncertainty(**data["uncertainty"]),
         displacement=data.get("displacement"),
+        tolerance_scale=data.get("tolerance_scale", 1.0),
     )
 
 

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
+from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit
-from rippletwin.calibration.posterior import MIN_MODEL_ERROR
 from rippletwin.explanation.fit_jobs import FitJob, FromTheta, Workers
 from rippletwin.explanation.localise.smooth_corrections import (
     NONE,
@@ -99,9 +99,11 @@ def fit_each_observation(workers: Workers, base: Fit) -> list[Fit]:
 
 
 def largest_pull(fit: Fit) -> tuple[float, str]:
-    """Largest |coordinate| of a line parameter with a prior, and the parameter's name."""
+    """Largest distance of a line parameter from the data sheet, in standard deviations as stated,
+    and the parameter's name."""
+    scale = fit.twin.rig.tolerance_scale
     pulls = [
-        (abs(float(u)), p.name)
+        (abs(float(u)) * (scale if p.is_sheet_number else 1.0), p.name)
         for p, u in zip(fit.twin.parameters, fit.twin.theta)
         if p.stated and not p.flat and "@" not in p.name
     ]

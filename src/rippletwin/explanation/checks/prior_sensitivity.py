@@ -12,9 +12,9 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.misfit import score_fit
-from rippletwin.calibration.posterior import MIN_MODEL_ERROR
 from rippletwin.case.model import Rig, Uncertainty
 from rippletwin.explanation.checks import alarms
 from rippletwin.explanation.fit_jobs import (

@@ -8,8 +8,8 @@ from itertools import combinations
 
 import numpy as np
 
+from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.frequency_continuation import fit_hypothesis
-from rippletwin.calibration.posterior import MIN_MODEL_ERROR
 from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
 from rippletwin.twin.twin import Twin

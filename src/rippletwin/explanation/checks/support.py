@@ -32,7 +32,11 @@ from rippletwin.explanation.localise.smooth_corrections import (
     position_spacing,
 )
 from rippletwin.explanation.search.stepwise_moves import extension_job
-from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR, PULL_ALARM
+from rippletwin.explanation.thresholds import (
+    MIN_LOG_BAYES_FACTOR,
+    MUCH_MODEL_ERROR,
+    PULL_ALARM,
+)
 
 HELD_OUT_STEPS = 8  # of the descent in shaft angle and state of a recording that was left out
 
@@ -114,6 +118,21 @@ def judge_beside_network(
         for support, gain in zip(judged.supports, lost)
     )
     return network, replace(judged, supports=supports)
+
+
+def withhold_where_much_remains(judged: Judged, explanation: Fit) -> Judged:
+    """Supports that are no more than `supported`, but of usual effects, where the `explanation`,
+    with a network if one stands in, leaves much."""
+    if explanation.model_error <= MUCH_MODEL_ERROR:
+        return judged
+    rig = judged.best.twin.rig
+    supports = tuple(
+        replace(support, level="supported")
+        if support.level == "established" and not effect.usual(rig, place)
+        else support
+        for support, (effect, place) in zip(judged.supports, judged.best.hypothesis)
+    )
+    return replace(judged, supports=supports)
 
 
 def _is_certain(fit: Fit, k: int) -> bool:

@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit, posterior_at_fit
-from rippletwin.calibration.posterior import MIN_MODEL_ERROR
 from rippletwin.explanation.localise.missing_immittance import whitened_columns
 from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR
 from rippletwin.line.frequency_domain.line_network import Insert

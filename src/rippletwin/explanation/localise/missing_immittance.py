@@ -83,10 +83,8 @@ def whitened_columns(
 
     A free source keeps its most likely amplitude at `prediction`.
     """
-    h = posterior.best_source(prediction)
-    amplitude = h / np.where(prediction == 0, 1.0, prediction)
     moved = np.asarray(moved)
-    stack = np.concatenate([h[None], (moved * amplitude).reshape(-1, *h.shape)])
+    stack = np.concatenate([prediction[None], moved.reshape(-1, *prediction.shape)])
     r = posterior.whitened(stack)[0]
     return (r[1:] - r[0]).reshape(moved.shape)
 

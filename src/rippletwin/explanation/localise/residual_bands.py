@@ -12,8 +12,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit, posterior_at_fit
-from rippletwin.calibration.posterior import MIN_MODEL_ERROR, Posterior
+from rippletwin.calibration.posterior import Posterior
 
 EXCESS_SHARE = 0.9  # of the excess that the intervals hold together
 MAX_INTERVALS = 4

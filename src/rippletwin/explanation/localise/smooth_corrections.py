@@ -72,8 +72,8 @@ class SmoothCorrections:
         self._expanded, self._at_mode = zip(*(self._expand(e, slopes) for e in self._errors))
 
     def _expand(self, model_error: float, slopes: np.ndarray) -> tuple[tuple, float]:
-        """Residual at theta = 0, scaled Jacobian (P, N) and constant part of the log determinant at
-        a model error; and half the square sum at the mode."""
+        """Residual at theta = 0, scaled Jacobian (P, N) and log determinant at a model error; and
+        half the square sum at the mode."""
         prior = self._posterior.prior
         self._posterior.model_error = float(model_error)
         r, jacobian = self._posterior.whiten_slopes(self._prediction, slopes)
@@ -82,7 +82,7 @@ class SmoothCorrections:
         expanded = (
             r - start @ jacobian,
             jacobian * scale,
-            self._posterior.constant_log_determinant(),
+            self._posterior.whitened(self._prediction)[1],
         )
         return expanded, 0.5 * float(r @ r + start @ start)
 
@@ -172,9 +172,7 @@ class SmoothCorrections:
             prediction = self._observe(network, element, share * correction, here)
             if not posterior.is_valid(prediction):
                 continue
-            r, log_determinant = posterior.whitened(prediction)
-            square = np.sum(np.abs(r) ** 2) + log_determinant
-            square -= posterior.constant_log_determinant()
+            square = np.sum(np.abs(posterior.whitened(prediction)[0]) ** 2)
             square += 0.5 * np.sum((start + share * (unit[:count] - start)) ** 2)
             square += 0.5 * np.sum((share * unit[count:]) ** 2)
             least = min(least, float(square))

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit, Hypothesis
-from rippletwin.calibration.posterior import MIN_MODEL_ERROR
 from rippletwin.explanation.fit_jobs import (
     Continuation,
     FitJob,

@@ -25,7 +25,9 @@ from functools import cached_property
 
 import numpy as np
 
-from rippletwin.calibration.posterior import FIRST_SOURCE_SD, MIN_MODEL_ERROR, Posterior
+from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
+from rippletwin.calibration.posterior import Posterior
+from rippletwin.calibration.reading_errors import FIRST_SOURCE_SD
 from rippletwin.case.model import Rig
 from rippletwin.explanation.search.stepwise_search import applicable_candidates
 from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR, MIN_LOG_BAYES_FACTOR
@@ -163,7 +165,7 @@ class _Rival:
         """Log evidence that this twin is expected to lose where these (S, F) are the readings."""
         posterior = self._posterior.with_values(readings)
         r, columns = posterior.whiten_slopes(self.readings, self._slopes)
-        r, columns = r[:-1], columns[:, :-1] * self._scale[:, None]  # the last is no reading
+        columns = columns * self._scale[:, None]
         projection = columns @ r
         absorbed = np.linalg.solve(np.eye(len(projection)) + columns @ columns.T, projection)
         return 0.5 * float(max(r @ r - projection @ absorbed, 0.0))

@@ -19,8 +19,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit
-from rippletwin.calibration.posterior import MIN_MODEL_ERROR, Posterior
+from rippletwin.calibration.posterior import Posterior
 from rippletwin.case.model import Rig
 from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR
 from rippletwin.explanation.verdict.candidate_recordings import (

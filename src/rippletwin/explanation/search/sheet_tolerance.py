@@ -1,0 +1,86 @@
+"""How far the data sheet is off: one factor on all its tolerances, estimated from a fit.
+
+Some numbers of a line are determined by the data, wave speeds above all, and others by the data
+sheet, such as the bore that all segments have in common. Where the first are several standard
+deviations off, the others are hardly better. So the tolerances of the data sheet get a common
+factor, the one of greatest evidence (empirical Bayes; MacKay 1992, Neural Computation 4:415, on the
+scale of a prior).
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+
+from rippletwin.calibration.fit import Fit
+from rippletwin.case.model import Rig, Uncertainty
+from rippletwin.explanation.search.stepwise_search import Search
+from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR
+from rippletwin.twin.parameters import coordinates
+from rippletwin.twin.twin import Twin
+
+SCALES = np.geomspace(1.0, 4.0, 13)
+
+
+def tolerance_scale(fit: Fit) -> float:
+    """The factor on the data sheet's tolerances with the greatest evidence, given a fit.
+
+    1 where no factor adds as much evidence as tells two explanations apart.
+    """
+    parameters = fit.twin.parameters
+    stated = [k for k, p in enumerate(parameters) if p.is_sheet_number]
+    if not stated or not np.isfinite(fit.evidence):
+        return 1.0
+    evidence = scale_evidence(fit.twin.theta[stated], fit.covariance[np.ix_(stated, stated)])
+    best = int(np.argmax(evidence))
+    return float(SCALES[best]) if evidence[best] >= EQUIVALENT_LOG_BAYES_FACTOR else 1.0
+
+
+def scale_evidence(mean: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """Log evidence of each of SCALES, less that of 1.
+
+    mean, covariance   (P,), (P, P) of the posterior with priors N(0, 1)
+
+    With the likelihood's precision L = covariance^-1 - I and b = covariance^-1 mean, a prior
+    N(0, k^2) has the log evidence b^T (L + I/k^2)^-1 b/2 - log det(I + k^2 L)/2 + const.
+    """
+    precision, unit = np.linalg.inv(covariance), np.eye(len(mean))
+    likelihood, b = precision - unit, precision @ mean
+    log_evidence = np.array(
+        [
+            0.5 * b @ np.linalg.solve(likelihood + unit / k**2, b)
+            - 0.5 * np.linalg.slogdet(unit + k**2 * likelihood)[1]
+            for k in SCALES
+        ]
+    )
+    return log_evidence - log_evidence[0]
+
+
+def scale_tolerances(rig: Rig, scale: float) -> Rig:
+    """The rig with `scale` times the data sheet's tolerances."""
+    names = {f.name for f in fields(Uncertainty)} - {"sensor_gain"}
+    wide = {name: scale * getattr(rig.uncertainty, name) for name in names}
+    return replace(
+        rig,
+        uncertainty=replace(rig.uncertainty, **wide),
+        tolerance_scale=scale * rig.tolerance_scale,
+    )
+
+
+def with_coordinates_of(search: Search, base: Twin) -> Search:
+    """A search whose fits have the coordinates of twins like `base`, to start fits from."""
+
+    def convert(fit: Fit) -> Fit:
+        twin = base.with_(effects=fit.hypothesis)
+        theta = coordinates(twin.parameters, fit.twin.values())
+        return replace(fit, twin=twin.with_(theta=theta))
+
+    return Search(
+        convert(search.base),
+        [convert(fit) for fit in search.single_effect_fits],
+        convert(search.best),
+        [convert(fit) for fit in search.rivals],
+        [convert(fit) for fit in search.passive_networks],
+        [convert(fit) for fit in search.other_positions],
+    )

@@ -1,0 +1,44 @@
+"""The factor on the data sheet's tolerances."""
+
+import numpy as np
+import pytest
+
+from paper_rig import paper_rig
+from rippletwin.explanation.search.sheet_tolerance import (
+    SCALES,
+    scale_evidence,
+    scale_tolerances,
+)
+
+
+def test_the_evidence_is_that_of_the_data_under_each_prior():
+    """Proves the closed form: data y = A u + noise with u ~ N(0, k^2) are Gaussian, and their log
+    density as a multivariate normal gives the same differences between the scales."""
+    rng = np.random.default_rng(1)
+    a, y = rng.normal(size=(7, 4)), rng.normal(size=7) * 3.0
+    covariance = np.linalg.inv(a.T @ a + np.eye(4))
+    evidence = scale_evidence(covariance @ a.T @ y, covariance)
+    densities = []
+    for k in SCALES:
+        total = np.eye(7) + k**2 * a @ a.T
+        densities.append(-0.5 * (y @ np.linalg.solve(total, y) + np.linalg.slogdet(total)[1]))
+    assert evidence == pytest.approx(np.array(densities) - densities[0], abs=1e-9)
+
+
+def test_numbers_twice_as_far_off_double_the_tolerances():
+    """Proves that the scale is found: of forty numbers that the data determine, drawn with twice
+    their stated deviation, the likeliest scale is near 2; drawn as stated it is near 1."""
+    rng = np.random.default_rng(2)
+    for true in (1.0, 2.0):
+        covariance = 0.01 * np.eye(40)
+        evidence = scale_evidence(true * rng.normal(size=40), covariance)
+        assert SCALES[int(np.argmax(evidence))] == pytest.approx(true, rel=0.2)
+
+
+def test_all_tolerances_are_scaled_but_that_of_the_sensors_gain():
+    """Proves that the rig tells how much wider its tolerances are, also when scaled again."""
+    rig = paper_rig(2)
+    wide = scale_tolerances(scale_tolerances(rig, 2.0), 1.5)
+    assert wide.tolerance_scale == 3.0
+    assert wide.uncertainty.diameter == pytest.approx(3.0 * rig.uncertainty.diameter)
+    assert wide.uncertainty.sensor_gain == rig.uncertainty.sensor_gain
