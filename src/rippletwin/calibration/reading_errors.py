@@ -299,6 +299,4 @@ class ReadingErrors:
     def _with_free_amplitudes(self, source: np.ndarray, h: np.ndarray) -> np.ndarray:
         if not self._sources.free.any():
             return source
-        return np.where(
-            self._sources.free, best_amplitude(self.values, h, self.variance()), source
-        )
+        return np.where(self._sources.free, best_amplitude(self.values, h, self.variance()), source)
