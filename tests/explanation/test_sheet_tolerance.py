@@ -1,5 +1,7 @@
 """The factor on the data sheet's tolerances."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from rippletwin.explanation.search.sheet_tolerance import (
     SCALES,
     scale_evidence,
     scale_tolerances,
+    tolerance_scale,
 )
 
 
@@ -42,3 +45,16 @@ def test_all_tolerances_are_scaled_but_that_of_the_sensors_gain():
     assert wide.tolerance_scale == 3.0
     assert wide.uncertainty.diameter == pytest.approx(3.0 * rig.uncertainty.diameter)
     assert wide.uncertainty.sensor_gain == rig.uncertainty.sensor_gain
+
+
+@pytest.mark.parametrize(("so_far", "found"), [(1.0, 4.0), (2.0, 2.0), (4.0, 1.0)])
+def test_the_tolerances_never_get_more_than_four_times_as_wide(so_far, found):
+    """Proves that a line whose physics is left out does not widen its data sheet without end: of
+    numbers twenty deviations off, each fit would ask for the largest factor again."""
+    twin = SimpleNamespace(
+        parameters=[SimpleNamespace(is_sheet_number=True)] * 6,
+        theta=np.full(6, 20.0),
+        rig=SimpleNamespace(tolerance_scale=so_far),
+    )
+    fit = SimpleNamespace(twin=twin, evidence=0.0, covariance=0.01 * np.eye(6))
+    assert tolerance_scale(fit) == pytest.approx(found)

@@ -49,8 +49,8 @@ are integrated out in closed form:
 
 m is the mean square of the measured harmonic over the sensors, K the covariance of eps. The smooth
 source and this covariance are held where the errors were estimated last, and a descent
-estimates them after each step: iteratively reweighted least squares (Jorgensen 2012, Encyclopedia
-of Environmetrics). A descent that could change the covariance would make the prediction small,
+estimates them after each step: iteratively reweighted least squares (Green 1984, J. R. Stat. Soc. B
+46:149). A descent that could change the covariance would make the prediction small,
 because that makes the errors of its source small. Explaining adds a least delta and the choice to
 be source-free: sigma is infinite, which projects amplitude and phase of the source out at every
 frequency. All observations stand side by side.
@@ -71,13 +71,12 @@ from rippletwin.calibration.source_expansion import (
     most_likely_expansion,
     whiten_with_source,
 )
-from rippletwin.calibration.whitening import NoiseBasis, Whitening
+from rippletwin.calibration.whitening import TINY, NoiseBasis, Whitening, best_amplitude
 
 FIRST_SOURCE_SD = 0.03  # before any residual is known
 FIRST_SIZES = ErrorSizes(smooth=0.0, source=FIRST_SOURCE_SD, model=0.1)
 SIZE_SD, SIZE_SD_OF_PUMP = 0.03, 0.01  # s, and s where the pump's numbers are parameters
 SOURCE_STEPS = 8  # at most, towards the most likely smooth error
-TINY = 1e-300
 
 
 class Sources(NamedTuple):
@@ -245,7 +244,7 @@ class ReadingErrors:
     def _expansion_by_readings(self, h: np.ndarray) -> SourceExpansion:
         """The expansion about the smooth part of the source that the readings alone suggest."""
         size = np.sum(np.abs(h) ** 2 / self.variance(), axis=0)
-        ratio = self._best_amplitude(h)
+        ratio = best_amplitude(self.values, h, self.variance())
         return self._smooth.expand_near(ratio, 1.0 / np.maximum(size * np.abs(ratio) ** 2, TINY))
 
     def _expand(self, h: np.ndarray) -> None:
@@ -290,8 +289,7 @@ class ReadingErrors:
     def _source(self, h: np.ndarray, independent: bool) -> np.ndarray:
         """Most likely source (F,), with or without its independent error."""
         whitening, expansion = self.whitening(h), self._expansion
-        whitened = whitening.apply(self.residual(h))
-        pull = np.sum(np.conj(h * expansion.factor) * whitening.adjoint(whitened), axis=0)
+        pull = whitening.pull(h * expansion.factor, self.residual(h))
         error = self._smooth.error(self._smooth.most_likely(pull, self.sizes.smooth))
         if independent:
             sd = np.where(self._sources.known, 0.0, self.sizes.source * self._sources.scale)
@@ -301,10 +299,4 @@ class ReadingErrors:
     def _with_free_amplitudes(self, source: np.ndarray, h: np.ndarray) -> np.ndarray:
         if not self._sources.free.any():
             return source
-        return np.where(self._sources.free, self._best_amplitude(h), source)
-
-    def _best_amplitude(self, h: np.ndarray) -> np.ndarray:
-        """Factor (F,) of the source at each frequency with which a prediction fits best."""
-        weight = 1.0 / self.variance()
-        size = np.maximum(np.sum(weight * np.abs(h) ** 2, axis=0), TINY)
-        return np.sum(weight * np.conj(h) * self.values, axis=0) / size
+        return np.where(self._sources.free, best_amplitude(self.values, h, self.variance()), source)

@@ -1,4 +1,4 @@
-"""The part of a nominal source's error that is smooth in frequency; see `posterior`."""
+"""The part of a nominal source's error that is smooth in frequency; see `reading_errors`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-CORRELATION_HZ = 1000.0  # l and f0 of `posterior`
+CORRELATION_HZ = 1000.0  # l and f0 of `reading_errors`
 MIN_HARMONIC = 0.01
 """Share of the strongest harmonic below which a harmonic of the source is uncertain by more than
 its own share."""
@@ -104,7 +104,7 @@ def smooth_basis(frequency_hz: np.ndarray, recording: np.ndarray) -> np.ndarray:
     frequency_hz   (N,)
     recording      (N,) number of the recording that each frequency belongs to
 
-    K is that of `posterior`.
+    K is that of `reading_errors`.
     """
     f = np.asarray(frequency_hz, float) / CORRELATION_HZ
     kernel = 1.0 + (1.0 + np.outer(f, f)) * np.exp(-0.5 * np.subtract.outer(f, f) ** 2)

@@ -42,8 +42,7 @@ def most_likely_expansion(data: SourceData, start: SourceExpansion, steps: int) 
         h = data.prediction * here.factor
         whitening = whiten_with_source(data, here)
         r = data.values - data.prediction * here.mean
-        pull = np.sum(np.conj(h) * whitening.adjoint(whitening.apply(r)), axis=0)
-        step = data.smooth.most_likely(pull, data.tau) - here.amplitudes
+        step = data.smooth.most_likely(whitening.pull(h, r), data.tau) - here.amplitudes
         alone = Whitening(h, data.sd, data.independent)
         cost = _cost(data, alone, here)
         for share in STEP_SHARES:

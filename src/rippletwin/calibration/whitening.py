@@ -9,6 +9,7 @@ import numpy as np
 from rippletwin.calibration.whitening_kernel import prepare, remove_along, rotate
 
 NO_FREQUENCIES, NO_BASIS = np.empty(0, np.int64), np.empty((0, 0))
+TINY = 1e-300  # size of a prediction that is nothing at every sensor
 
 
 class NoiseBasis:
@@ -62,6 +63,14 @@ class Whitening:
         """x (..., S, F) multiplied by the root's adjoint: adjoint(apply(x)) is C^-1 x."""
         return self._remove(x, self._right, self._left) / self._sd
 
+    def pull(self, h: np.ndarray, residual: np.ndarray) -> np.ndarray:
+        """Derivative (F,) of the log likelihood by a relative error of h (S, F) at each frequency,
+        the real part by its real part and the imaginary part by its imaginary part.
+
+        residual   (S, F) readings less the expected ones
+        """
+        return np.sum(np.conj(h) * self.adjoint(self.apply(residual)), axis=0)
+
     def _remove(self, x, left, right):
         rows = remove_along(_rows(x), self._u, self._diagonal, self._nominal, left, right)
         return rows.reshape(x.shape)
@@ -70,6 +79,15 @@ class Whitening:
 def _rows(x: np.ndarray) -> np.ndarray:
     """x (..., S, F) as (N, S, F), complex and contiguous."""
     return np.ascontiguousarray(x, complex).reshape(-1, *x.shape[-2:])
+
+
+def best_amplitude(values: np.ndarray, h: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    """Factor (F,) of h (S, F) at each frequency with which it fits values (S, F) best.
+
+    variance   (S, F) of the values, independent between sensors
+    """
+    size = np.sum(np.abs(h) ** 2 / variance, axis=0)
+    return np.sum(np.conj(h) * values / variance, axis=0) / np.maximum(size, TINY)
 
 
 def as_real(r: np.ndarray) -> np.ndarray:

@@ -19,6 +19,7 @@ from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.levenberg_marquardt import descend
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.shaft_angles import fit_shaft_angles
+from rippletwin.explanation.checks.alarms import largest_pull
 from rippletwin.explanation.checks.cross_validation import Fold, Halves, make_folds
 from rippletwin.explanation.checks.prior_sensitivity import WithoutEffect, fit_without_each_effect
 from rippletwin.explanation.checks.robustness import Robustness, compare_beside_corrections
@@ -120,10 +121,12 @@ def judge_beside_network(
     return network, replace(judged, supports=supports)
 
 
-def withhold_where_much_remains(judged: Judged, explanation: Fit) -> Judged:
-    """Supports that are no more than `supported`, but of usual effects, where the `explanation`,
-    with a network if one stands in, leaves much."""
-    if explanation.model_error <= MUCH_MODEL_ERROR:
+def withhold_on_a_doubtful_line(judged: Judged, explanation: Fit) -> Judged:
+    """Supports that are no more than `supported`, but of usual effects, where the line of the
+    `explanation`, with a network if one stands in, is in doubt: it leaves much, or contradicts the
+    data sheet."""
+    leaves_much = explanation.model_error > MUCH_MODEL_ERROR
+    if not leaves_much and largest_pull(explanation)[0] <= PULL_ALARM:
         return judged
     rig = judged.best.twin.rig
     supports = tuple(
@@ -176,13 +179,13 @@ def _judge_each(
     supports = []
     for k, (effect, place) in enumerate(best.hypothesis):
         robustness = compare_beside_corrections(present, absent[k], owns[k], spacing)
-        pull = _largest_pull(best, f"{effect.name}@{place}.")
+        pull = _pull_of_effect(best, f"{effect.name}@{place}.")
         level = support_level(robustness, held_out[k], pull)
         supports.append(Support(effect.name, str(place), level, robustness, held_out[k], pull))
     return tuple(supports)
 
 
-def _largest_pull(fit: Fit, label: str) -> float:
+def _pull_of_effect(fit: Fit, label: str) -> float:
     """Largest |coordinate| of the parameters of one effect; a position has no pull."""
     pulls = [
         abs(float(u))

@@ -21,19 +21,22 @@ from rippletwin.twin.parameters import coordinates
 from rippletwin.twin.twin import Twin
 
 SCALES = np.geomspace(1.0, 4.0, 13)
+ROUNDING = 1e-9
 
 
 def tolerance_scale(fit: Fit) -> float:
-    """The factor on the data sheet's tolerances with the greatest evidence, given a fit.
+    """The factor on a fit's tolerances of the data sheet with the greatest evidence.
 
-    1 where no factor adds as much evidence as tells two explanations apart.
+    With the factor that the fit's rig has already it is one of SCALES at most. 1 where no factor
+    adds as much evidence as tells two explanations apart.
     """
     parameters = fit.twin.parameters
     stated = [k for k, p in enumerate(parameters) if p.is_sheet_number]
     if not stated or not np.isfinite(fit.evidence):
         return 1.0
     evidence = scale_evidence(fit.twin.theta[stated], fit.covariance[np.ix_(stated, stated)])
-    best = int(np.argmax(evidence))
+    within = SCALES * fit.twin.rig.tolerance_scale <= SCALES[-1] * (1.0 + ROUNDING)
+    best = int(np.argmax(np.where(within, evidence, -np.inf)))
     return float(SCALES[best]) if evidence[best] >= EQUIVALENT_LOG_BAYES_FACTOR else 1.0
 
 
