@@ -126,7 +126,7 @@ def refit_poor_fits(workers: Workers, fits: list[Fit]) -> list[Fit]:
     ]
     jobs = []
     for fit in poor:
-        whole_line = fit.hypothesis[-1][0].element == "line"
+        whole_line = fit.hypothesis[-1][1].element == "line"
         draws = DRAWS_PER_MODE if whole_line and len(workers.observations) == 1 else 0
         starts = tuple(refined_starts(workers.base.rig, fit))
         jobs.append(FitJob(fit.hypothesis, Continuation(starts, draws)))
