@@ -93,6 +93,29 @@ def test_a_general_effect_needs_evidence_over_its_special_cases(general, special
         assert simplified.hypothesis[1] in special_cases
 
 
+@pytest.mark.parametrize("cost", [MIN_LOG_BAYES_FACTOR - 1, MIN_LOG_BAYES_FACTOR + 1])
+def test_walls_that_differ_need_evidence_over_walls_that_are_alike(cost):
+    """Creep of two segments becomes that of all segments, with half the parameters, unless that
+    costs MIN_LOG_BAYES_FACTOR; creep of a single segment is not tried as that of all."""
+    walls = [(HOSE[0], Place(f"segment {k}", k - 1)) for k in (1, 2)]
+    everywhere = (HOSE[0], Place("line"))
+    asked = []
+
+    def fit(jobs):
+        asked.extend(job.hypothesis for job in jobs)
+        return [made_fit(100.0 - cost, *job.hypothesis) for job in jobs]
+
+    workers = SimpleNamespace(base=SimpleNamespace(rig=rig()), fit=fit)
+    best = made_fit(100.0, *walls, VOLUME)
+    simplified = simplify_effects(workers, best, [*walls, everywhere])
+    assert asked == [(VOLUME, everywhere)]
+    merged = cost < MIN_LOG_BAYES_FACTOR
+    assert simplified.hypothesis == ((VOLUME, everywhere) if merged else best.hypothesis)
+    asked.clear()
+    simplify_effects(workers, made_fit(100.0, walls[0], VOLUME), [*walls, everywhere])
+    assert asked == []
+
+
 def test_the_general_form_of_an_effect_is_no_other_effect():
     """A volume at the load that a branch and a volume on the line fit as well is one family, told
     as such; a hose that fits as well is another effect."""

@@ -172,17 +172,33 @@ def fit_substitutes(workers: Workers, best: Fit, candidates: Sequence) -> list[F
 
 
 def simplify_effects(workers: Workers, best: Fit, candidates: Sequence) -> Fit:
-    """Replace each effect by a special case of it unless that costs MIN_LOG_BAYES_FACTOR.
+    """Replace each effect by a special case of it, and one of several segments by that of the whole
+    line, unless that costs MIN_LOG_BAYES_FACTOR.
 
     What the general effect has besides is further physics, which needs as much evidence as any.
     """
+    rig = workers.base.rig
+    simpler = [_alike(best.hypothesis, candidates)]
     for k, member in enumerate(best.hypothesis):
-        special = [c for c in candidates if is_limit(c, member, workers.base.rig)]
-        jobs = [FitJob(h, NearFit(best)) for h in _exchanges(best.hypothesis, k, special)]
+        special = [c for c in candidates if is_limit(c, member, rig)]
+        simpler.append(_exchanges(best.hypothesis, k, special))
+    for hypotheses in simpler:
+        jobs = [FitJob(h, NearFit(best)) for h in hypotheses]
         for fit in rank_by_evidence(workers.fit(jobs))[:1]:
             if fit.evidence > best.evidence - MIN_LOG_BAYES_FACTOR:
                 return simplify_effects(workers, fit, candidates)
     return best
+
+
+def _alike(hypothesis: Hypothesis, candidates: Sequence) -> list[Hypothesis]:
+    """The hypotheses in which an effect of at least two segments is alike in all of the line."""
+    found = []
+    for effect, place in candidates:
+        rest = tuple(m for m in hypothesis if m[0] is not effect)
+        whole_line = effect.element == "segment" and place.element == "line"
+        if whole_line and len(hypothesis) - len(rest) >= 2:
+            found.append((*rest, (effect, place)))
+    return found
 
 
 def drop_needless_effects(workers: Workers, best: Fit) -> Fit:
