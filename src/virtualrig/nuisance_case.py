@@ -71,7 +71,7 @@ def draw_nuisance_case(count: int, commit: str, number: int | str, index: int) -
     rng = random_generator(commit, number, "nuisance case", index)
     sheet = draw_sheet(rng)
     true = draw_true(sheet, rng, off=kind == "off")
-    nuisance = draw_nuisance(rng, len(sheet["sensors"]))
+    nuisance = draw_nuisance(rng, len(sheet["sensors"]), len(sheet["line"]["segments"]))
     points = draw_points(rng, fewest=1)
     context = RigContext(
         rng,
