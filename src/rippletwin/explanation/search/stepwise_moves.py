@@ -28,7 +28,7 @@ from rippletwin.explanation.thresholds import (
 )
 from rippletwin.twin.effects.library import is_form_of, is_limit, next_instance
 
-MAX_EFFECTS = 4  # different ones in one hypothesis
+MAX_EFFECTS = 4  # different ones in one hypothesis, beside the usual ones
 MAX_OF_ONE_EFFECT = 4  # at free positions
 SUBSTITUTES_TRIED = 10  # best single effects tried in the place of another
 MAX_MODEL_ERROR_FOR_EXACT_MODE = 10.0 * MIN_MODEL_ERROR
@@ -93,19 +93,15 @@ def _fit_promising(workers: Workers, best: Fit, jobs: Sequence[FitJob], report) 
 def _additions(rig, hypothesis: Hypothesis, candidates: Sequence) -> list:
     """The candidates that may still be added, each as the next of its kind.
 
-    What is known to be there before the search begins takes none of the MAX_EFFECTS.
+    The usual effects, which are tried before the search begins, take none of the MAX_EFFECTS.
     """
-    names = {
-        effect.name
-        for effect, place in hypothesis
-        if not (effect.usual(rig, place) and effect.certain(rig, place))
-    }
+    names = {effect.name for effect, place in hypothesis if not effect.usual(rig, place)}
     instances = [next_instance(candidate, hypothesis) for candidate in candidates]
     return [
         (effect, place)
         for effect, place in filter(None, instances)
         if place.number <= MAX_OF_ONE_EFFECT
-        and len(names | {effect.name}) <= MAX_EFFECTS
+        and (effect.usual(rig, place) or len(names | {effect.name}) <= MAX_EFFECTS)
         and not any(is_form_of(member, (effect, place), rig) for member in hypothesis)
     ]
 
