@@ -266,12 +266,15 @@ def test_always_present_effects_are_fitted_whatever_they_promise(monkeypatch):
     assert asked == [ALWAYS_PRESENT]
 
 
-def test_the_pumps_volume_takes_no_room_from_what_is_searched_for(monkeypatch):
-    """Beside it there may be four different effects, and no fifth. Radiation from an open end is
-    searched for with the others, and is one of four."""
+def test_usual_effects_take_no_room_from_what_is_searched_for(monkeypatch):
+    """Beside the pump's volume and friction there may be four different effects, and no fifth, but
+    another usual one. Radiation from an open end is searched for with the others, and is one of
+    four."""
     monkeypatch.setattr(stepwise_moves, "rank_at_exact_modes", lambda workers, best, fits: fits)
-    four = [(EFFECTS[name], Place("line")) for name in ("unsteady_friction", "entrained_air")]
+    four = [(EFFECTS["entrained_air"], Place("line")), (EFFECTS["leak"], Place("position"))]
     four += [HOSE, VOLUME]
+    usual = [VOLUME_AT_PUMP, (EFFECTS["unsteady_friction"], Place("line"))]
+    walls = (HOSE[0], Place("line"))
     gain = (EFFECTS["sensor_gain"], Place("sensor p1", 0))
     stated = replace(rig(), displacement=2e-5)
     asked = []
@@ -281,9 +284,10 @@ def test_the_pumps_volume_takes_no_room_from_what_is_searched_for(monkeypatch):
         return []
 
     workers = SimpleNamespace(fit=fit, base=SimpleNamespace(rig=stated))
-    fit_extensions(workers, made_fit(0.0, VOLUME_AT_PUMP, *four[:3]), [gain], None)
+    fit_extensions(workers, made_fit(0.0, *usual, *four[:3]), [gain], None)
     assert asked == [gain]
-    fit_extensions(workers, made_fit(0.0, VOLUME_AT_PUMP, *four), [gain], None)
+    fit_extensions(workers, made_fit(0.0, *usual, *four), [gain, walls], None)
+    assert asked.pop() == walls
     radiation = (EFFECTS["end_radiation"], Place("load"))
     fit_extensions(workers, made_fit(0.0, radiation, *four[:3]), [gain], None)
     assert asked == [gain]

@@ -213,7 +213,10 @@ def main() -> int:
                 failed.append(name)
             else:
                 (arguments.found / f"{name}.log").unlink()
-            print(f"{name}: {'see ' if process.exitcode else 'nothing in '}{arguments.found}", flush=True)
+            print(
+                f"{name}: {'see ' if process.exitcode else 'nothing in '}{arguments.found}",
+                flush=True,
+            )
     return 1 if failed else 0
 
 
