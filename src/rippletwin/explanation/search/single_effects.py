@@ -61,8 +61,8 @@ def fit_single_effects(
 
 
 def _add_usual_effects(workers: Workers, base: Fit, fits: Sequence[Fit]) -> Fit:
-    """`base` with the set of usual effects that adds most evidence beyond what each must add; `fits`
-    are those of one each.
+    """`base` with the set of usual effects that adds most evidence beyond what each must add, where
+    the set adds enough; `fits` are those of one each.
 
     All sets are tried: friction and creep both damp, so that the first alone may do for both.
     """
@@ -79,12 +79,10 @@ def _add_usual_effects(workers: Workers, base: Fit, fits: Sequence[Fit]) -> Fit:
     rig = workers.base.rig
 
     def surplus(fit: Fit) -> float:
-        certain = [c for c in fit.hypothesis if c[0].certain(rig, c[1])]
-        if fit.hypothesis and len(certain) == len(fit.hypothesis):
-            return fit.evidence - MIN_LOG_BAYES_FACTOR  # nothing else shows that the line lacks it
         return fit.evidence - sum(min_log_bayes_factor(rig, *c) for c in fit.hypothesis)
 
-    return max([base, *found.values()], key=surplus)
+    best = max(found.values(), key=surplus, default=base)
+    return best if best.evidence >= base.evidence + MIN_LOG_BAYES_FACTOR else base
 
 
 def _fit_each_alone(
