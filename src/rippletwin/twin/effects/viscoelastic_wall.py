@@ -21,6 +21,10 @@ def _places(rig):
     return (*segment_places(rig), *((Place(LINE),) if len(rig.line) > 1 else ()))
 
 
+def _is_whole_line(rig, place):
+    return place.element == LINE or len(rig.line) == 1
+
+
 def _apply(network, state, values, place):
     creep = values["compliance_ratio"] / (1.0 + network.s * values["retardation_time"])
     for k in _segments(network.shunt, place):
@@ -47,11 +51,11 @@ EFFECT = Effect(
     source="Franke & Seyler 1983, J. Hydraulic Res. 21:349; one Kelvin-Voigt element, "
     "Covas et al. 2005, J. Hydraulic Res. 43:56, eq. 10",
     parameters=lambda rig, place: (
-        Parameter("compliance_ratio", "1", ALL_WALLS if place.element == LINE else HOSE),
+        Parameter("compliance_ratio", "1", ALL_WALLS if _is_whole_line(rig, place) else HOSE),
         Parameter("retardation_time", "s", lognormal(3e-4, 1.3), (-1.0, 0.7)),
     ),
     places=_places,
     apply=_apply,
     apply_in_time=_apply_in_time,
-    usual=lambda rig, place: place.element == LINE,
+    usual=_is_whole_line,
 )
