@@ -30,6 +30,8 @@ sys.path[:0] = [str(ROOT / "tests/helpers"), str(ROOT / "workflow")]
 with atheris.instrument_imports(include=["rippletwin", "nptdms", "pyuff", "scipy.io", "yaml"]):
     import yaml
     from snakemake.exceptions import WorkflowError
+    from test_fuzz_readers import TABLES
+    from test_fuzz_results import RESULTS
 
     from case_folders import ripple, sheet, write_case, write_hdf5
     from config_errors import check_config
@@ -43,8 +45,6 @@ with atheris.instrument_imports(include=["rippletwin", "nptdms", "pyuff", "scipy
     from rippletwin.learning.kept_networks import load_networks
     from rippletwin.report.page import report_case
     from rippletwin.twin.twin_file import load_twin
-    from test_fuzz_readers import TABLES
-    from test_fuzz_results import RESULTS
 
 SECONDS = 60  # that an input may take
 LONGEST = 1 << 16  # bytes of an input
