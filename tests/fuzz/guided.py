@@ -4,8 +4,8 @@
 
 Each reader runs in a process of its own. It ends at the first input that is neither read nor
 refused with an InputError, or that takes longer than SECONDS or more than MORE_MEMORY. That input
-is kept in FOUND with a log, and the exit status is 1. With CORPUS a later run goes on from the inputs that
-this one found worth keeping. Needs the extra `fuzz` (atheris).
+is kept in FOUND with a log, and the exit status is 1. With CORPUS a later run goes on from the
+inputs that this one found worth keeping. Needs the extra `fuzz` (atheris).
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ def prepare_twin(folder: Path) -> Reader:
 
 
 def prepare_result(name: str, folder: Path) -> Reader:
-    """A file that the page shows; recordings' spectra, which take most of its time, are left out."""
+    """A file that the page shows. Recordings' spectra take most of its time and are left out."""
     write_results(folder)
 
     def read():

@@ -172,7 +172,8 @@ def test_unsteady_friction_replaces_steady():
 
 def test_walls_that_creep_alike_are_those_of_every_segment():
     """Creep of the whole line equals the same creep put into one segment after the other, in the
-    frequency domain and in the pipes of the time domain. A line of one segment has no such place."""
+    frequency domain and in the pipes of the time domain. A line of one segment has no such
+    place."""
     wall, everywhere = EFFECTS["viscoelastic_wall"], Place("line")
     assert everywhere in wall.places(rig()) and wall.usual(rig(), everywhere)
     assert everywhere not in wall.places(replace(rig(), line=rig().line[:1]))
