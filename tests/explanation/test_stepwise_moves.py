@@ -267,14 +267,14 @@ def test_always_present_effects_are_fitted_whatever_they_promise(monkeypatch):
 
 
 def test_usual_effects_take_no_room_from_what_is_searched_for(monkeypatch):
-    """Beside the pump's volume and friction there may be four different effects, and no fifth, but
-    another usual one. Radiation from an open end is searched for with the others, and is one of
-    four."""
+    """Beside the pump's volume and creep of all walls there may be four different effects, and no
+    fifth, but another usual one. Radiation from an open end is searched for with the others, and is
+    one of four; so is friction."""
     monkeypatch.setattr(stepwise_moves, "rank_at_exact_modes", lambda workers, best, fits: fits)
     four = [(EFFECTS["entrained_air"], Place("line")), (EFFECTS["leak"], Place("position"))]
     four += [HOSE, VOLUME]
-    usual = [VOLUME_AT_PUMP, (EFFECTS["unsteady_friction"], Place("line"))]
-    walls = (HOSE[0], Place("line"))
+    usual = [VOLUME_AT_PUMP, (HOSE[0], Place("line"))]
+    friction = (EFFECTS["unsteady_friction"], Place("line"))
     gain = (EFFECTS["sensor_gain"], Place("sensor p1", 0))
     stated = replace(rig(), displacement=2e-5)
     asked = []
@@ -286,8 +286,8 @@ def test_usual_effects_take_no_room_from_what_is_searched_for(monkeypatch):
     workers = SimpleNamespace(fit=fit, base=SimpleNamespace(rig=stated))
     fit_extensions(workers, made_fit(0.0, *usual, *four[:3]), [gain], None)
     assert asked == [gain]
-    fit_extensions(workers, made_fit(0.0, *usual, *four), [gain, walls], None)
-    assert asked.pop() == walls
-    radiation = (EFFECTS["end_radiation"], Place("load"))
-    fit_extensions(workers, made_fit(0.0, radiation, *four[:3]), [gain], None)
+    fit_extensions(workers, made_fit(0.0, *usual, *four), [gain, friction], None)
+    assert asked.pop() == friction
+    for counted in ((EFFECTS["end_radiation"], Place("load")), friction):
+        fit_extensions(workers, made_fit(0.0, counted, *four[:3]), [gain], None)
     assert asked == [gain]

@@ -28,7 +28,9 @@ from rippletwin.explanation.thresholds import (
 )
 from rippletwin.twin.effects.library import is_form_of, is_limit, next_instance
 
-MAX_EFFECTS = 4  # different ones in one hypothesis, beside the usual ones
+MAX_EFFECTS = 4
+"""Different effects in one hypothesis, boundary layers included, the pump's volume and creep of all
+walls not. With more, effects that are not there were established in measured tubes."""
 MAX_OF_ONE_EFFECT = 4  # at free positions
 SUBSTITUTES_TRIED = 10  # best single effects tried in the place of another
 MAX_MODEL_ERROR_FOR_EXACT_MODE = 10.0 * MIN_MODEL_ERROR
@@ -93,9 +95,14 @@ def _fit_promising(workers: Workers, best: Fit, jobs: Sequence[FitJob], report) 
 def _additions(rig, hypothesis: Hypothesis, candidates: Sequence) -> list:
     """The candidates that may still be added, each as the next of its kind.
 
-    The usual effects, which are tried before the search begins, take none of the MAX_EFFECTS.
+    Usual effects are tried before the search begins and may always join. Those with parameters take
+    none of the MAX_EFFECTS; boundary layers, which have none, do.
     """
-    names = {effect.name for effect, place in hypothesis if not effect.usual(rig, place)}
+    names = {
+        effect.name
+        for effect, place in hypothesis
+        if not (effect.usual(rig, place) and effect.parameters(rig, place))
+    }
     instances = [next_instance(candidate, hypothesis) for candidate in candidates]
     return [
         (effect, place)
