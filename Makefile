@@ -7,7 +7,7 @@ export OMP_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 export NUMBA_NUM_THREADS = 1
 
-.PHONY: run smoke test test-long coverage mutants lint docs-site bench pins audit clean
+.PHONY: run smoke test test-long coverage mutants fuzz lint docs-site bench pins audit clean
 
 run: .venv/ready
 	$(BIN)/snakemake --cores $(CORES)
@@ -30,6 +30,12 @@ coverage: .venv/ready
 # Faults put into the verdict's rules, the scoring and the readers, one at a time: what share the tests notice.
 mutants: .venv/ready
 	$(BIN)/python benchmarks/mutants.py
+
+# Inputs of every reader, guided by the branches that they reach; what is found is kept in fuzz_found.
+INPUTS ?= 10000
+fuzz: .venv/ready
+	$(BIN)/python -m pip install --quiet ".[fuzz]"
+	$(BIN)/python tests/fuzz/guided.py --inputs $(INPUTS) --corpus .fuzz
 
 lint: .venv/ready
 	$(BIN)/ruff check .
@@ -75,4 +81,4 @@ audit:
 	.venv-audit/bin/pip-audit --requirement .venv-audit/pins --no-deps --disable-pip
 
 clean:
-	rm -rf .venv .venv-* .snakemake .site .coverage results
+	rm -rf .venv .venv-* .snakemake .site .coverage .fuzz results

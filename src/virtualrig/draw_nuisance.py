@@ -83,6 +83,8 @@ NUISANCE = {
         "estimate: slip of induction motors with mains and load"),
     "session_kelvin": Range(0.5, 2.5, "K", "signed", "state: warmer or colder than when healthy",
         "0.3 % of wave speed and 4 % of viscosity a kelvin (Gholizadeh et al. 2011; ASTM D341)"),
+    "wall_factor": Range(0.7, 1.4, "times", "log", "line: that compliance in each segment",
+        "estimate: seals and clamps of one line differ by a third"),
     "laminar": Range(0.1, 0.6, "of the flow", "uniform", "leaks: laminar share",
         "McCandlish and Dorey 1984; Bergada et al. 2010"),
 }  # fmt: skip
@@ -91,12 +93,15 @@ RECORDING_KELVIN = 0.4  # standard deviation of the temperature from recording t
 LOAD_ERROR = 0.005  # relative standard deviation of the load pressure that the operator sets
 SPEED_ERROR = 0.001
 EACH_SENSOR = ("cavity", "cavity_hz", "cavity_damping", "gain", "offset")
+EACH_SEGMENT = ("wall_factor",)
 
 
-def draw_nuisance(rng: np.random.Generator, sensors: int) -> dict:
-    """A value of every quantity of NUISANCE but `laminar`; of EACH_SENSOR a list."""
+def draw_nuisance(rng: np.random.Generator, sensors: int, segments: int) -> dict:
+    """A value of every quantity of NUISANCE but `laminar`; of EACH_SENSOR and EACH_SEGMENT a
+    list."""
+    counts = dict.fromkeys(EACH_SENSOR, sensors) | dict.fromkeys(EACH_SEGMENT, segments)
     return {
-        name: [given.draw(rng) for _ in range(sensors)] if name in EACH_SENSOR else given.draw(rng)
+        name: [given.draw(rng) for _ in range(counts[name])] if name in counts else given.draw(rng)
         for name, given in NUISANCE.items()
         if name != "laminar"
     }

@@ -65,7 +65,7 @@ def draw_rig(commit: str, number: int | str, rig: int) -> DrawnRig:
     rng = random_generator(commit, number, "population", rig)
     sheet = draw_sheet(rng)
     true = draw_true(sheet, rng)
-    nuisance = draw_nuisance(rng, len(sheet["sensors"]))
+    nuisance = draw_nuisance(rng, len(sheet["sensors"]), len(sheet["line"]["segments"]))
     points = draw_points(rng)
     plans = [
         PlannedRecording(replace(points[0], label=f"healthy_0_{k}"), "healthy")

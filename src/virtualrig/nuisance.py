@@ -24,15 +24,18 @@ def seal_at(
     arguments of the effect `side_branch`, and `effects`, entries of a seal, which come last: they
     replace what the nuisance physics says of the same sensor.
     """
+    compliance, time = nuisance["wall_compliance"], nuisance["wall_time"]
+    walled = [
+        {"wall": (compliance * factor, time)} | segment
+        for factor, segment in zip(nuisance["wall_factor"], true["line"]["segments"], strict=True)
+    ]
     segments = cut_with_gradient(
-        true["line"]["segments"],
+        walled,
         true["sensors"],
         true["fluid"]["kinematic_viscosity"],
         nuisance["temperature_drop"],
         kelvin,
     )
-    for piece in segments:
-        piece.setdefault("wall", (nuisance["wall_compliance"], nuisance["wall_time"]))
     effects = [{"name": "unsteady_friction"}]
     for k, position in enumerate(true["sensors"]):
         effects += [

@@ -71,7 +71,7 @@ def draw_nuisance_case(count: int, commit: str, number: int | str, index: int) -
     rng = random_generator(commit, number, "nuisance case", index)
     sheet = draw_sheet(rng)
     true = draw_true(sheet, rng, off=kind == "off")
-    nuisance = draw_nuisance(rng, len(sheet["sensors"]))
+    nuisance = draw_nuisance(rng, len(sheet["sensors"]), len(sheet["line"]["segments"]))
     points = draw_points(rng, fewest=1)
     context = RigContext(
         rng,
@@ -148,10 +148,11 @@ def nuisance_effects(sheet: dict, true: dict, nuisance: dict, geometry: bool) ->
     The pump responds to the line; where the data sheet gives its geometry, its chambers differ from
     the sheet's.
     """
+    segments = [f"segment {k}" for k in range(1, len(true["line"]["segments"]) + 1)]
     line = [("unsteady_friction", "line", {}, None)]
     line += [
-        ("viscoelastic_wall", f"segment {k}", {}, None)
-        for k in range(1, len(true["line"]["segments"]) + 1)
+        ("viscoelastic_wall", element, {}, None)
+        for element in ("line", *segments)  # all walls creep alike
     ]
     for name, position in zip([s["name"] for s in sheet["sensors"]], true["sensors"]):
         line.append(("line_volume", "position", {}, position))

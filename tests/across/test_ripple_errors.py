@@ -30,10 +30,13 @@ def test_the_likelihood_is_greatest_at_the_parameters_of_the_draws():
             assert minus_log_likelihood(other, pumps) > least + 10.0
 
 
-def test_a_drawn_pump_makes_less_of_the_highest_harmonics_than_its_sheet():
-    """Relief grooves spread the backflow over the angle at which they open: of a drawn pump's
-    harmonics above 2 kHz less is left than of those below 500 Hz."""
-    frequency_hz, orders, error = ripple_error(1043, 3, 0)[0]
-    assert np.all(np.diff(orders) == orders[0])
-    low, high = error.real[frequency_hz < 500.0], error.real[frequency_hz > 2000.0]
-    assert np.mean(high) < np.mean(low) - 0.3
+def test_drawn_pumps_make_less_of_the_highest_harmonics_than_their_sheets():
+    """Relief grooves spread the backflow over the angle at which they open: of the harmonics above
+    2 kHz less is left than of those below 500 Hz, by more than half in the mean of six pumps."""
+    falls = []
+    for pump in range(6):
+        frequency_hz, orders, error = ripple_error(1043, 6, pump)[0]
+        assert np.all(np.diff(orders) == orders[0])
+        low, high = error.real[frequency_hz < 500.0], error.real[frequency_hz > 2000.0]
+        falls.append(np.mean(low) - np.mean(high))
+    assert np.mean(falls) > np.log(2.0)

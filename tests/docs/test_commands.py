@@ -45,6 +45,7 @@ NOT_RUN = {
     "make test-long": ("it runs this test", "make --dry-run test-long"),
     "make coverage": ("it runs this test", "make --dry-run coverage"),
     "make mutants": (HOURS, "make --dry-run mutants"),
+    "make fuzz": (HOURS, "make --dry-run fuzz"),
     "python benchmarks/soak.py my_case": (HOURS, "python benchmarks/soak.py --help"),
     "python3 -m venv .venv": (NETWORK, "python3 -m venv --help"),
     ". .venv/bin/activate": ("it needs the environment above", "true"),

@@ -59,3 +59,25 @@ def test_an_exchange_back_to_an_earlier_explanation_ends_the_search(monkeypatch)
     start = Search(made_fit(0.0), [], volume)
     found = _search_stepwise(SimpleNamespace(), start, [VOLUME, BRANCH, WALL], None)
     assert found.best is both and len(exchanges) == 1
+
+
+def test_a_better_substitute_goes_on_with_the_search(monkeypatch):
+    """Where no extension and no exchange of the best single effects is better, but a branch in the
+    volume's place is, the search goes on beside the branch and finds the wall."""
+    fits = {(VOLUME,): 100.0, (BRANCH,): 130.0, (BRANCH, WALL): 150.0}
+
+    def extend(workers, best, candidates, progress):
+        longer = (*best.hypothesis, WALL)
+        return [made_fit(fits[longer], *longer)] if longer in fits else []
+
+    def substitute(workers, best, candidates):
+        return [made_fit(130.0, BRANCH)] if best.hypothesis == (VOLUME,) else []
+
+    monkeypatch.setattr(stepwise_search, "exchange_effects", lambda w, best, fits: best)
+    monkeypatch.setattr(stepwise_search, "_revise", lambda w, best, candidates: best)
+    monkeypatch.setattr(stepwise_search, "move_to_best_position", lambda w, fit: (fit, []))
+    monkeypatch.setattr(stepwise_search, "fit_extensions", extend)
+    monkeypatch.setattr(stepwise_search, "fit_substitutes", substitute)
+    start = Search(made_fit(0.0), [], made_fit(100.0, VOLUME))
+    found = _search_stepwise(SimpleNamespace(), start, [VOLUME, BRANCH, WALL], None)
+    assert found.best.hypothesis == (BRANCH, WALL)

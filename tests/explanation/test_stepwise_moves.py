@@ -93,6 +93,29 @@ def test_a_general_effect_needs_evidence_over_its_special_cases(general, special
         assert simplified.hypothesis[1] in special_cases
 
 
+@pytest.mark.parametrize("cost", [MIN_LOG_BAYES_FACTOR - 1, MIN_LOG_BAYES_FACTOR + 1])
+def test_walls_that_differ_need_evidence_over_walls_that_are_alike(cost):
+    """Creep of two segments becomes that of all segments, with half the parameters, unless that
+    costs MIN_LOG_BAYES_FACTOR; creep of a single segment is not tried as that of all."""
+    walls = [(HOSE[0], Place(f"segment {k}", k - 1)) for k in (1, 2)]
+    everywhere = (HOSE[0], Place("line"))
+    asked = []
+
+    def fit(jobs):
+        asked.extend(job.hypothesis for job in jobs)
+        return [made_fit(100.0 - cost, *job.hypothesis) for job in jobs]
+
+    workers = SimpleNamespace(base=SimpleNamespace(rig=rig()), fit=fit)
+    best = made_fit(100.0, *walls, VOLUME)
+    simplified = simplify_effects(workers, best, [*walls, everywhere])
+    assert asked == [(VOLUME, everywhere)]
+    merged = cost < MIN_LOG_BAYES_FACTOR
+    assert simplified.hypothesis == ((VOLUME, everywhere) if merged else best.hypothesis)
+    asked.clear()
+    simplify_effects(workers, made_fit(100.0, walls[0], VOLUME), [*walls, everywhere])
+    assert asked == []
+
+
 def test_the_general_form_of_an_effect_is_no_other_effect():
     """A volume at the load that a branch and a volume on the line fit as well is one family, told
     as such; a hose that fits as well is another effect."""
@@ -243,12 +266,15 @@ def test_always_present_effects_are_fitted_whatever_they_promise(monkeypatch):
     assert asked == [ALWAYS_PRESENT]
 
 
-def test_the_pumps_volume_takes_no_room_from_what_is_searched_for(monkeypatch):
-    """Beside it there may be four different effects, and no fifth. Radiation from an open end is
-    searched for with the others, and is one of four."""
+def test_usual_effects_take_no_room_from_what_is_searched_for(monkeypatch):
+    """Beside the pump's volume and creep of all walls there may be four different effects, and no
+    fifth, but another usual one. Radiation from an open end is searched for with the others, and is
+    one of four; so is friction."""
     monkeypatch.setattr(stepwise_moves, "rank_at_exact_modes", lambda workers, best, fits: fits)
-    four = [(EFFECTS[name], Place("line")) for name in ("unsteady_friction", "entrained_air")]
+    four = [(EFFECTS["entrained_air"], Place("line")), (EFFECTS["leak"], Place("position"))]
     four += [HOSE, VOLUME]
+    usual = [VOLUME_AT_PUMP, (HOSE[0], Place("line"))]
+    friction = (EFFECTS["unsteady_friction"], Place("line"))
     gain = (EFFECTS["sensor_gain"], Place("sensor p1", 0))
     stated = replace(rig(), displacement=2e-5)
     asked = []
@@ -258,9 +284,10 @@ def test_the_pumps_volume_takes_no_room_from_what_is_searched_for(monkeypatch):
         return []
 
     workers = SimpleNamespace(fit=fit, base=SimpleNamespace(rig=stated))
-    fit_extensions(workers, made_fit(0.0, VOLUME_AT_PUMP, *four[:3]), [gain], None)
+    fit_extensions(workers, made_fit(0.0, *usual, *four[:3]), [gain], None)
     assert asked == [gain]
-    fit_extensions(workers, made_fit(0.0, VOLUME_AT_PUMP, *four), [gain], None)
-    radiation = (EFFECTS["end_radiation"], Place("load"))
-    fit_extensions(workers, made_fit(0.0, radiation, *four[:3]), [gain], None)
+    fit_extensions(workers, made_fit(0.0, *usual, *four), [gain, friction], None)
+    assert asked.pop() == friction
+    for counted in ((EFFECTS["end_radiation"], Place("load")), friction):
+        fit_extensions(workers, made_fit(0.0, counted, *four[:3]), [gain], None)
     assert asked == [gain]

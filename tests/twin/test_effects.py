@@ -1,6 +1,7 @@
 """The library of effects: what every effect must be, and limits that are known by other means."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor
 from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
+from rippletwin.line.time_domain.line_elements import Pipe
 from rippletwin.twin import twin_file
 from rippletwin.twin.effects.base import LineState, Place
 from rippletwin.twin.effects.library import EFFECTS, candidates
@@ -166,6 +168,27 @@ def test_unsteady_friction_replaces_steady():
     net, state = network(rig())
     EFFECTS["unsteady_friction"].apply(net, state, {}, Place("line"))
     np.testing.assert_allclose(net.series, network(rig(), "unsteady")[0].series, rtol=1e-10)
+
+
+def test_walls_that_creep_alike_are_those_of_every_segment():
+    """Creep of the whole line equals the same creep put into one segment after the other, in the
+    frequency domain and in the pipes of the time domain. A line of one segment has no such
+    place."""
+    wall, everywhere = EFFECTS["viscoelastic_wall"], Place("line")
+    assert everywhere in wall.places(rig()) and wall.usual(rig(), everywhere)
+    assert everywhere not in wall.places(replace(rig(), line=rig().line[:1]))
+    values = {"compliance_ratio": 0.01, "retardation_time": 2e-4}
+    one, state = network(rig())
+    each, _ = network(rig())
+    pipes = [Pipe(s.length, s.diameter, s.wave_speed) for s in rig().line]
+    at_once, in_turn = SimpleNamespace(pipes=[*pipes]), SimpleNamespace(pipes=[*pipes])
+    wall.apply(one, state, values, everywhere)
+    wall.apply_in_time(at_once, state, values, everywhere)
+    for place in wall.places(rig())[:2]:
+        wall.apply(each, state, values, place)
+        wall.apply_in_time(in_turn, state, values, place)
+    np.testing.assert_allclose(one.shunt, each.shunt, rtol=1e-12)
+    assert at_once.pipes == in_turn.pipes and at_once.pipes[1].creep == ((0.01, 2e-4),)
 
 
 def test_short_branch_is_a_volume():

@@ -56,7 +56,8 @@ def test_nuisance_physics_is_part_of_the_truth():
     rig = case.rig
     listed = nuisance_effects(rig.sheet, rig.true, rig.nuisance, case.geometry)
     places = {(effect["name"], effect["element"]) for effect in listed}
-    assert ("unsteady_friction", "line") in places
+    assert {("unsteady_friction", "line"), ("viscoelastic_wall", "line")} <= places
+    assert ("viscoelastic_wall", "segment 2") in places
     assert all(("sensor_gain", f"sensor {s['name']}") in places for s in rig.sheet["sensors"])
     volumes = [e["position"] for e in listed if e["name"] == "line_volume"]
     assert volumes == list(rig.true["sensors"])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from virtualrig.draw import draw_case
-from virtualrig.draw_nuisance import EACH_SENSOR, NUISANCE
+from virtualrig.draw_nuisance import EACH_SEGMENT, EACH_SENSOR, NUISANCE
 from virtualrig.draw_population import STATES, draw_rig
 from virtualrig.faults import Leak
 from virtualrig.nuisance import true_pump
@@ -47,6 +47,8 @@ def test_every_rig_has_all_nuisance_physics_in_its_range():
             assert (values > 0).any() and (values < 0).any(), name
     for rig in RIGS:
         assert all(len(rig.nuisance[name]) == len(rig.sheet["sensors"]) for name in EACH_SENSOR)
+        segments = rig.sheet["line"]["segments"]
+        assert all(len(rig.nuisance[name]) == len(segments) for name in EACH_SEGMENT)
 
 
 def test_cylinders_have_room():

@@ -29,6 +29,7 @@ AT_OTHER = {
     "passive_network": "network without a name",
     "passive_piece": "piece of another pipe",
 }
+ON_THE_WHOLE_LINE = {"viscoelastic_wall": "viscoelastic walls of all segments"}
 WORDS_AFTER_FORM = {"source_impedance": "at the pump"}
 """Effects that their form names: "volume at the pump"."""
 IMPLIED_PLACES = ("line", "position", "load", "source")
@@ -63,6 +64,8 @@ def name_effect(name: str, element: str | None = None) -> str:
     the effect in brackets, and in the number of one of several at free positions: "load (spool)",
     "position (shunt) 2".
     """
+    if element == "line" and name in ON_THE_WHOLE_LINE:
+        return ON_THE_WHOLE_LINE[name]
     words = AT_SENSOR.get(name) or AT_OTHER.get(name) or name.replace("_", " ")
     if not element:
         return f"{words} of a sensor" if name in AT_SENSOR else words

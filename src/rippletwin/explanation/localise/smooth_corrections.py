@@ -314,9 +314,9 @@ def own_element(effect, place, values: Mapping[str, float], rig) -> tuple:
     everywhere = tuple(range(len(rig.line))) if len(rig.line) > 1 else 0
     if effect.element == "sensor":
         return "sensor", place.index
-    if effect.element == "segment":
+    if effect.element == "segment" and place.index is not None:
         return "segment shunt", place.index
-    if effect.element == "line":
+    if place.element == "line":
         return ("segment series" if effect.friction else "segment shunt"), everywhere
     position = {"source": 0.0, "load": float(rig.length)}.get(effect.element)
     if position is None:

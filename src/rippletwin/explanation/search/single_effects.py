@@ -8,6 +8,7 @@ and the other effects beside those that the data show.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
@@ -30,7 +31,7 @@ from rippletwin.explanation.search.stepwise_moves import (
 from rippletwin.explanation.thresholds import (
     GOOD_MODEL_ERROR,
     MIN_LOG_BAYES_FACTOR,
-    min_log_bayes_factor_of_newest,
+    min_log_bayes_factor,
 )
 
 DRAWS_PER_MODE = 800  # random starts around each mode below a frequency limit
@@ -60,15 +61,28 @@ def fit_single_effects(
 
 
 def _add_usual_effects(workers: Workers, base: Fit, fits: Sequence[Fit]) -> Fit:
-    """`base` with every usual effect that adds enough evidence; `fits` are those of one each."""
-    best, left, needed = base, rank_by_evidence(fits), MIN_LOG_BAYES_FACTOR
-    while left and left[0].evidence > best.evidence + needed:
-        best, rest = left[0], [f.hypothesis[-1] for f in left[1:]]
-        left = rank_by_evidence(
-            workers.fit([FitJob((*best.hypothesis, c), NearFit(best)) for c in rest])
-        )
-        needed = min_log_bayes_factor_of_newest(left[0]) if left else needed
-    return best
+    """`base` with the set of usual effects that adds most evidence beyond what each must add, where
+    the set adds enough; `fits` are those of one each.
+
+    All sets are tried: friction and creep both damp, so that the first alone may do for both.
+    """
+    found = {frozenset(f.hypothesis): f for f in fits}
+    usual = [f.hypothesis[0] for f in fits]
+    for size in range(2, len(usual) + 1):
+        jobs = []
+        for members in combinations(usual, size):
+            parts = [found[frozenset(members) - {c}] for c in members]
+            near = max(parts, key=lambda f: f.evidence)
+            (newest,) = set(members) - set(near.hypothesis)
+            jobs.append(FitJob((*near.hypothesis, newest), NearFit(near)))
+        found |= {frozenset(f.hypothesis): f for f in workers.fit(jobs)}
+    rig = workers.base.rig
+
+    def surplus(fit: Fit) -> float:
+        return fit.evidence - sum(min_log_bayes_factor(rig, *c) for c in fit.hypothesis)
+
+    best = max(found.values(), key=surplus, default=base)
+    return best if best.evidence >= base.evidence + MIN_LOG_BAYES_FACTOR else base
 
 
 def _fit_each_alone(
@@ -126,7 +140,7 @@ def refit_poor_fits(workers: Workers, fits: list[Fit]) -> list[Fit]:
     ]
     jobs = []
     for fit in poor:
-        whole_line = fit.hypothesis[-1][0].element == "line"
+        whole_line = fit.hypothesis[-1][1].element == "line"
         draws = DRAWS_PER_MODE if whole_line and len(workers.observations) == 1 else 0
         starts = tuple(refined_starts(workers.base.rig, fit))
         jobs.append(FitJob(fit.hypothesis, Continuation(starts, draws)))

@@ -28,7 +28,9 @@ from rippletwin.explanation.thresholds import (
 )
 from rippletwin.twin.effects.library import is_form_of, is_limit, next_instance
 
-MAX_EFFECTS = 4  # different ones in one hypothesis
+MAX_EFFECTS = 4
+"""Different effects in one hypothesis, boundary layers included, the pump's volume and creep of all
+walls not. With more, effects that are not there were established in measured tubes."""
 MAX_OF_ONE_EFFECT = 4  # at free positions
 SUBSTITUTES_TRIED = 10  # best single effects tried in the place of another
 MAX_MODEL_ERROR_FOR_EXACT_MODE = 10.0 * MIN_MODEL_ERROR
@@ -93,19 +95,20 @@ def _fit_promising(workers: Workers, best: Fit, jobs: Sequence[FitJob], report) 
 def _additions(rig, hypothesis: Hypothesis, candidates: Sequence) -> list:
     """The candidates that may still be added, each as the next of its kind.
 
-    What is known to be there before the search begins takes none of the MAX_EFFECTS.
+    Usual effects are tried before the search begins and may always join. Those with parameters take
+    none of the MAX_EFFECTS; boundary layers, which have none, do.
     """
     names = {
         effect.name
         for effect, place in hypothesis
-        if not (effect.usual(rig, place) and effect.certain(rig, place))
+        if not (effect.usual(rig, place) and effect.parameters(rig, place))
     }
     instances = [next_instance(candidate, hypothesis) for candidate in candidates]
     return [
         (effect, place)
         for effect, place in filter(None, instances)
         if place.number <= MAX_OF_ONE_EFFECT
-        and len(names | {effect.name}) <= MAX_EFFECTS
+        and (effect.usual(rig, place) or len(names | {effect.name}) <= MAX_EFFECTS)
         and not any(is_form_of(member, (effect, place), rig) for member in hypothesis)
     ]
 
@@ -172,17 +175,33 @@ def fit_substitutes(workers: Workers, best: Fit, candidates: Sequence) -> list[F
 
 
 def simplify_effects(workers: Workers, best: Fit, candidates: Sequence) -> Fit:
-    """Replace each effect by a special case of it unless that costs MIN_LOG_BAYES_FACTOR.
+    """Replace each effect by a special case of it, and one of several segments by that of the whole
+    line, unless that costs MIN_LOG_BAYES_FACTOR.
 
     What the general effect has besides is further physics, which needs as much evidence as any.
     """
+    rig = workers.base.rig
+    simpler = [_alike(best.hypothesis, candidates)]
     for k, member in enumerate(best.hypothesis):
-        special = [c for c in candidates if is_limit(c, member, workers.base.rig)]
-        jobs = [FitJob(h, NearFit(best)) for h in _exchanges(best.hypothesis, k, special)]
+        special = [c for c in candidates if is_limit(c, member, rig)]
+        simpler.append(_exchanges(best.hypothesis, k, special))
+    for hypotheses in simpler:
+        jobs = [FitJob(h, NearFit(best)) for h in hypotheses]
         for fit in rank_by_evidence(workers.fit(jobs))[:1]:
             if fit.evidence > best.evidence - MIN_LOG_BAYES_FACTOR:
                 return simplify_effects(workers, fit, candidates)
     return best
+
+
+def _alike(hypothesis: Hypothesis, candidates: Sequence) -> list[Hypothesis]:
+    """The hypotheses in which an effect of at least two segments is alike in all of the line."""
+    found = []
+    for effect, place in candidates:
+        rest = tuple(m for m in hypothesis if m[0] is not effect)
+        whole_line = effect.element == "segment" and place.element == "line"
+        if whole_line and len(hypothesis) - len(rest) >= 2:
+            found.append((*rest, (effect, place)))
+    return found
 
 
 def drop_needless_effects(workers: Workers, best: Fit) -> Fit:

@@ -130,7 +130,8 @@ def resume_search(workers: Workers, past: Search, progress=None) -> Search:
 def _search_stepwise(
     workers: Workers, start: Search, candidates: Sequence, progress, settled: str | None = None
 ) -> Search:
-    """Go on from `start.best` until no candidate and no other position adds enough evidence.
+    """Go on from `start.best` until no candidate, no substitute and no other position adds enough
+    evidence.
 
     settled   label of a hypothesis whose effects have been exchanged and moved before
     """
@@ -150,11 +151,16 @@ def _search_stepwise(
                 moved = _revise(workers, moved, candidates)
             was_there = frozenset(moved.hypothesis) in visited
             if moved is best or (exchanged is not best and was_there):
-                # Simplifying may lead back from an exchange: only two effects at once lead on.
+                # Simplifying may lead back from an exchange: only two effects at once lead on, or
+                # an effect that was not tried beside those that came later.
                 pair = _accepted_pair(workers, best, extensions, candidates)
                 moved = best if pair is None else _revise(workers, pair, candidates)
                 if frozenset(moved.hypothesis) in visited:
-                    break
+                    substitutes = fit_substitutes(workers, best, candidates)
+                    moved = _better_substitute(workers, best, substitutes, candidates)
+                    if frozenset(moved.hypothesis) in visited:
+                        break
+                    rivals = [*rivals, *substitutes]
             best = moved
         else:
             revised = _revise(workers, extended, candidates)
@@ -167,9 +173,6 @@ def _search_stepwise(
             best = revised
         visited.add(frozenset(best.hypothesis))
         extensions = fit_extensions(workers, best, candidates, progress)
-    substitutes = fit_substitutes(workers, best, candidates)
-    if substitutes and substitutes[0].evidence > best.evidence + MIN_IMPROVEMENT:
-        best, other_positions = move_to_best_position(workers, substitutes[0])
     return Search(
         start.base,
         single_effect_fits,
@@ -177,6 +180,16 @@ def _search_stepwise(
         [*rivals, *substitutes],
         other_positions=other_positions,
     )
+
+
+def _better_substitute(
+    workers: Workers, best: Fit, substitutes: Sequence[Fit], candidates: Sequence
+) -> Fit:
+    """The best of `substitutes`, revised, where it is better than `best`; `best` where none is."""
+    if not substitutes or substitutes[0].evidence <= best.evidence + MIN_IMPROVEMENT:
+        return best
+    moved, _ = move_to_best_position(workers, substitutes[0])
+    return _revise(workers, moved, candidates)
 
 
 def _accepted_pair(

@@ -115,17 +115,10 @@ def _found(
         return sentences
     if not e.decision.established:  # what is named acts at shaft orders alone
         return ["At the piston orders nothing is missing."]
-    sentences = [
+    return [
         f"The twin lacks {_effects(e, certain)}. This is established.",
         f"With this, and with the pump's flow ripple corrected, {falls}.",
     ]
-    sentences += [
-        f"{_capital(name_effect(entry['effect'].name))} is always present: it is included unless "
-        "the data contradict it."
-        for entry in certain
-        if _is_always_present(e, entry)
-    ]
-    return sentences
 
 
 def _is_always_present(e: Explanation, entry: dict) -> bool:

@@ -1,24 +1,46 @@
-"""A viscoelastic (hose) wall: creep adds compliance at low frequency and loss around 1/tau."""
+"""A viscoelastic wall: creep adds compliance at low frequency and loss around 1/tau.
+
+One segment is a hose, or all segments creep alike. Every wall, clamp and seal creeps a little: in a
+metal pipe a tenth of what a hose does. Each segment alone shows too little of that, and a twin
+without it makes up for it by lengths and diameters.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from rippletwin.twin.effects.base import Effect, segment_places
+from rippletwin.twin.effects.base import Effect, Place, segment_places
 from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal
+
+HOSE, ALL_WALLS = lognormal(0.15, 1.0), lognormal(0.01, 1.5)  # compliance ratio
+LINE = "line"
+
+
+def _places(rig):
+    return (*segment_places(rig), *((Place(LINE),) if len(rig.line) > 1 else ()))
+
+
+def _is_whole_line(rig, place):
+    return place.element == LINE or len(rig.line) == 1
 
 
 def _apply(network, state, values, place):
     creep = values["compliance_ratio"] / (1.0 + network.s * values["retardation_time"])
-    network.shunt[place.index] = network.shunt[place.index] * (1.0 + creep)
+    for k in _segments(network.shunt, place):
+        network.shunt[k] = network.shunt[k] * (1.0 + creep)
 
 
 def _apply_in_time(line, state, values, place):
     # One more retarded strain at each node.
-    pipe = line.pipes[place.index]
     term = values["compliance_ratio"], values["retardation_time"]
-    line.pipes[place.index] = replace(pipe, creep=(*pipe.creep, term))
+    for k in _segments(line.pipes, place):
+        pipe = line.pipes[k]
+        line.pipes[k] = replace(pipe, creep=(*pipe.creep, term))
+
+
+def _segments(segments, place):
+    return range(len(segments)) if place.element == LINE else (place.index,)
 
 
 EFFECT = Effect(
@@ -29,10 +51,11 @@ EFFECT = Effect(
     source="Franke & Seyler 1983, J. Hydraulic Res. 21:349; one Kelvin-Voigt element, "
     "Covas et al. 2005, J. Hydraulic Res. 43:56, eq. 10",
     parameters=lambda rig, place: (
-        Parameter("compliance_ratio", "1", lognormal(0.15, 1.0)),
+        Parameter("compliance_ratio", "1", ALL_WALLS if _is_whole_line(rig, place) else HOSE),
         Parameter("retardation_time", "s", lognormal(3e-4, 1.3), (-1.0, 0.7)),
     ),
-    places=segment_places,
+    places=_places,
     apply=_apply,
     apply_in_time=_apply_in_time,
+    usual=_is_whole_line,
 )
