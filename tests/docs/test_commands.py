@@ -46,6 +46,10 @@ NOT_RUN = {
     "make coverage": ("it runs this test", "make --dry-run coverage"),
     "make mutants": (HOURS, "make --dry-run mutants"),
     "make fuzz": (HOURS, "make --dry-run fuzz"),
+    "python benchmarks/processors.py own_rig": (
+        "it takes minutes",
+        "python benchmarks/processors.py --help",
+    ),
     "python benchmarks/soak.py my_case": (HOURS, "python benchmarks/soak.py --help"),
     "python3 -m venv .venv": (NETWORK, "python3 -m venv --help"),
     ". .venv/bin/activate": ("it needs the environment above", "true"),
