@@ -34,7 +34,7 @@ mutants: .venv/ready
 # Inputs of every reader, guided by the branches that they reach; what is found is kept in fuzz_found.
 INPUTS ?= 10000
 fuzz: .venv/ready
-	$(BIN)/python -m pip install --quiet ".[fuzz]"
+	$(BIN)/python -m pip install --quiet --editable ".[fuzz]"
 	$(BIN)/python tests/fuzz/guided.py --inputs $(INPUTS) --corpus .fuzz
 
 lint: .venv/ready
@@ -81,4 +81,4 @@ audit:
 	.venv-audit/bin/pip-audit --requirement .venv-audit/pins --no-deps --disable-pip
 
 clean:
-	rm -rf .venv .venv-* .snakemake .site .coverage .fuzz results
+	rm -rf .venv .venv-* .snakemake .site .coverage .fuzz fuzz_found results

@@ -33,13 +33,13 @@ VARIANTS = {
 }
 
 
-def answer(case: Path, out: Path, variables: dict[str, str]) -> list[dict]:
-    """verdict.json of a case, explained with these environment variables, and diagnosis.json where
-    it has recordings to diagnose."""
+def answer(case: Path, out: Path, variables: dict[str, str], diagnose: bool) -> list[dict]:
+    """verdict.json of a case, explained with these environment variables, and diagnosis.json if it
+    is to be diagnosed as well."""
     cache = {"NUMBA_CACHE_DIR": str(out / "numba")} if "NUMBA_CPU_NAME" in variables else {}
     command = [sys.executable, "-m", "rippletwin"]
     commands = [[*command, "explain", str(case), "--out", str(out)]]
-    if any(r.state == "unknown" for r in load_case(case).recordings):
+    if diagnose:
         twin = ["--twin", str(out / "twin.json")]
         commands.append([*command, "diagnose", str(case), "--out", str(out), *twin])
     for each in commands:
@@ -84,10 +84,11 @@ def main() -> None:
         "| libraries | to the last digit | verdict, effects, support, states | a number moves by |"
     )
     print("|---|---|---|---|")
+    diagnose = bool(load_case(options.case, states={"unknown"}).recordings)
     with TemporaryDirectory() as folder:
-        first = answer(options.case, Path(folder) / "first", {})
+        first = answer(options.case, Path(folder) / "first", {}, diagnose)
         for k, (name, variables) in enumerate(VARIANTS.items()):
-            again = answer(options.case, Path(folder) / str(k), variables)
+            again = answer(options.case, Path(folder) / str(k), variables, diagnose)
             equal, agree, moved = compare(first, again)
             size = f"{moved:.1g} of half its interval at most" if agree else "-"
             said = "the same" if agree else "others"

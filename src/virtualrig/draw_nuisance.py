@@ -83,7 +83,7 @@ NUISANCE = {
         "estimate: slip of induction motors with mains and load"),
     "session_kelvin": Range(0.5, 2.5, "K", "signed", "state: warmer or colder than when healthy",
         "0.3 % of wave speed and 4 % of viscosity a kelvin (Gholizadeh et al. 2011; ASTM D341)"),
-    "wall_factor": Range(0.7, 1.4, "times", "log", "line: that compliance in each segment",
+    "wall_factor": Range(0.7, 1.4, "of the line's", "log", "line: wall compliance of a segment",
         "estimate: seals and clamps of one line differ by a third"),
     "laminar": Range(0.1, 0.6, "of the flow", "uniform", "leaks: laminar share",
         "McCandlish and Dorey 1984; Bergada et al. 2010"),

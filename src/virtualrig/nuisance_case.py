@@ -152,7 +152,7 @@ def nuisance_effects(sheet: dict, true: dict, nuisance: dict, geometry: bool) ->
     line = [("unsteady_friction", "line", {}, None)]
     line += [
         ("viscoelastic_wall", element, {}, None)
-        for element in ("line", *segments)  # all walls creep alike
+        for element in ("line", *segments)  # every wall creeps
     ]
     for name, position in zip([s["name"] for s in sheet["sensors"]], true["sensors"]):
         line.append(("line_volume", "position", {}, position))

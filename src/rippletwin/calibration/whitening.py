@@ -64,10 +64,10 @@ class Whitening:
         return self._remove(x, self._right, self._left) / self._sd
 
     def pull(self, h: np.ndarray, residual: np.ndarray) -> np.ndarray:
-        """Derivative (F,) of the log likelihood by a relative error of h (S, F) at each frequency,
-        the real part by its real part and the imaginary part by its imaginary part.
+        """Derivative (F,) of the log likelihood by the conjugate of a relative error of h (S, F) at
+        each frequency: h^H C^-1 r there.
 
-        residual   (S, F) readings less the expected ones
+        residual   (S, F) r, readings less the expected ones
         """
         return np.sum(np.conj(h) * self.adjoint(self.apply(residual)), axis=0)
 

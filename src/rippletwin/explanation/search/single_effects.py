@@ -1,8 +1,8 @@
 """First step of the search: the line without effects, the usual effects, and each other one alone.
 
-Boundary layers are in nearly every real line, and so are the chambers of a pump whose flow is
-stated. A line without them fits so badly that nothing else can be judged. So they are tried first,
-and the other effects beside those that the data show.
+Boundary layers and creep of the walls are in nearly every real line, and so are the chambers of a
+pump whose flow is stated. A line without them fits so badly that nothing else can be judged. So
+they are tried first, and the other effects beside those that the data show.
 """
 
 from __future__ import annotations

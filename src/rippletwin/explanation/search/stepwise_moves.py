@@ -30,7 +30,7 @@ from rippletwin.twin.effects.library import is_form_of, is_limit, next_instance
 
 MAX_EFFECTS = 4
 """Different effects in one hypothesis, boundary layers included, the pump's volume and creep of all
-walls not. With more, effects that are not there were established in measured tubes."""
+walls not. With more, effects that are not there are established in measured tubes."""
 MAX_OF_ONE_EFFECT = 4  # at free positions
 SUBSTITUTES_TRIED = 10  # best single effects tried in the place of another
 MAX_MODEL_ERROR_FOR_EXACT_MODE = 10.0 * MIN_MODEL_ERROR

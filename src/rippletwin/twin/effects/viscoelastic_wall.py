@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rippletwin.twin.effects.base import Effect, Place, segment_places
+from rippletwin.twin.effects.base import Effect, line_place, segment_places
 from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal
 
@@ -18,7 +18,7 @@ LINE = "line"
 
 
 def _places(rig):
-    return (*segment_places(rig), *((Place(LINE),) if len(rig.line) > 1 else ()))
+    return (*segment_places(rig), *(line_place(rig) if len(rig.line) > 1 else ()))
 
 
 def _is_whole_line(rig, place):
