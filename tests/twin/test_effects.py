@@ -191,6 +191,31 @@ def test_walls_that_creep_alike_are_those_of_every_segment():
     assert at_once.pipes == in_turn.pipes and at_once.pipes[1].creep == ((0.01, 2e-4),)
 
 
+def test_a_hose_creeps_as_it_says_beside_walls_that_creep():
+    """A line whose walls all creep and whose second segment is a hose is the line whose segments
+    each have their own creep: the hose's is not added to that of all walls. In the frequency domain
+    and in the pipes of the time domain."""
+    wall = EFFECTS["viscoelastic_wall"]
+    line, first, second = Place("line"), Place("segment 1", 0), Place("segment 2", 1)
+    steel = {"compliance_ratio": 0.01, "retardation_time": 2e-4}
+    hose = {"compliance_ratio": 0.2, "retardation_time": 4e-4}
+
+    def changed(*effects):
+        net, state = network(rig())
+        pipes = [Pipe(s.length, s.diameter, s.wave_speed) for s in rig().line]
+        state.effects = [(wall, place) for place, _ in effects]
+        in_time = SimpleNamespace(pipes=pipes)
+        for place, values in effects:
+            wall.apply(net, state, values, place)
+            wall.apply_in_time(in_time, state, values, place)
+        return net.shunt, in_time.pipes
+
+    shunt, pipes = changed((line, steel), (second, hose))
+    expected_shunt, expected_pipes = changed((first, steel), (second, hose))
+    np.testing.assert_allclose(shunt, expected_shunt, rtol=1e-12)
+    assert pipes == expected_pipes
+
+
 def test_short_branch_is_a_volume():
     """A branch much shorter than the wave stores like its volume (Wylie & Streeter, sec. 12.5)."""
     values = {"position": 1.0, "length": 0.01, "diameter": 0.01, "viscosity_ratio": 1.0}

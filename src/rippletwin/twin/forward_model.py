@@ -211,6 +211,7 @@ class ForwardModel:
             mean_flow=self.mean_flow,
             load_passes_flow=self.twin.rig.load.passes_flow and not self.twin.guessed_load,
             friction=self.twin.friction_law,
+            effects=self.twin.effects,
         )
 
     @cached_property

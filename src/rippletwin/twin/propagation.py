@@ -108,6 +108,7 @@ def line_in_time(
         prandtl=rig.fluid.prandtl,
         mean_flow=np.array(nominal),
         load_passes_flow=rig.load.passes_flow,
+        effects=twin.effects,
     )
     for effect, place, values in twin.effect_values(twin.theta):
         apply_in_time(effect, line, state, values, place)

@@ -58,6 +58,7 @@ class LineState:
                      frequency, (F,); None where there is no shaft
     load_passes_flow whether the load's coefficient is calculated from that mean flow: a flow that
                      leaves the line before the load must be subtracted
+    effects          (effect, place) of all that act on the line
     """
 
     density: float
@@ -74,6 +75,7 @@ class LineState:
     mean_flow: np.ndarray | None = None
     load_passes_flow: bool = False
     friction: str = "steady"
+    effects: Sequence[tuple[Effect, Place]] = ()
 
     def area(self, k: int):
         """Cross section of segment k, m2."""

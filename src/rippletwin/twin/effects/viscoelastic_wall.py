@@ -2,7 +2,8 @@
 
 One segment is a hose, or all segments creep alike. Every wall, clamp and seal creeps a little: in a
 metal pipe a tenth of what a hose does. Each segment alone shows too little of that, and a twin
-without it makes up for it by lengths and diameters.
+without it makes up for it by lengths and diameters. A hose is no metal pipe: the creep of all walls
+leaves it out.
 """
 
 from __future__ import annotations
@@ -27,20 +28,24 @@ def _is_whole_line(rig, place):
 
 def _apply(network, state, values, place):
     creep = values["compliance_ratio"] / (1.0 + network.s * values["retardation_time"])
-    for k in _segments(network.shunt, place):
+    for k in _segments(len(network.shunt), state, place):
         network.shunt[k] = network.shunt[k] * (1.0 + creep)
 
 
 def _apply_in_time(line, state, values, place):
     # One more retarded strain at each node.
     term = values["compliance_ratio"], values["retardation_time"]
-    for k in _segments(line.pipes, place):
+    for k in _segments(len(line.pipes), state, place):
         pipe = line.pipes[k]
         line.pipes[k] = replace(pipe, creep=(*pipe.creep, term))
 
 
-def _segments(segments, place):
-    return range(len(segments)) if place.element == LINE else (place.index,)
+def _segments(count, state, place):
+    """Indices of the segments, of `count`, whose wall creeps as the effect at `place` says."""
+    if place.element != LINE:
+        return [place.index]
+    hoses = {p.index for effect, p in state.effects if effect.name == EFFECT.name}
+    return [k for k in range(count) if k not in hoses]
 
 
 EFFECT = Effect(
