@@ -2,8 +2,10 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from virtualrig import exact
 from virtualrig.draw import draw_case
 from virtualrig.resolution import (
     ALLOWED_ERROR,
@@ -50,3 +52,24 @@ def test_a_linear_line_keeps_its_mesh(stiffening):
     """Without nonlinear compliance nothing is refined and no error is estimated."""
     linear = replace(stiffening, seal=stiffening.seal | {"effects": []})
     assert choose_mesh(linear) == (BASE_NUMERICS, None)
+
+
+@pytest.mark.parametrize(
+    "estimate, error, passes",
+    [
+        (None, 69.0, True),
+        (None, 71.0, False),
+        (50.0, 71.0, False),  # the mesh was fine enough by its estimate
+        (80.0, 119.0, True),  # the finest mesh: the estimate says what is left
+        (80.0, 121.0, False),
+    ],
+)
+def test_the_finest_mesh_is_held_to_its_estimate(stiffening, monkeypatch, estimate, error, passes):
+    """A tenth of the noise, 70 Pa, is allowed; where the finest mesh leaves more, 1.5 times what
+    was estimated of it."""
+    amplitudes = iter((np.sqrt(2.0) * error, 0.0))
+    monkeypatch.setattr(exact, "choose_mesh", lambda drawn: (BASE_NUMERICS, estimate))
+    monkeypatch.setattr(
+        exact, "settled_harmonics", lambda *_: np.array([[next(amplitudes)]], complex)
+    )
+    assert exact.check_against_finer(stiffening).passed == passes
