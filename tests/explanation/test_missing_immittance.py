@@ -8,6 +8,7 @@ import pytest
 from rippletwin.calibration.frequency_continuation import refine
 from rippletwin.explanation.localise.free_corrections import locate_mismatch
 from rippletwin.explanation.localise.missing_immittance import (
+    MissingImmittance,
     describe_law,
     is_passive,
     missing_immittance,
@@ -46,6 +47,17 @@ def test_the_missing_admittance_follows_the_true_law(hose):
     is_near = np.abs(missing.points - truth) < 4 * missing.sd + 0.05 * np.abs(truth)
     assert np.mean(is_near) > 0.9
     assert "relaxing compliance" in missing.law_in_words
+
+
+def test_frequencies_at_which_nothing_changes_say_nothing():
+    """A law is read from the points that have a standard deviation; those with none, where the
+    effect changes nothing, leave it as it is, and no arithmetic fails."""
+    frequency_hz = np.linspace(50.0, 4000.0, 30)
+    points, sd = 2e-13j * frequency_hz, 1e-12 * np.ones(30)
+    points[::4], sd[::4] = 0.0, 0.0
+    with np.errstate(all="raise"):
+        missing = MissingImmittance("", "", "", frequency_hz, points, points, sd)
+        assert "proportional to jw)" in missing.law_in_words
 
 
 def test_the_best_free_element_is_the_segment_with_the_hose(hose):

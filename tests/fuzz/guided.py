@@ -18,6 +18,7 @@ import os
 import sys
 import tempfile
 from collections.abc import Callable
+from contextlib import redirect_stderr
 from functools import partial
 from pathlib import Path
 from unittest import mock
@@ -27,7 +28,12 @@ import atheris
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests/helpers"), str(ROOT / "workflow")]
 
-with atheris.instrument_imports(include=["rippletwin", "nptdms", "pyuff", "scipy.io", "yaml"]):
+# atheris tells of each module that it instruments
+with (
+    open(os.devnull, "w") as nowhere,
+    redirect_stderr(nowhere),
+    atheris.instrument_imports(include=["rippletwin", "nptdms", "pyuff", "yaml"]),
+):
     import yaml
     from snakemake.exceptions import WorkflowError
     from test_fuzz_readers import TABLES

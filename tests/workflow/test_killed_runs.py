@@ -43,7 +43,7 @@ class Experiment:
 
 
 FAST = Experiment(OVERLAY, True, EVERY_STAGE, 1, 3)
-LONG = Experiment(SMOKE, False, ("all",), 25, 4)
+LONG = Experiment(SMOKE, False, ("all",), 5, 20)
 
 
 def make(folder: Path, experiment: Experiment) -> Path:

@@ -36,8 +36,13 @@ class PlannedRecording:
 
 
 def advise(rig: Rig, recordings: Sequence[PlannedRecording]) -> list[str]:
-    """Plain sentences, one for each thing that these recordings do not allow, with the remedy."""
+    """Plain sentences, one for each thing that these recordings do not allow, with the remedy.
+
+    Of a line that is excited without a pump, only sensors are told.
+    """
     periodic = [r for r in recordings if r.speed_rpm is not None]
+    if recordings and not periodic:
+        return list(_of_sensors(rig))
     return [
         *_of_sensors(rig),
         *_of_operating_points(rig, [r for r in periodic if r.state == "healthy"]),

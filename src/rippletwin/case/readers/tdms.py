@@ -6,10 +6,12 @@ rig.yaml names, or from a channel `time_s`. `dataset` of rig.yaml is the group.
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
 import numpy as np
 from nptdms import TdmsFile
+from nptdms.log import log_manager
 
 from rippletwin.case.readers.file_checks import (
     BoundedFile,
@@ -22,6 +24,8 @@ from rippletwin.case.readers.signals import Signals, numbers, one_number
 from rippletwin.errors import InputError
 
 MAGIC = b"TDSm"  # the first bytes of every TDMS file
+
+log_manager.set_level(logging.ERROR)  # a file that lacks something is refused here, in one sentence
 
 
 def read(path: Path, layout: Layout) -> Signals:

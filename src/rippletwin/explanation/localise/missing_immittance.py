@@ -51,8 +51,10 @@ class MissingImmittance:
 
     @property
     def law_in_words(self) -> str:
-        """The simple law that the points follow, in words."""
-        return describe_law(self.frequency_hz, self.points, 1.0 / np.maximum(self.sd, 1e-300) ** 2)
+        """The simple law that the points follow, in words. Where the effect changes nothing, a
+        point says nothing."""
+        weight = np.divide(1.0, self.sd**2, out=np.zeros(len(self.sd)), where=self.sd > 0.0)
+        return describe_law(self.frequency_hz, self.points, weight)
 
 
 def observable_of(
