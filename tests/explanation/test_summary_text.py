@@ -7,6 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from paper_rig import paper_rig
+from rippletwin.explanation.checks.cross_validation import Disagreement
+from rippletwin.explanation.checks.support import Support
 from rippletwin.explanation.localise.shaft_orders import ShaftEffect, ShaftOrders
 from rippletwin.explanation.verdict.number_text import (
     load_sentences,
@@ -198,9 +200,13 @@ def explained(
     verdict="named",
     levels=("established", "established", "supported"),
     leak=EFFECTS["leak"],
+    disagreement=None,
     **result,
 ):
-    """The paragraphs of a verdict with a delay of two sensors and a leak between p1 and p2."""
+    """The paragraphs of a verdict with a delay of two sensors and a leak between p1 and p2.
+
+    `disagreement` is that of the second delay.
+    """
     rig, seconds = paper_rig(), {"value": 5e-6, "ci95": [4e-6, 6e-6], "unit": "s"}
     place = {"value": 1.0, "ci95": [0.9, 1.1], "unit": "m"}
     entries = [
@@ -215,9 +221,10 @@ def explained(
         {"effect": leak, "place": leak.places(rig)[0], "parameters": {"position": place}}
     )
     supports = [
-        SimpleNamespace(name=x["effect"].name, place=str(x["place"]), level=level)
+        Support(x["effect"].name, str(x["place"]), level, None, 1.0, 0.0)
         for x, level in zip(entries, levels, strict=True)
     ]
+    supports[1] = replace(supports[1], disagreement=disagreement)
     rival = SimpleNamespace(
         effect="source_impedance", place="source (volume)", misfit=0.003, parameter="length[2]",
         value=1.6, nominal=1.8, unit="m", pull=10.0, rivals=True,
@@ -255,6 +262,19 @@ def test_a_named_verdict_begins_with_what_is_missing():
     assert rest[0].startswith(
         "Values, with 95 % intervals in brackets. Delay of sensor p1: 5.0 µs (4"
     )
+
+
+def test_values_that_contradict_the_law_are_told():
+    """With and without the recording that disagrees, in units of a test bench; values that differ
+    by no more than errors do are not told."""
+    name = "sensor_delay@sensor p2.delay"
+    differs = Disagreement(5.1, name, 5e-6, 9e-6, "recording healthy_1")
+    first = explained(disagreement=differs)[0]
+    assert first.endswith(
+        "Delay of sensor p2: delay 9.00 µs without recording healthy_1, 5.00 µs with it. By the "
+        "law of the effect both are the same, so other physics acts there."
+    )
+    assert "with it" not in explained(disagreement=replace(differs, deviations=5.0))[0]
 
 
 def test_what_is_always_present_is_not_doubted():

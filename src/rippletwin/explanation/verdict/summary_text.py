@@ -24,6 +24,7 @@ from rippletwin.explanation.localise.source_free_fits import compare_evidence
 from rippletwin.explanation.thresholds import PULL_ALARM
 from rippletwin.explanation.verdict.explanation import Explanation
 from rippletwin.explanation.verdict.number_text import (
+    disagreement_sentence,
     load_sentences,
     parameters_sentence,
     pump_sentences,
@@ -69,6 +70,7 @@ def summary_text(e: Explanation, result: dict, entries: Sequence[dict]) -> str:
     found = _found(e, result, entries, certain)
     if named:
         found += _lesser(e, [entry for entry in named if entry not in certain], levels)
+        found += _contradictions(e, named)
     paragraphs = [
         [*found, *_unfinished_fit(result["fit"])],
         [*_undecided(result), *_next_recording(result)],
@@ -148,6 +150,17 @@ def _lesser(e: Explanation, entries: Sequence[dict], levels: Mapping) -> list[st
             "alone do not establish it."
         )
     return sentences
+
+
+def _contradictions(e: Explanation, entries: Sequence[dict]) -> list[str]:
+    """Effects to which parts of the recordings give different values."""
+    supports = {(s.name, s.place): s for s in e.decision.supports if s.contradicts_its_law}
+    keys = [(entry["effect"].name, str(entry["place"])) for entry in entries]
+    return [
+        disagreement_sentence(_effect(e, entry), entry["parameters"], supports[key].disagreement)
+        for entry, key in zip(entries, keys)
+        if key in supports
+    ]
 
 
 def _undecided(result: dict) -> list[str]:
