@@ -237,8 +237,22 @@ def test_on_a_doubtful_line_only_a_usual_effect_is_established(
     monkeypatch.setattr(rules, "largest_pull", lambda fit: (pull, "viscosity"))
     judged = judged_of(HOSE, FRICTION)
     explanation = replace(judged.best, model_error=model_error)
-    found = rules.withhold_on_a_doubtful_line(judged, explanation)
+    found = rules.withhold_what_is_in_doubt(judged, explanation)
     assert [support.level for support in found.supports] == levels
+
+
+def test_an_effect_must_be_plausible_in_the_explanation_too(monkeypatch):
+    """A network that stands in moves the parameters of the effects: an effect, usual or not, whose
+    own are not plausible then is no more than supported."""
+    pulls = {
+        "viscoelastic_wall@segment 1.": PULL_ALARM,
+        "unsteady_friction@line.": PULL_ALARM + 0.1,
+    }
+    monkeypatch.setattr(rules, "_pull_of_effect", lambda fit, label: pulls[label])
+    monkeypatch.setattr(rules, "largest_pull", lambda fit: (0.0, ""))
+    judged = judged_of(HOSE, FRICTION)
+    found = rules.withhold_what_is_in_doubt(judged, replace(judged.best, model_error=0.004))
+    assert [support.level for support in found.supports] == ["established", "supported"]
 
 
 def test_each_effect_is_left_out_in_two_ways(monkeypatch):

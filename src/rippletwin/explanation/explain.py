@@ -52,7 +52,7 @@ from rippletwin.explanation.checks.support import (
     Judged,
     judge_beside_network,
     judge_effects,
-    withhold_on_a_doubtful_line,
+    withhold_what_is_in_doubt,
 )
 from rippletwin.explanation.fit_jobs import FitJob, PlainCalibration, open_workers
 from rippletwin.explanation.localise.free_corrections import locate_mismatch
@@ -154,7 +154,7 @@ def explain_observations(
             if network is not None and set(judged.best.hypothesis) <= set(network.hypothesis):
                 network, judged = judge_beside_network(workers, search.base, network, judged)
                 search = replace(search, best=judged.best, passive_networks=[network, *networks])
-            judged = withhold_on_a_doubtful_line(judged, accepted_network(search) or search.best)
+            judged = withhold_what_is_in_doubt(judged, accepted_network(search) or search.best)
             contradiction = find_swapped_sensors(base, data, search)
         # Steps 11 to 14: checks
         point_fits = fit_each_observation(workers, search.base)

@@ -137,21 +137,25 @@ def judge_beside_network(
     return network, replace(judged, supports=supports)
 
 
-def withhold_on_a_doubtful_line(judged: Judged, explanation: Fit) -> Judged:
-    """Supports that are no more than `supported`, but of usual effects, where the line of the
-    `explanation`, with a network if one stands in, is in doubt: it leaves much, or contradicts the
-    data sheet."""
-    leaves_much = explanation.model_error > MUCH_MODEL_ERROR
-    if not leaves_much and largest_pull(explanation)[0] <= PULL_ALARM:
-        return judged
-    rig = judged.best.twin.rig
-    supports = tuple(
-        replace(support, level="supported")
-        if support.level == "established" and not effect.usual(rig, place)
-        else support
-        for support, (effect, place) in zip(judged.supports, judged.best.hypothesis)
+def withhold_what_is_in_doubt(judged: Judged, explanation: Fit) -> Judged:
+    """Supports that are no more than `supported` where the `explanation` gives reason to doubt.
+
+    The explanation has a network if one stands in, which moves the parameters of the effects. All
+    but usual effects are in doubt where its line leaves much, or contradicts the data sheet; any
+    effect is whose own parameters are not plausible in it.
+    """
+    doubtful_line = (
+        explanation.model_error > MUCH_MODEL_ERROR or largest_pull(explanation)[0] > PULL_ALARM
     )
-    return replace(judged, supports=supports)
+    rig = judged.best.twin.rig
+    supports = []
+    for support, (effect, place) in zip(judged.supports, judged.best.hypothesis):
+        pull = _pull_of_effect(explanation, f"{effect.name}@{place}.")
+        in_doubt = pull > PULL_ALARM or (doubtful_line and not effect.usual(rig, place))
+        if in_doubt and support.level == "established":
+            support = replace(support, level="supported")
+        supports.append(support)
+    return replace(judged, supports=tuple(supports))
 
 
 def _is_certain(fit: Fit, k: int) -> bool:
