@@ -28,9 +28,9 @@ def test_before_is_the_better_of_base_and_plain_calibration():
     fit, even where the other's is smaller. Without a plain calibration it is the base."""
     base = {"in_sample": Score(1.26, 0.4), "held_out": Score(0.40, 0.2)}
     plain = {"in_sample": Score(0.47, 0.2), "held_out": Score(0.50, 0.3)}
-    assert Validation(base, base, base, (), 0.0).without_effects == base
-    assert Validation(base, base, base, (), 0.0, plain).without_effects == plain
-    assert Validation(plain, base, base, (), 0.0, base).without_effects == plain
+    assert Validation(base, base, base, (), 0.0, 0.0).without_effects == base
+    assert Validation(base, base, base, (), 0.0, 0.0, plain).without_effects == plain
+    assert Validation(plain, base, base, (), 0.0, 0.0, base).without_effects == plain
 
 
 def test_plain_calibration_fits_better_than_the_base_where_physics_is_missing():

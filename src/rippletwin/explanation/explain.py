@@ -16,8 +16,8 @@ The steps of the method, each with the module that takes it:
 12. Repeat the best fits with an unknown source                   localise.source_free_fits
 13. Cross-validate the base and the explanation                   checks.cross_validation
 14. Draw the null distribution of the evidence, if asked for      checks.bootstrap
-15. Decide                                                        verdict.decision
-16. Test the data sheet: prior sensitivity of accepted effects    checks.prior_sensitivity
+15. Test the data sheet: prior sensitivity of accepted effects    checks.prior_sensitivity
+16. Decide                                                        verdict.decision
 17. Locate the mismatch and what remains, by free corrections     localise.free_corrections,
                                                                   localise.remainder
 18. Analyse the shaft orders by the explained line                localise.shaft_orders
@@ -154,7 +154,6 @@ def explain_observations(
             if network is not None and set(judged.best.hypothesis) <= set(network.hypothesis):
                 network, judged = judge_beside_network(workers, search.base, network, judged)
                 search = replace(search, best=judged.best, passive_networks=[network, *networks])
-            judged = withhold_what_is_in_doubt(judged, accepted_network(search) or search.best)
             contradiction = find_swapped_sensors(base, data, search)
         # Steps 11 to 14: checks
         point_fits = fit_each_observation(workers, search.base)
@@ -168,11 +167,15 @@ def explain_observations(
         null_distribution = None
         if draws and search.best.hypothesis:
             null_distribution = bootstrap_null(search.base, data, draws, processes, progress)
-        # Steps 15 and 16: decision
-        decision = decide(search, alarms, judged.supports, contradiction, null_distribution)
+        # Steps 15 and 16: the data sheet, and the decision
         sensitivity: tuple[PriorSensitivity, ...] = ()
-        if decision.supports:
+        if judged.supports:
             sensitivity = compare_without_each_effect(workers, search.best, judged.without)
+            has_rivals = [each.rivals for each in sensitivity]
+            judged = withhold_what_is_in_doubt(
+                judged, explanation, validation.model_error, has_rivals
+            )
+        decision = decide(search, alarms, judged.supports, contradiction, null_distribution)
     accepted = add_sensor_tolerance(decision.accepted, data)
     decision = replace(decision, accepted=accepted)
     # Steps 17 and 18: where the mismatch is
@@ -194,7 +197,7 @@ def explain_observations(
         decision=decision,
         point_fits=tuple(point_fits),
         source_free_fits=tuple(source_free_fits),
-        prior_sensitivity=sensitivity,
+        prior_sensitivity=sensitivity if decision.supports else (),
         shaft_orders=shaft_orders,
         location=location,
         remainder=remainder,

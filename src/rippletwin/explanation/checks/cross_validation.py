@@ -11,13 +11,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from rippletwin.calibration.fit import Fit
+from rippletwin.calibration.levenberg_marquardt import descend
 from rippletwin.calibration.misfit import Score, score_fit
+from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.ripple_correction import correct_ripple
+from rippletwin.calibration.shaft_angles import fit_shaft_angles
 from rippletwin.explanation.fit_jobs import Workers, job_from
 from rippletwin.spectra.frequency_selection import select_frequencies
 from rippletwin.spectra.observation import Observation
 
 UNDETERMINED_VARIANCE = 0.5  # of a coordinate in a fold; its prior has 1
+HELD_OUT_STEPS = 8  # of the descent in shaft angle and state of a recording that was left out
 Halves = tuple[Observation, Observation]
 """A single periodic recording's first and second half."""
 FREQUENCY_BLOCKS = 8  # of a single spectrum, every second of which is held out
@@ -34,6 +38,7 @@ class Validation:
     left_out        what each fold left out, in words
     disagreement    largest of an effect's parameter between a fold and the whole fit, in standard
                     deviations
+    model_error     of the explanation, relative, as the data that were left out show it
     """
 
     before: dict[str, Score]
@@ -41,6 +46,7 @@ class Validation:
     nominal_ripple: dict[str, Score]
     left_out: tuple[str, ...]
     disagreement: float
+    model_error: float
     calibrated: dict[str, Score] | None = None
 
     @property
@@ -86,6 +92,7 @@ def cross_validate(
         after,
         tuple(fold.left_out for fold in folds),
         0.0 if disagreement is None else disagreement.deviations,
+        _rms([predict_held_out(r[1], f.held_out)[0].model_error for r, f in zip(refitted, folds)]),
         *plain,
     )
 
@@ -170,6 +177,20 @@ def make_folds(workers: Workers, halves: Halves | None = None) -> list[Fold]:
         held_out = [select_frequencies(observation, ~inside)]
         folds.append(Fold(own, None, held_out, f"{words} eighths of the band"))
     return folds
+
+
+def predict_held_out(fit: Fit, observations: Sequence) -> tuple[Posterior, np.ndarray]:
+    """The posterior of observations that a fit was not made of, and its parameters for them.
+
+    Shaft angles and the state of each recording are free, and the sizes of the errors are those
+    that suit the observations best: another operating point has other errors.
+    """
+    posterior = Posterior(fit.twin, observations, None, fit.source_free)
+    labels = {f"{kind}[{o.label}]" for o in observations for kind in ("angle", "state")}
+    theta = fit_shaft_angles(posterior, fit.twin.theta)
+    fixed = [k for k, p in enumerate(fit.twin.parameters) if p.name not in labels]
+    theta, _ = descend(posterior, theta, HELD_OUT_STEPS, fixed)
+    return posterior, theta
 
 
 @dataclass(frozen=True)

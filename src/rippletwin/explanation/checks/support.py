@@ -17,9 +17,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rippletwin.calibration.fit import Fit
-from rippletwin.calibration.levenberg_marquardt import descend
-from rippletwin.calibration.posterior import Posterior
-from rippletwin.calibration.shaft_angles import fit_shaft_angles
 from rippletwin.explanation.checks.alarms import largest_pull
 from rippletwin.explanation.checks.cross_validation import (
     Disagreement,
@@ -27,6 +24,7 @@ from rippletwin.explanation.checks.cross_validation import (
     Halves,
     find_disagreement,
     make_folds,
+    predict_held_out,
 )
 from rippletwin.explanation.checks.prior_sensitivity import WithoutEffect, fit_without_each_effect
 from rippletwin.explanation.checks.robustness import Robustness, compare_beside_corrections
@@ -46,8 +44,6 @@ from rippletwin.explanation.thresholds import (
     MUCH_MODEL_ERROR,
     PULL_ALARM,
 )
-
-HELD_OUT_STEPS = 8  # of the descent in shaft angle and state of a recording that was left out
 
 
 @dataclass(frozen=True)
@@ -137,21 +133,32 @@ def judge_beside_network(
     return network, replace(judged, supports=supports)
 
 
-def withhold_what_is_in_doubt(judged: Judged, explanation: Fit) -> Judged:
+def withhold_what_is_in_doubt(
+    judged: Judged, explanation: Fit, held_out_error: float, has_rivals: Sequence[bool]
+) -> Judged:
     """Supports that are no more than `supported` where the `explanation` gives reason to doubt.
 
-    The explanation has a network if one stands in, which moves the parameters of the effects. All
-    but usual effects are in doubt where its line leaves much, or contradicts the data sheet; any
-    effect is whose own parameters are not plausible in it.
+    The explanation has a network if one stands in. An effect is in doubt
+
+    * whose own parameters are not plausible in the explanation: a network moves them,
+    * where the explanation leaves much, but a usual effect,
+    * that has a rival in the data sheet, where the line does the work of physics that is left out:
+      a parameter contradicts the sheet, or held-out data leave much; but a usual effect.
+
+    held_out_error   model error, relative, of the explanation on data that were left out
+    has_rivals       of each effect, whether other values of the data sheet do nearly as well
     """
-    doubtful_line = (
-        explanation.model_error > MUCH_MODEL_ERROR or largest_pull(explanation)[0] > PULL_ALARM
-    )
+    leaves_much = explanation.model_error > MUCH_MODEL_ERROR
+    bent = largest_pull(explanation)[0] > PULL_ALARM or held_out_error > MUCH_MODEL_ERROR
     rig = judged.best.twin.rig
     supports = []
-    for support, (effect, place) in zip(judged.supports, judged.best.hypothesis):
-        pull = _pull_of_effect(explanation, f"{effect.name}@{place}.")
-        in_doubt = pull > PULL_ALARM or (doubtful_line and not effect.usual(rig, place))
+    for support, (effect, place), has_rival in zip(
+        judged.supports, judged.best.hypothesis, has_rivals, strict=True
+    ):
+        is_doubtful_line = leaves_much or (bent and has_rival)
+        in_doubt = is_doubtful_line and not effect.usual(rig, place)
+        if _pull_of_effect(explanation, f"{effect.name}@{place}.") > PULL_ALARM:
+            in_doubt = True
         if in_doubt and support.level == "established":
             support = replace(support, level="supported")
         supports.append(support)
@@ -274,15 +281,7 @@ def _check_on_folds(
 
 
 def _log_predictive(fit: Fit, observations: Sequence) -> float:
-    """Log probability of observations under a fit to others.
-
-    Shaft angles and the state of each recording are free, and the sizes of the errors are those
-    that suit the observations best: another operating point has other errors.
-    """
-    posterior = Posterior(fit.twin, observations, None, fit.source_free)
-    labels = {f"{kind}[{o.label}]" for o in observations for kind in ("angle", "state")}
-    theta = fit_shaft_angles(posterior, fit.twin.theta)
-    fixed = [k for k, p in enumerate(fit.twin.parameters) if p.name not in labels]
-    theta, _ = descend(posterior, theta, HELD_OUT_STEPS, fixed)
+    """Log probability of observations under a fit to others."""
+    posterior, theta = predict_held_out(fit, observations)
     r, log_determinant = posterior.whitened(posterior.predict(theta))
     return -float(np.sum(np.abs(r) ** 2)) - log_determinant
