@@ -201,11 +201,12 @@ def explained(
     levels=("established", "established", "supported"),
     leak=EFFECTS["leak"],
     disagreement=None,
+    held_out_error=0.05,
     **result,
 ):
     """The paragraphs of a verdict with a delay of two sensors and a leak between p1 and p2.
 
-    `disagreement` is that of the second delay.
+    `disagreement` is that of the second delay, `held_out_error` the model error on data left out.
     """
     rig, seconds = paper_rig(), {"value": 5e-6, "ci95": [4e-6, 6e-6], "unit": "s"}
     place = {"value": 1.0, "ci95": [0.9, 1.1], "unit": "m"}
@@ -247,6 +248,7 @@ def explained(
     )
     scores = {"held_out": 0.5, "in_sample": 0.5}
     fit = {"before": scores, "after": {"held_out": 0.02}, "expected_gain": {"after": 0.1}}
+    fit["model_error"] = {"held_out": held_out_error, "after": 0.02}
     whole = {"verdict": verdict, "fit": fit, "next_recording": None, "pump": {}, "load": None}
     whole |= {"sensors": {}, "remainder": None, "equivalents": []} | result
     return summary_text(e, whole, entries).split("\n")
@@ -275,6 +277,13 @@ def test_values_that_contradict_the_law_are_told():
         "law of the effect both are the same, so other physics acts there."
     )
     assert "with it" not in explained(disagreement=replace(differs, deviations=5.0))[0]
+
+
+def test_an_explanation_that_does_not_carry_over_says_so():
+    """Above 5 % of model error on data that were left out; at 5 % nothing is said."""
+    said = explained(held_out_error=0.051)[0]
+    assert "by 5.1 % on data that were left out, by 2.0 % on those that were fitted." in said
+    assert "carry over" not in explained()[0]
 
 
 def test_what_is_always_present_is_not_doubted():

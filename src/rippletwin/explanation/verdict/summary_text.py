@@ -21,7 +21,7 @@ from rippletwin.case.words import (
 )
 from rippletwin.explanation.checks.alarms import largest_pull
 from rippletwin.explanation.localise.source_free_fits import compare_evidence
-from rippletwin.explanation.thresholds import PULL_ALARM
+from rippletwin.explanation.thresholds import MUCH_MODEL_ERROR, PULL_ALARM
 from rippletwin.explanation.verdict.explanation import Explanation
 from rippletwin.explanation.verdict.number_text import (
     disagreement_sentence,
@@ -120,6 +120,18 @@ def _found(
     return [
         f"The twin lacks {_effects(e, certain)}. This is established.",
         f"With this, and with the pump's flow ripple corrected, {falls}.",
+        *_carries_over(result["fit"]["model_error"]),
+    ]
+
+
+def _carries_over(model_error: Mapping[str, float]) -> list[str]:
+    """That the explanation does not carry over to data that were left out, where it does not."""
+    if model_error["held_out"] <= MUCH_MODEL_ERROR:
+        return []
+    held_out, fitted = (write_share(model_error[which]) for which in ("held_out", "after"))
+    return [
+        f"It does not carry over well: the line errs by {held_out} on data that were left out, by "
+        f"{fitted} on those that were fitted."
     ]
 
 

@@ -282,6 +282,7 @@ def _fit_scores(e: Explanation) -> dict:
         "model_error": {
             "before": float(e.search.base.model_error),
             "after": float(e.decision.accepted.model_error),
+            "held_out": float(e.validation.model_error),
         },
         "expected_gain": {
             "before": float(e.search.base.expected_gain),
