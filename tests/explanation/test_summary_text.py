@@ -15,8 +15,9 @@ from rippletwin.explanation.verdict.number_text import (
     parameters_sentence,
     sensor_sentences,
 )
+from rippletwin.explanation.verdict.pressure_text import pressure_sentences
 from rippletwin.explanation.verdict.remainder_text import ripple_sentences
-from rippletwin.explanation.verdict.summary_text import liquid_like_air, summary_text
+from rippletwin.explanation.verdict.summary_text import summary_text
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
 
@@ -144,22 +145,23 @@ def test_what_remains_is_told_with_place_and_law():
 
 
 @pytest.mark.parametrize(
-    ("name", "pressures", "is_warned"),
+    ("names", "pressures", "is_gas", "told"),
     [
-        ("entrained_air", (9e6,), True),
-        ("entrained_air", (9e6, 9.1e6), True),
-        ("entrained_air", (9e6, 7e6), False),
-        ("entrained_air", (None,), False),
-        ("unsteady_friction", (9e6,), False),
+        (["entrained_air", "leak"], (9e6,), False, ["any liquid that stiffens"]),
+        (["entrained_air"], (9e6, 9.4e6), False, ["any liquid that stiffens"]),
+        (["entrained_air", "line_volume"], (9e6, 9.5e6), False, []),
+        (["entrained_air", "line_volume"], (None,), False, []),
+        (["load_volume"], (9e6,), False, ["a small volume of gas"]),
+        (["line_volume"], (9e6,), True, []),
+        (["unsteady_friction"], (9e6,), False, []),
     ],
 )
-def test_air_at_one_pressure_may_be_another_liquid(name, pressures, is_warned):
-    """At one pressure a liquid that stiffens by another law fits as well as entrained air.
-
-    The sentence says so there, and nowhere else."""
-    warning = liquid_like_air([name, "leak"], pressures)
-    assert (len(warning) == 1) is is_warned
-    assert all("any liquid that stiffens" in sentence for sentence in warning)
+def test_what_one_pressure_cannot_tell_apart(names, pressures, is_gas, told):
+    """At pressures within 5 % a liquid that stiffens fits as well as entrained air, and gas as well
+    as a volume of liquid. The sentences say so there, and nowhere else."""
+    said = pressure_sentences(names, pressures, is_gas)
+    assert len(said) == len(told)
+    assert all(words in sentence for words, sentence in zip(told, said))
 
 
 def test_a_wrong_ripple_is_told_apart_from_a_wrong_line():

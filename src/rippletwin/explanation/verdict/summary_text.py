@@ -31,13 +31,13 @@ from rippletwin.explanation.verdict.number_text import (
     sensor_sentences,
 )
 from rippletwin.explanation.verdict.places import element_and_extent, extent_in_words
+from rippletwin.explanation.verdict.pressure_text import pressure_sentences
 from rippletwin.explanation.verdict.remainder_text import (
     remainder_sentences,
     ripple_sentences,
     shaft_order_sentences,
 )
 
-SAME_PRESSURE = 0.05  # relative; mean pressures closer than this count as one
 SOURCE_FREE_SHARE = 0.2  # of the evidence that must remain if the source is unknown
 OPENINGS = {
     "consistent": "The recordings agree with the twin within the tolerances of the data sheet.",
@@ -77,7 +77,7 @@ def summary_text(e: Explanation, result: dict, entries: Sequence[dict]) -> str:
         _values(e, certain),
         [
             *(_data_sheet_rivals(e, result["fit"]) if named else []),
-            *_air(e, certain),
+            *_alike(e, certain),
             *(_source_free(e) if is_named else []),
         ],
         [
@@ -231,25 +231,12 @@ def _data_sheet_rivals(e: Explanation, fit: dict) -> list[str]:
     return sentences
 
 
-def _air(e: Explanation, entries: Sequence[dict]) -> list[str]:
+def _alike(e: Explanation, entries: Sequence[dict]) -> list[str]:
+    """What the mean pressures of these recordings cannot tell from the effects of `entries`."""
     names = [entry["effect"].name for entry in entries]
     if not names:
         return []
-    return liquid_like_air(names, [o.load_pressure for o in e.observations])
-
-
-def liquid_like_air(names: Sequence[str], pressures: Sequence[float | None]) -> list[str]:
-    """A warning where accepted effects `names` include entrained air at one pressure (Pa).
-
-    Only the change with pressure discriminates air from any liquid that stiffens.
-    """
-    known = [p for p in pressures if p is not None]
-    if "entrained_air" not in names or not known or max(known) > (1 + SAME_PRESSURE) * min(known):
-        return []
-    return [
-        "At a single mean pressure any liquid that stiffens under compression fits as well as "
-        "entrained air: record at another pressure."
-    ]
+    return pressure_sentences(names, [o.load_pressure for o in e.observations], e.rig.fluid.is_gas)
 
 
 def _source_free(e: Explanation) -> list[str]:
