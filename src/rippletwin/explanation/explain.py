@@ -67,6 +67,7 @@ from rippletwin.explanation.localise.shaft_orders import ShaftOrders, analyse_sh
 from rippletwin.explanation.localise.source_free_fits import refit_source_free
 from rippletwin.explanation.search.passive_networks import accepted_network, fit_passive_networks
 from rippletwin.explanation.search.sheet_tolerance import (
+    fit_with_wider_tolerances,
     scale_tolerances,
     tolerance_scale,
     with_coordinates_of,
@@ -295,7 +296,7 @@ def _resume_search(
     coupled = None
     if search.best.model_error < MAX_MODEL_ERROR_FOR_COUPLING:
         coupled = couple_pump_to_line(search.best.twin, state.observations)
-    scale = tolerance_scale(search.best)
+    search, scale = _widen_tolerances(state, search, processes)
     if coupled is None and scale == 1.0:
         return state, search
     data = coupled or state.observations
@@ -309,6 +310,17 @@ def _resume_search(
         if scale == 1.0:
             break
     return state, search
+
+
+def _widen_tolerances(state: _State, search: Search, processes: int) -> tuple[Search, float]:
+    """The search with its best explanation under wider tolerances of the data sheet, if they gain,
+    and the factor on them."""
+    with open_workers(state.base, state.observations, processes) as workers:
+        wider = fit_with_wider_tolerances(workers, search.best)
+    if wider is None:
+        return search, 1.0
+    factor = wider.twin.rig.tolerance_scale / state.base.rig.tolerance_scale
+    return replace(search, best=wider), factor * tolerance_scale(wider)
 
 
 def _select_fitted(
