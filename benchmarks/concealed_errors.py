@@ -4,8 +4,9 @@
 
 TRIAL is the folder of a trial whose seals are open, RESULTS/concealed. Prints how many delays and
 impedances are within two stated standard deviations, apart for the first segment and the others and
-for data sheets with and without the pump's geometry, and every 95 % interval of an effect that
-misses the true value.
+for data sheets with and without the pump's geometry, every 95 % interval of an effect that misses
+the true value, and every effect to which parts of the data give values more than TOLD standard
+deviations apart.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from rippletwin.case.load import load_case
 from virtualrig.seal import open_seal_file
 
 QUANTITIES = ("delay", "impedance")
+TOLD = 3.0
 
 
 def line_table(trial: Path, rows: list[dict]) -> str:
@@ -69,6 +71,23 @@ def missed_intervals(trial: Path, rows: list[dict]) -> Iterator[str]:
                     )
 
 
+def disagreements(trial: Path, rows: list[dict]) -> Iterator[str]:
+    """A line for each effect with a parameter of more than TOLD deviations between parts of data,
+    which says whether the effect is among the wrong names of its case."""
+    for row in rows:
+        path = trial / "explained" / f"{row['case']:03d}" / "verdict.json"
+        for effect in json.loads(path.read_text())["effects"]:
+            found = effect.get("disagreement")
+            if found is not None and found["deviations"] > TOLD:
+                wrong = effect["name"] in row["wrong"].split(" + ")
+                yield (
+                    f"case {row['case']}: {effect['name']} ({effect['element']}), "
+                    f"{effect['support']}{', a wrong name' if wrong else ''}: "
+                    f"{found['parameter']} {found['part']:.3g} without {found['left_out']}, "
+                    f"{found['whole']:.3g} with it, {found['deviations']:.1f} deviations"
+                )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("trial", type=Path, help="folder RESULTS/concealed of an opened trial")
@@ -77,6 +96,7 @@ def main() -> None:
         parser.error(f"{trial}: has no rows.json; run `snakemake concealed` to its end")
     rows = json.loads((trial / "rows.json").read_text())
     print(line_table(trial, rows), *missed_intervals(trial, rows), sep="\n")
+    print(*disagreements(trial, rows), sep="\n")
 
 
 if __name__ == "__main__":

@@ -1,17 +1,23 @@
 """The factor on the data sheet's tolerances."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from paper_rig import paper_rig
+from rippletwin.explanation.fit_jobs import Continuation, FitJob, FromTheta, Workers
+from rippletwin.explanation.search import sheet_tolerance
 from rippletwin.explanation.search.sheet_tolerance import (
     SCALES,
+    fit_with_wider_tolerances,
     scale_evidence,
     scale_tolerances,
     tolerance_scale,
 )
+from rippletwin.twin.twin import Twin
+from synthetic_observations import make
 
 
 def test_the_evidence_is_that_of_the_data_under_each_prior():
@@ -58,3 +64,45 @@ def test_the_tolerances_never_get_more_than_four_times_as_wide(so_far, found):
     )
     fit = SimpleNamespace(twin=twin, evidence=0.0, covariance=0.01 * np.eye(6))
     assert tolerance_scale(fit) == pytest.approx(found)
+
+
+@pytest.fixture(scope="module")
+def plain_fit():
+    """A line without effects, fitted, and the workers for its observations."""
+    rig, observations, truth = make(np.random.default_rng(3), points=((1000, 9.5e6),))
+    workers = Workers(Twin(rig, observations), observations)
+    (fit,) = workers.fit([FitJob((), FromTheta(truth.theta))])
+    return fit, workers
+
+
+@pytest.mark.parametrize(
+    ("gains", "taken"), [((2.9, 1.0), None), ((3.0, 1.0), 0), ((3.5, 20.0), 1), ((-9.0, 3.0), 1)]
+)
+def test_wider_tolerances_are_taken_where_they_gain(plain_fit, monkeypatch, gains, taken):
+    """Proves that the better of two fits is taken, the one from the present values and the one
+    begun anew, from 3 of log evidence on; both have twice the data sheet's tolerances, because the
+    fit itself asks for none."""
+    fit, workers = plain_fit
+    monkeypatch.setattr(sheet_tolerance, "tolerance_scale", lambda fit: 1.0)
+    asked = []
+
+    def run(jobs):
+        asked.extend(jobs)
+        return [replace(fit, evidence=fit.evidence + gain) for gain in gains]
+
+    wider = fit_with_wider_tolerances(
+        SimpleNamespace(observations=workers.observations, fit=run), fit
+    )
+    assert [job.base.rig.tolerance_scale for job in asked] == [2.0, 2.0]
+    assert [type(job.start) for job in asked] == [FromTheta, Continuation]
+    assert (wider is None) == (taken is None)
+    if taken is not None:
+        assert wider.evidence == pytest.approx(fit.evidence + gains[taken])
+
+
+def test_tolerances_four_times_as_wide_are_not_widened(plain_fit):
+    """Proves that nothing is fitted where the tolerances are as wide as they may get."""
+    fit, workers = plain_fit
+    rig = replace(fit.twin.rig, tolerance_scale=4.0)
+    widest = replace(fit, twin=Twin(rig, workers.observations).with_(theta=fit.twin.theta))
+    assert fit_with_wider_tolerances(None, widest) is None

@@ -8,9 +8,11 @@ import pytest
 from rippletwin.calibration.frequency_continuation import refine
 from rippletwin.calibration.misfit import Score
 from rippletwin.explanation.checks.alarms import Alarms
-from rippletwin.explanation.checks.cross_validation import Validation
+from rippletwin.explanation.checks.cross_validation import Disagreement, Validation
+from rippletwin.explanation.checks.support import Support
 from rippletwin.explanation.localise.shaft_orders import ShaftEffect, ShaftOrders
 from rippletwin.explanation.search.stepwise_search import Search
+from rippletwin.explanation.verdict import verdict_file
 from rippletwin.explanation.verdict.decision import Decision
 from rippletwin.explanation.verdict.explanation import Explanation
 from rippletwin.explanation.verdict.verdict_file import verdict_dict
@@ -32,7 +34,7 @@ def explanation():
         observations=tuple(observations),
         search=Search(base, [base], base),
         alarms=Alarms(0.004, (0.1, "load"), (0.1, "load"), (0.5, "point 1")),
-        validation=Validation(scores, scores, scores, ("recording 1",), 0.0),
+        validation=Validation(scores, scores, scores, ("recording 1",), 0.0, 0.004),
         decision=Decision("consistent", base),
         point_fits=(),
         shaft_orders=MODULATION,
@@ -61,6 +63,20 @@ def test_warnings_of_the_case_are_told(explanation):
     """What `check` warns of, as a generic pump, is in the verdict too."""
     warned = replace(explanation, warnings=("pump: only pistons is given",))
     assert verdict_dict(warned)["warnings"] == ["pump: only pistons is given"]
+
+
+def test_a_disagreement_is_told_with_the_parameters_own_name():
+    """Of an effect's support, in SI units; null where nothing could be compared."""
+    support = Support("leak", "position", "supported", None, 1.0, 0.0)
+    found = Disagreement(6.0, "leak@position.conductance", 1e-11, 2e-11, "recording 1")
+    assert verdict_file._disagreement(replace(support, disagreement=found)) == {
+        "deviations": 6.0,
+        "parameter": "conductance",
+        "whole": 1e-11,
+        "part": 2e-11,
+        "left_out": "recording 1",
+    }
+    assert verdict_file._disagreement(support) is None
 
 
 def test_an_unknown_interval_is_left_out(explanation):

@@ -16,8 +16,8 @@ The steps of the method, each with the module that takes it:
 12. Repeat the best fits with an unknown source                   localise.source_free_fits
 13. Cross-validate the base and the explanation                   checks.cross_validation
 14. Draw the null distribution of the evidence, if asked for      checks.bootstrap
-15. Decide                                                        verdict.decision
-16. Test the data sheet: prior sensitivity of accepted effects    checks.prior_sensitivity
+15. Test the data sheet: prior sensitivity of accepted effects    checks.prior_sensitivity
+16. Decide                                                        verdict.decision
 17. Locate the mismatch and what remains, by free corrections     localise.free_corrections,
                                                                   localise.remainder
 18. Analyse the shaft orders by the explained line                localise.shaft_orders
@@ -52,7 +52,7 @@ from rippletwin.explanation.checks.support import (
     Judged,
     judge_beside_network,
     judge_effects,
-    withhold_on_a_doubtful_line,
+    withhold_what_is_in_doubt,
 )
 from rippletwin.explanation.fit_jobs import FitJob, PlainCalibration, open_workers
 from rippletwin.explanation.localise.free_corrections import locate_mismatch
@@ -67,6 +67,7 @@ from rippletwin.explanation.localise.shaft_orders import ShaftOrders, analyse_sh
 from rippletwin.explanation.localise.source_free_fits import refit_source_free
 from rippletwin.explanation.search.passive_networks import accepted_network, fit_passive_networks
 from rippletwin.explanation.search.sheet_tolerance import (
+    fit_with_wider_tolerances,
     scale_tolerances,
     tolerance_scale,
     with_coordinates_of,
@@ -154,7 +155,6 @@ def explain_observations(
             if network is not None and set(judged.best.hypothesis) <= set(network.hypothesis):
                 network, judged = judge_beside_network(workers, search.base, network, judged)
                 search = replace(search, best=judged.best, passive_networks=[network, *networks])
-            judged = withhold_on_a_doubtful_line(judged, accepted_network(search) or search.best)
             contradiction = find_swapped_sensors(base, data, search)
         # Steps 11 to 14: checks
         point_fits = fit_each_observation(workers, search.base)
@@ -168,11 +168,15 @@ def explain_observations(
         null_distribution = None
         if draws and search.best.hypothesis:
             null_distribution = bootstrap_null(search.base, data, draws, processes, progress)
-        # Steps 15 and 16: decision
-        decision = decide(search, alarms, judged.supports, contradiction, null_distribution)
+        # Steps 15 and 16: the data sheet, and the decision
         sensitivity: tuple[PriorSensitivity, ...] = ()
-        if decision.supports:
+        if judged.supports:
             sensitivity = compare_without_each_effect(workers, search.best, judged.without)
+            has_rivals = [each.rivals for each in sensitivity]
+            judged = withhold_what_is_in_doubt(
+                judged, explanation, validation.model_error, has_rivals
+            )
+        decision = decide(search, alarms, judged.supports, contradiction, null_distribution)
     accepted = add_sensor_tolerance(decision.accepted, data)
     decision = replace(decision, accepted=accepted)
     # Steps 17 and 18: where the mismatch is
@@ -194,7 +198,7 @@ def explain_observations(
         decision=decision,
         point_fits=tuple(point_fits),
         source_free_fits=tuple(source_free_fits),
-        prior_sensitivity=sensitivity,
+        prior_sensitivity=sensitivity if decision.supports else (),
         shaft_orders=shaft_orders,
         location=location,
         remainder=remainder,
@@ -292,7 +296,7 @@ def _resume_search(
     coupled = None
     if search.best.model_error < MAX_MODEL_ERROR_FOR_COUPLING:
         coupled = couple_pump_to_line(search.best.twin, state.observations)
-    scale = tolerance_scale(search.best)
+    search, scale = _widen_tolerances(state, search, processes)
     if coupled is None and scale == 1.0:
         return state, search
     data = coupled or state.observations
@@ -306,6 +310,17 @@ def _resume_search(
         if scale == 1.0:
             break
     return state, search
+
+
+def _widen_tolerances(state: _State, search: Search, processes: int) -> tuple[Search, float]:
+    """The search with its best explanation under wider tolerances of the data sheet, if they gain,
+    and the factor on them."""
+    with open_workers(state.base, state.observations, processes) as workers:
+        wider = fit_with_wider_tolerances(workers, search.best)
+    if wider is None:
+        return search, 1.0
+    factor = wider.twin.rig.tolerance_scale / state.base.rig.tolerance_scale
+    return replace(search, best=wider), factor * tolerance_scale(wider)
 
 
 def _select_fitted(

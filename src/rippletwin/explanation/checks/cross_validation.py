@@ -11,13 +11,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from rippletwin.calibration.fit import Fit
+from rippletwin.calibration.levenberg_marquardt import descend
 from rippletwin.calibration.misfit import Score, score_fit
+from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.ripple_correction import correct_ripple
+from rippletwin.calibration.shaft_angles import fit_shaft_angles
 from rippletwin.explanation.fit_jobs import Workers, job_from
 from rippletwin.spectra.frequency_selection import select_frequencies
 from rippletwin.spectra.observation import Observation
 
 UNDETERMINED_VARIANCE = 0.5  # of a coordinate in a fold; its prior has 1
+HELD_OUT_STEPS = 8  # of the descent in shaft angle and state of a recording that was left out
 Halves = tuple[Observation, Observation]
 """A single periodic recording's first and second half."""
 FREQUENCY_BLOCKS = 8  # of a single spectrum, every second of which is held out
@@ -32,8 +36,9 @@ class Validation:
     nominal_ripple  those of the explanation with the nominal ripple of the pump in its place
     calibrated      those of the plain calibration without effects; None if it was not made
     left_out        what each fold left out, in words
-    disagreement    largest difference of an effect's parameter between a fold and the whole fit, in
-                    standard deviations
+    disagreement    largest of an effect's parameter between a fold and the whole fit, in standard
+                    deviations
+    model_error     of the explanation, relative, as the data that were left out show it
     """
 
     before: dict[str, Score]
@@ -41,6 +46,7 @@ class Validation:
     nominal_ripple: dict[str, Score]
     left_out: tuple[str, ...]
     disagreement: float
+    model_error: float
     calibrated: dict[str, Score] | None = None
 
     @property
@@ -78,12 +84,15 @@ def cross_validate(
         _score(fit, [r[k] for r in refitted], folds, workers.observations)
         for k, fit in enumerate(fits)
     )
+    parts = [(fits[1], fold.left_out) for fits, fold in zip(refitted, folds)]
+    disagreement = find_disagreement(best, parts)
     return Validation(
         before,
         _score(best, [r[1] for r in refitted], folds, workers.observations, corrects_ripple=True),
         after,
         tuple(fold.left_out for fold in folds),
-        max((_largest_difference(best, fold[1]) for fold in refitted), default=0.0),
+        0.0 if disagreement is None else disagreement.deviations,
+        _rms([predict_held_out(r[1], f.held_out)[0].model_error for r, f in zip(refitted, folds)]),
         *plain,
     )
 
@@ -170,25 +179,63 @@ def make_folds(workers: Workers, halves: Halves | None = None) -> list[Fold]:
     return folds
 
 
-def _largest_difference(whole: Fit, fold: Fit) -> float:
-    """Largest difference of an effect's parameter between a fold and the whole fit.
+def predict_held_out(fit: Fit, observations: Sequence) -> tuple[Posterior, np.ndarray]:
+    """The posterior of observations that a fit was not made of, and its parameters for them.
 
-    In standard deviations. The fold's data are part of the whole's, so the variance of the
-    difference is the fold's less the whole's; it is at least a quarter of the fold's. A parameter
-    that the fold determines hardly better than its prior cannot disagree, as a pressure exponent at
-    one pressure.
+    Shaft angles and the state of each recording are free, and the sizes of the errors are those
+    that suit the observations best: another operating point has other errors.
     """
-    largest = 0.0
-    for p in whole.twin.parameters:
-        if "@" in p.name:
-            k, m = whole.twin.index[p.name], fold.twin.index[p.name]
-            fold_variance = fold.covariance[m, m]
-            if fold_variance > UNDETERMINED_VARIANCE:
+    posterior = Posterior(fit.twin, observations, None, fit.source_free)
+    labels = {f"{kind}[{o.label}]" for o in observations for kind in ("angle", "state")}
+    theta = fit_shaft_angles(posterior, fit.twin.theta)
+    fixed = [k for k, p in enumerate(fit.twin.parameters) if p.name not in labels]
+    theta, _ = descend(posterior, theta, HELD_OUT_STEPS, fixed)
+    return posterior, theta
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """How far a parameter of an effect is in a fit to a part of the data from that to all data.
+
+    deviations    in standard deviations of the difference
+    parameter     its name in the twin
+    whole, part   its values in SI units, of all data and of the part
+    left_out      what the part leaves out, in words
+    """
+
+    deviations: float
+    parameter: str
+    whole: float
+    part: float
+    left_out: str
+
+
+def find_disagreement(
+    whole: Fit, parts: Sequence[tuple[Fit, str]], label: str = ""
+) -> Disagreement | None:
+    """The largest disagreement of a parameter of an effect; None where there is nothing to compare.
+
+    parts   fits to parts of the data, with what each leaves out
+    label   beginning of the names of the parameters of one effect; "" for all effects
+
+    A part's data are among those of the whole, so the variance of the difference is the part's less
+    the whole's; it is at least a quarter of the part's. A parameter that the part determines hardly
+    better than its prior cannot disagree, as a pressure exponent at one pressure.
+    """
+    found = []
+    for part, left_out in parts:
+        values, part_values = whole.twin.values(), part.twin.values()
+        for p in whole.twin.parameters:
+            if "@" not in p.name or not p.name.startswith(label):
                 continue
-            variance = max(fold_variance - whole.covariance[k, k], 0.25 * fold_variance) + 1e-4
-            z = abs(whole.twin.theta[k] - fold.twin.theta[m]) / np.sqrt(variance)
-            largest = max(largest, float(z))
-    return largest
+            k, m = whole.twin.index[p.name], part.twin.index[p.name]
+            part_variance = part.covariance[m, m]
+            if part_variance > UNDETERMINED_VARIANCE:
+                continue
+            variance = max(part_variance - whole.covariance[k, k], 0.25 * part_variance) + 1e-4
+            z = float(abs(whole.twin.theta[k] - part.twin.theta[m]) / np.sqrt(variance))
+            found.append(Disagreement(z, p.name, values[p.name], part_values[p.name], left_out))
+    return max(found, key=lambda each: each.deviations, default=None)
 
 
 def _rms(values: Sequence[float]) -> float:

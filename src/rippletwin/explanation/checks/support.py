@@ -3,7 +3,8 @@
 suggested     The search accepted it.
 supported     It also keeps its evidence with a free data sheet, and predicts held-out data better.
 established   It also keeps its evidence beside a free correction of any other element, with a free
-              correction at its own place its law is not needless, and its parameters are plausible.
+              correction at its own place its law is not needless, its parameters are plausible, and
+              they are the same without any part of the data.
 
 Effects are judged one by one: the others stay in both models.
 """
@@ -16,11 +17,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rippletwin.calibration.fit import Fit
-from rippletwin.calibration.levenberg_marquardt import descend
-from rippletwin.calibration.posterior import Posterior
-from rippletwin.calibration.shaft_angles import fit_shaft_angles
 from rippletwin.explanation.checks.alarms import largest_pull
-from rippletwin.explanation.checks.cross_validation import Fold, Halves, make_folds
+from rippletwin.explanation.checks.cross_validation import (
+    Disagreement,
+    Fold,
+    Halves,
+    find_disagreement,
+    make_folds,
+    predict_held_out,
+)
 from rippletwin.explanation.checks.prior_sensitivity import WithoutEffect, fit_without_each_effect
 from rippletwin.explanation.checks.robustness import Robustness, compare_beside_corrections
 from rippletwin.explanation.fit_jobs import FitJob, FromTheta, Workers, job_without_effect
@@ -34,12 +39,11 @@ from rippletwin.explanation.localise.smooth_corrections import (
 )
 from rippletwin.explanation.search.stepwise_moves import extension_job
 from rippletwin.explanation.thresholds import (
+    MAX_DISAGREEMENT,
     MIN_LOG_BAYES_FACTOR,
     MUCH_MODEL_ERROR,
     PULL_ALARM,
 )
-
-HELD_OUT_STEPS = 8  # of the descent in shaft angle and state of a recording that was left out
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,8 @@ class Support:
     robustness    its log Bayes factors beside free corrections
     held_out      log predictive probability of held-out data that it adds, over all folds
     pull          prior standard deviations between its parameters and their medians, at most
+    disagreement  the largest of its parameters between a part of the data and all data; None where
+                  nothing can be compared
     """
 
     name: str
@@ -59,6 +65,12 @@ class Support:
     robustness: Robustness
     held_out: float
     pull: float
+    disagreement: Disagreement | None = None
+
+    @property
+    def contradicts_its_law(self) -> bool:
+        """Whether parts of the data give it different values, which its law says are the same."""
+        return _deviations(self.disagreement) > MAX_DISAGREEMENT
 
 
 @dataclass(frozen=True)
@@ -121,21 +133,36 @@ def judge_beside_network(
     return network, replace(judged, supports=supports)
 
 
-def withhold_on_a_doubtful_line(judged: Judged, explanation: Fit) -> Judged:
-    """Supports that are no more than `supported`, but of usual effects, where the line of the
-    `explanation`, with a network if one stands in, is in doubt: it leaves much, or contradicts the
-    data sheet."""
+def withhold_what_is_in_doubt(
+    judged: Judged, explanation: Fit, held_out_error: float, has_rivals: Sequence[bool]
+) -> Judged:
+    """Supports that are no more than `supported` where the `explanation` gives reason to doubt.
+
+    The explanation has a network if one stands in. An effect is in doubt
+
+    * whose own parameters are not plausible in the explanation: a network moves them,
+    * where the explanation leaves much, but a usual effect,
+    * that has a rival in the data sheet, where the line does the work of physics that is left out:
+      a parameter contradicts the sheet, or held-out data leave much; but a usual effect.
+
+    held_out_error   model error, relative, of the explanation on data that were left out
+    has_rivals       of each effect, whether other values of the data sheet do nearly as well
+    """
     leaves_much = explanation.model_error > MUCH_MODEL_ERROR
-    if not leaves_much and largest_pull(explanation)[0] <= PULL_ALARM:
-        return judged
+    bent = largest_pull(explanation)[0] > PULL_ALARM or held_out_error > MUCH_MODEL_ERROR
     rig = judged.best.twin.rig
-    supports = tuple(
-        replace(support, level="supported")
-        if support.level == "established" and not effect.usual(rig, place)
-        else support
-        for support, (effect, place) in zip(judged.supports, judged.best.hypothesis)
-    )
-    return replace(judged, supports=supports)
+    supports = []
+    for support, (effect, place), has_rival in zip(
+        judged.supports, judged.best.hypothesis, has_rivals, strict=True
+    ):
+        is_doubtful_line = leaves_much or (bent and has_rival)
+        in_doubt = is_doubtful_line and not effect.usual(rig, place)
+        if _pull_of_effect(explanation, f"{effect.name}@{place}.") > PULL_ALARM:
+            in_doubt = True
+        if in_doubt and support.level == "established":
+            support = replace(support, level="supported")
+        supports.append(support)
+    return replace(judged, supports=tuple(supports))
 
 
 def _is_certain(fit: Fit, k: int) -> bool:
@@ -162,7 +189,7 @@ def _judge_each(
 ) -> tuple[Support, ...]:
     """`Support` of every effect of `best`."""
     folds = make_folds(workers, halves)
-    held_out = _held_out_gains(best, without, folds)
+    held_out, disagreements = _check_on_folds(best, without, folds)
     rig, values = best.twin.rig, best.twin.effect_values(best.twin.theta)
     owns = [own_element(effect, place, value, rig) for effect, place, value in values]
     elements = elements_of(rig, workers.observations, owns)
@@ -180,8 +207,10 @@ def _judge_each(
     for k, (effect, place) in enumerate(best.hypothesis):
         robustness = compare_beside_corrections(present, absent[k], owns[k], spacing)
         pull = _pull_of_effect(best, f"{effect.name}@{place}.")
-        level = support_level(robustness, held_out[k], pull)
-        supports.append(Support(effect.name, str(place), level, robustness, held_out[k], pull))
+        differs = disagreements[k]
+        level = support_level(robustness, held_out[k], pull, _deviations(differs))
+        support = Support(effect.name, str(place), level, robustness, held_out[k], pull, differs)
+        supports.append(support)
     return tuple(supports)
 
 
@@ -217,39 +246,42 @@ def evaluate_without(base, observations: Sequence, job: tuple) -> list[dict[tupl
     return [*tables, SmoothCorrections(wide, observations).by_element([(NONE, None)])]
 
 
-def support_level(robustness: Robustness, held_out: float, pull: float) -> str:
+def support_level(
+    robustness: Robustness, held_out: float, pull: float, deviations: float = 0.0
+) -> str:
     """Level of an effect with these results of the checks."""
     if robustness.plain < MIN_LOG_BAYES_FACTOR or held_out <= 0.0:
         return "suggested"
     survives = robustness.least >= MIN_LOG_BAYES_FACTOR and robustness.own >= 0.0
-    return "established" if survives and pull <= PULL_ALARM else "supported"
+    plausible = pull <= PULL_ALARM and deviations <= MAX_DISAGREEMENT
+    return "established" if survives and plausible else "supported"
 
 
-def _held_out_gains(
+def _deviations(disagreement: Disagreement | None) -> float:
+    return 0.0 if disagreement is None else disagreement.deviations
+
+
+def _check_on_folds(
     best: Fit, without: Sequence[WithoutEffect], folds: Sequence[Fold]
-) -> list[float]:
-    """Log predictive probability of the held-out data that each effect adds, over all folds."""
-    gains = np.zeros(len(without))
+) -> tuple[list[float], list[Disagreement | None]]:
+    """Of each effect of `best`: the log predictive probability of the held-out data that it adds,
+    over all folds, and the largest disagreement of its parameters between a fold and all data."""
+    gains, parts = np.zeros(len(without)), []
     for fold in folds:
         jobs = [
             FitJob(f.hypothesis, FromTheta(f.twin.theta, exact=False), observations=fold.indices)
             for f in (best, *(each.stated for each in without))
         ]
-        present, *absent = (_log_predictive(fit, fold.held_out) for fit in fold.workers.fit(jobs))
+        fits = fold.workers.fit(jobs)
+        present, *absent = (_log_predictive(fit, fold.held_out) for fit in fits)
         gains += present - np.array(absent)
-    return [float(g) for g in gains]
+        parts.append((fits[0], fold.left_out))
+    labels = [f"{effect.name}@{place}." for effect, place in best.hypothesis]
+    return list(map(float, gains)), [find_disagreement(best, parts, label) for label in labels]
 
 
 def _log_predictive(fit: Fit, observations: Sequence) -> float:
-    """Log probability of observations under a fit to others.
-
-    Shaft angles and the state of each recording are free, and the sizes of the errors are those
-    that suit the observations best: another operating point has other errors.
-    """
-    posterior = Posterior(fit.twin, observations, None, fit.source_free)
-    labels = {f"{kind}[{o.label}]" for o in observations for kind in ("angle", "state")}
-    theta = fit_shaft_angles(posterior, fit.twin.theta)
-    fixed = [k for k, p in enumerate(fit.twin.parameters) if p.name not in labels]
-    theta, _ = descend(posterior, theta, HELD_OUT_STEPS, fixed)
+    """Log probability of observations under a fit to others."""
+    posterior, theta = predict_held_out(fit, observations)
     r, log_determinant = posterior.whitened(posterior.predict(theta))
     return -float(np.sum(np.abs(r) ** 2)) - log_determinant

@@ -5,6 +5,9 @@ sheet, such as the bore that all segments have in common. Where the first are se
 deviations off, the others are hardly better. So the tolerances of the data sheet get a common
 factor, the one of greatest evidence (empirical Bayes; MacKay 1992, Neural Computation 4:415, on the
 scale of a prior).
+
+Where the data sheet is far off, the fit may have settled in a mode that its tolerances favour,
+which shows nothing of that. So the explanation is also begun anew with wider tolerances.
 """
 
 from __future__ import annotations
@@ -15,12 +18,16 @@ import numpy as np
 
 from rippletwin.calibration.fit import Fit
 from rippletwin.case.model import Rig, Uncertainty
+from rippletwin.explanation.fit_jobs import Continuation, FitJob, FromTheta, Workers
+from rippletwin.explanation.fit_starts import common_coordinates
 from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR
 from rippletwin.twin.parameters import coordinates
 from rippletwin.twin.twin import Twin
 
 SCALES = np.geomspace(1.0, 4.0, 13)
+WIDER = 2.0  # factor with which the explanation is begun anew where the fit needs none
+RANDOM_STARTS = 4  # around each mode below a frequency limit
 ROUNDING = 1e-9
 
 
@@ -58,6 +65,29 @@ def scale_evidence(mean: np.ndarray, covariance: np.ndarray) -> np.ndarray:
         ]
     )
     return log_evidence - log_evidence[0]
+
+
+def fit_with_wider_tolerances(workers: Workers, best: Fit) -> Fit | None:
+    """The hypothesis of `best` with wider tolerances of the data sheet, where that adds as much
+    evidence as tells two explanations apart; else None.
+
+    The factor is that of `tolerance_scale`, or WIDER where that is 1. The fit goes on from `best`,
+    and is begun anew with random starts.
+    """
+    scale = tolerance_scale(best)
+    rig = scale_tolerances(best.twin.rig, WIDER if scale == 1.0 else scale)
+    if rig.tolerance_scale > SCALES[-1] * (1.0 + ROUNDING):
+        return None
+    base = Twin(rig, workers.observations, uncertain_pump=True, changing_state=True)
+    twin = base.with_(effects=best.hypothesis)
+    starts = (
+        FromTheta(coordinates(twin.parameters, best.twin.values())),
+        Continuation((common_coordinates(best, best.hypothesis),), RANDOM_STARTS),
+    )
+    fits = workers.fit([FitJob(best.hypothesis, start, base=base) for start in starts])
+    wider = max(fits, key=lambda fit: fit.evidence)
+    gain = wider.evidence - best.evidence
+    return wider if gain >= EQUIVALENT_LOG_BAYES_FACTOR else None
 
 
 def scale_tolerances(rig: Rig, scale: float) -> Rig:

@@ -8,6 +8,7 @@ import numpy as np
 
 from rippletwin.case.quantities import plain, unit_of, write_interval, write_stated, write_value
 from rippletwin.case.words import join_words, name_parameter
+from rippletwin.explanation.checks.cross_validation import Disagreement
 
 
 def parameters_sentence(effect: str, parameters: Mapping[str, dict]) -> str:
@@ -22,6 +23,19 @@ def parameters_sentence(effect: str, parameters: Mapping[str, dict]) -> str:
             words = ""
         told.append(f"{words}{value} ({write_interval(ends, unit)})")
     return plain(f"{effect[:1].upper()}{effect[1:]}: {join_words(told)}.")
+
+
+def disagreement_sentence(effect: str, parameters: Mapping[str, dict], found: Disagreement) -> str:
+    """The two values of a parameter of an effect, which is told with its place, that contradict its
+    law."""
+    name = found.parameter.rpartition(".")[2]
+    unit = unit_of(parameters[name]["unit"], name)
+    part, whole = (write_value(value, unit) for value in (found.part, found.whole))
+    return plain(
+        f"{effect[:1].upper()}{effect[1:]}: {name_parameter(name)} {part} without "
+        f"{found.left_out}, {whole} with it. By the law of the effect both are the same, so other "
+        "physics acts there."
+    )
 
 
 def pump_sentences(parameters: dict) -> list[str]:

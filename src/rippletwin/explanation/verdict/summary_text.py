@@ -21,22 +21,23 @@ from rippletwin.case.words import (
 )
 from rippletwin.explanation.checks.alarms import largest_pull
 from rippletwin.explanation.localise.source_free_fits import compare_evidence
-from rippletwin.explanation.thresholds import PULL_ALARM
+from rippletwin.explanation.thresholds import MUCH_MODEL_ERROR, PULL_ALARM
 from rippletwin.explanation.verdict.explanation import Explanation
 from rippletwin.explanation.verdict.number_text import (
+    disagreement_sentence,
     load_sentences,
     parameters_sentence,
     pump_sentences,
     sensor_sentences,
 )
 from rippletwin.explanation.verdict.places import element_and_extent, extent_in_words
+from rippletwin.explanation.verdict.pressure_text import pressure_sentences
 from rippletwin.explanation.verdict.remainder_text import (
     remainder_sentences,
     ripple_sentences,
     shaft_order_sentences,
 )
 
-SAME_PRESSURE = 0.05  # relative; mean pressures closer than this count as one
 SOURCE_FREE_SHARE = 0.2  # of the evidence that must remain if the source is unknown
 OPENINGS = {
     "consistent": "The recordings agree with the twin within the tolerances of the data sheet.",
@@ -69,13 +70,14 @@ def summary_text(e: Explanation, result: dict, entries: Sequence[dict]) -> str:
     found = _found(e, result, entries, certain)
     if named:
         found += _lesser(e, [entry for entry in named if entry not in certain], levels)
+        found += _contradictions(e, named)
     paragraphs = [
         [*found, *_unfinished_fit(result["fit"])],
         [*_undecided(result), *_next_recording(result)],
         _values(e, certain),
         [
             *(_data_sheet_rivals(e, result["fit"]) if named else []),
-            *_air(e, certain),
+            *_alike(e, certain),
             *(_source_free(e) if is_named else []),
         ],
         [
@@ -118,6 +120,18 @@ def _found(
     return [
         f"The twin lacks {_effects(e, certain)}. This is established.",
         f"With this, and with the pump's flow ripple corrected, {falls}.",
+        *_carries_over(result["fit"]["model_error"]),
+    ]
+
+
+def _carries_over(model_error: Mapping[str, float]) -> list[str]:
+    """That the explanation does not carry over to data that were left out, where it does not."""
+    if model_error["held_out"] <= MUCH_MODEL_ERROR:
+        return []
+    held_out, fitted = (write_share(model_error[which]) for which in ("held_out", "after"))
+    return [
+        f"It does not carry over well: the line errs by {held_out} on data that were left out, by "
+        f"{fitted} on those that were fitted."
     ]
 
 
@@ -148,6 +162,17 @@ def _lesser(e: Explanation, entries: Sequence[dict], levels: Mapping) -> list[st
             "alone do not establish it."
         )
     return sentences
+
+
+def _contradictions(e: Explanation, entries: Sequence[dict]) -> list[str]:
+    """Effects to which parts of the recordings give different values."""
+    supports = {(s.name, s.place): s for s in e.decision.supports if s.contradicts_its_law}
+    keys = [(entry["effect"].name, str(entry["place"])) for entry in entries]
+    return [
+        disagreement_sentence(_effect(e, entry), entry["parameters"], supports[key].disagreement)
+        for entry, key in zip(entries, keys)
+        if key in supports
+    ]
 
 
 def _undecided(result: dict) -> list[str]:
@@ -206,25 +231,12 @@ def _data_sheet_rivals(e: Explanation, fit: dict) -> list[str]:
     return sentences
 
 
-def _air(e: Explanation, entries: Sequence[dict]) -> list[str]:
+def _alike(e: Explanation, entries: Sequence[dict]) -> list[str]:
+    """What the mean pressures of these recordings cannot tell from the effects of `entries`."""
     names = [entry["effect"].name for entry in entries]
     if not names:
         return []
-    return liquid_like_air(names, [o.load_pressure for o in e.observations])
-
-
-def liquid_like_air(names: Sequence[str], pressures: Sequence[float | None]) -> list[str]:
-    """A warning where accepted effects `names` include entrained air at one pressure (Pa).
-
-    Only the change with pressure discriminates air from any liquid that stiffens.
-    """
-    known = [p for p in pressures if p is not None]
-    if "entrained_air" not in names or not known or max(known) > (1 + SAME_PRESSURE) * min(known):
-        return []
-    return [
-        "At a single mean pressure any liquid that stiffens under compression fits as well as "
-        "entrained air: record at another pressure."
-    ]
+    return pressure_sentences(names, [o.load_pressure for o in e.observations], e.rig.fluid.is_gas)
 
 
 def _source_free(e: Explanation) -> list[str]:

@@ -16,6 +16,7 @@ from rippletwin.explanation.checks.profile_intervals import (
     pump_intervals,
     sensor_intervals,
 )
+from rippletwin.explanation.checks.support import Support
 from rippletwin.explanation.localise import residual_bands
 from rippletwin.explanation.localise.missing_immittance import is_passive, missing_immittance
 from rippletwin.explanation.localise.shaft_orders import ShaftEffect
@@ -78,20 +79,33 @@ def verdict_dict(explanation: Explanation) -> dict:
 
 def _line_effects(e: Explanation, entries: list[dict]) -> list[dict]:
     """The effects of the explanation, each with its support."""
-    levels = {(s.name, s.place): s.level for s in e.decision.supports}
+    supports = {(s.name, s.place): s for s in e.decision.supports}
     probabilities = posterior_probabilities(e.search, e.decision.accepted)
-    return [
-        {
-            "name": entry["effect"].name,
-            "element": entry["place"].element,
-            "parameters": entry["parameters"],
-            "probability": probabilities[entry["effect"].name],
-            "support": levels.get((entry["effect"].name, str(entry["place"])), "suggested"),
-            "limit_of": generalisations(entry["effect"], entry["place"]),
-        }
-        for entry in entries
-        if entry["effect"].named
-    ]
+    effects = []
+    for entry in entries:
+        if not entry["effect"].named:
+            continue
+        support = supports.get((entry["effect"].name, str(entry["place"])))
+        effects.append(
+            {
+                "name": entry["effect"].name,
+                "element": entry["place"].element,
+                "parameters": entry["parameters"],
+                "probability": probabilities[entry["effect"].name],
+                "support": "suggested" if support is None else support.level,
+                "limit_of": generalisations(entry["effect"], entry["place"]),
+                "disagreement": None if support is None else _disagreement(support),
+            }
+        )
+    return effects
+
+
+def _disagreement(support: Support) -> dict | None:
+    """The largest difference of a parameter's value from a part of the data and from all data."""
+    found = support.disagreement
+    if found is None:
+        return None
+    return asdict(found) | {"parameter": found.parameter.rpartition(".")[2]}
 
 
 def _shaft_effects(e: Explanation) -> list[dict]:
@@ -268,6 +282,7 @@ def _fit_scores(e: Explanation) -> dict:
         "model_error": {
             "before": float(e.search.base.model_error),
             "after": float(e.decision.accepted.model_error),
+            "held_out": float(e.validation.model_error),
         },
         "expected_gain": {
             "before": float(e.search.base.expected_gain),
