@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -25,17 +25,28 @@ def parameters_sentence(effect: str, parameters: Mapping[str, dict]) -> str:
     return plain(f"{effect[:1].upper()}{effect[1:]}: {join_words(told)}.")
 
 
-def disagreement_sentence(effect: str, parameters: Mapping[str, dict], found: Disagreement) -> str:
-    """The two values of a parameter of an effect, which is told with its place, that contradict its
-    law."""
-    name = found.parameter.rpartition(".")[2]
-    unit = unit_of(parameters[name]["unit"], name)
-    part, whole = (write_value(value, unit) for value in (found.part, found.whole))
-    return plain(
-        f"{effect[:1].upper()}{effect[1:]}: {name_parameter(name)} {part} without "
-        f"{found.left_out}, {whole} with it. By the law of the effect both are the same, so other "
-        "physics acts there."
-    )
+def disagreement_sentences(
+    found: Sequence[tuple[str, Mapping[str, dict], Disagreement]],
+) -> list[str]:
+    """The values that change where a part of the data is left out, against the law of the effect.
+
+    found   of each effect: the effect with its place, its parameters, and the disagreement
+    """
+    told = []
+    for effect, parameters, differs in found:
+        name = differs.parameter.rpartition(".")[2]
+        unit = unit_of(parameters[name]["unit"], name)
+        part, whole = (write_value(value, unit) for value in (differs.part, differs.whole))
+        told.append(
+            f"{effect}, {name_parameter(name)} {whole} with all data and {part} without "
+            f"{differs.left_out}"
+        )
+    if not told:
+        return []
+    return [
+        plain(f"Values change where a part of the data is left out: {'; '.join(told)}."),
+        "The law of the effect does not allow that, so other physics acts there.",
+    ]
 
 
 def pump_sentences(parameters: dict) -> list[str]:

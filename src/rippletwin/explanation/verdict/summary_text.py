@@ -24,7 +24,7 @@ from rippletwin.explanation.localise.source_free_fits import compare_evidence
 from rippletwin.explanation.thresholds import MUCH_MODEL_ERROR, PULL_ALARM
 from rippletwin.explanation.verdict.explanation import Explanation
 from rippletwin.explanation.verdict.number_text import (
-    disagreement_sentence,
+    disagreement_sentences,
     load_sentences,
     parameters_sentence,
     pump_sentences,
@@ -168,11 +168,13 @@ def _contradictions(e: Explanation, entries: Sequence[dict]) -> list[str]:
     """Effects to which parts of the recordings give different values."""
     supports = {(s.name, s.place): s for s in e.decision.supports if s.contradicts_its_law}
     keys = [(entry["effect"].name, str(entry["place"])) for entry in entries]
-    return [
-        disagreement_sentence(_effect(e, entry), entry["parameters"], supports[key].disagreement)
-        for entry, key in zip(entries, keys)
-        if key in supports
-    ]
+    return disagreement_sentences(
+        [
+            (_effect(e, entry), entry["parameters"], supports[key].disagreement)
+            for entry, key in zip(entries, keys)
+            if key in supports
+        ]
+    )
 
 
 def _undecided(result: dict) -> list[str]:
