@@ -72,6 +72,10 @@ NOT_RUN = {
         "it needs a finished trial",
         "python benchmarks/concealed_errors.py --help",
     ),
+    "python benchmarks/bench_mesh.py --each 1": (
+        "it takes minutes",
+        "python benchmarks/bench_mesh.py --help",
+    ),
     "python benchmarks/constants.py results/concealed constants --cases 8": (
         "it needs a finished trial",
         "python benchmarks/constants.py --help",
