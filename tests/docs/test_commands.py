@@ -80,7 +80,7 @@ NOT_RUN = {
         "it needs a finished trial",
         "python benchmarks/constants.py --help",
     ),
-    "python benchmarks/third_party_tubes.py 43 tubes": (
+    "python benchmarks/third_party_tubes.py 44 tubes": (
         "openwind is not part of the environment",
         "python benchmarks/third_party_tubes.py --help",
     ),
