@@ -15,11 +15,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from virtualrig.draw_rig import HIGHEST_HZ
 from virtualrig.nuisance import NUMERICS, seal_at
 from virtualrig.nuisance_case import NuisanceCase, draw_nuisance_case
 from virtualrig.orbit import Bench
 from virtualrig.population import TOLERANCE, ripple_of
+from virtualrig.resolution import rms_of_harmonics, shaft_orders
 from virtualrig.rig import build
 
 FINER = {"frequency": 20000.0, "points": 8.0, "degree": 7, "modes": 14}
@@ -44,15 +44,14 @@ def first_of_each_liquid(number: int, count: int, each: int) -> Iterator[tuple[s
 
 
 def harmonics(case: NuisanceCase, numerics: dict, step_divisor: int) -> np.ndarray:
-    """Complex peak amplitudes (sensors, shaft orders below HIGHEST_HZ), Pa, at the first point."""
+    """Complex peak amplitudes (sensors, `shaft_orders`), Pa, at the first point."""
     drawn, plan = case.rig, case.rig.recordings[0]
     seal = seal_at(drawn.sheet, drawn.true, drawn.nuisance, plan.kelvin, numerics)
     bench = Bench(build(drawn.sheet, seal), step_divisor=step_divisor)
     point = plan.point
     orbit = bench.settle(point.speed_rpm, point.load_pressure, tolerance=TOLERANCE / 4)
     ripple = ripple_of(orbit, bench.rig.sensing)
-    orders = slice(1, int(HIGHEST_HZ * 60 / point.speed_rpm) + 1)
-    return 2 * np.fft.rfft(ripple, axis=1)[:, orders] / ripple.shape[1]
+    return 2 * np.fft.rfft(ripple, axis=1)[:, shaft_orders(point.speed_rpm)] / ripple.shape[1]
 
 
 def main() -> None:
@@ -64,9 +63,8 @@ def main() -> None:
     print("| case | liquid | error over ripple | error over noise |\n|---|---|---|---|")
     for liquid, index, case in first_of_each_liquid(options.number, options.cases, options.each):
         coarse, fine = harmonics(case, NUMERICS, 1), harmonics(case, FINER, 2)
-        error = np.linalg.norm(coarse - fine, axis=1) / np.sqrt(2.0)
-        ripple = np.linalg.norm(fine, axis=1) / np.sqrt(2.0)
-        shares = np.max(error / ripple), np.max(error) / case.rig.nuisance["noise"]
+        error = rms_of_harmonics(coarse - fine)
+        shares = np.max(error / rms_of_harmonics(fine)), np.max(error) / case.rig.nuisance["noise"]
         print(f"| {index} | {liquid} | {shares[0]:.2%} | {shares[1]:.2g} |", flush=True)
 
 

@@ -54,8 +54,8 @@ PULL_ALARM = 4.0  # prior standard deviations between a parameter and the data s
 DISAGREEMENT_ALARM = 4.0  # standard deviations between the fits of two operating points
 MAX_DISAGREEMENT = 5.0
 """Standard deviations between the values of an effect's parameter from a part of the data and from
-all data, up to which they count as the same. Of physics that is there at most 4 were seen in 36
-cases of development, of a name for other physics 7 and more (docs/explanation/explain.md)."""
+all data, up to which they count as the same. Physics that is there rarely has more, an accumulator
+under the name of a volume has (docs/explanation/explain.md)."""
 DRIFT_SIGNIFICANCE = 1e-3  # p-value that both halves of a recording are of one state
 WIDE_PRIOR_MISFIT_RATIO = 2.0
 """Between the accepted fit and a fit without an effect with wide priors. A fit that misfits less

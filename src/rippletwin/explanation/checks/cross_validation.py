@@ -222,9 +222,9 @@ def find_disagreement(
     the whole's; it is at least a quarter of the part's. A parameter that the part determines hardly
     better than its prior cannot disagree, as a pressure exponent at one pressure.
     """
-    found = []
+    found, values = [], whole.twin.values()
     for part, left_out in parts:
-        values, part_values = whole.twin.values(), part.twin.values()
+        part_values = part.twin.values()
         for p in whole.twin.parameters:
             if "@" not in p.name or not p.name.startswith(label):
                 continue
