@@ -1,7 +1,9 @@
 """Whether networks are as accurate when they train in mixed precision.
 
-    snakemake --cores 2 accuracy_table --config results=results/float32 'training={precision: float32}'
-    snakemake --cores 2 accuracy_table --config results=results/bfloat16 'training={precision: bfloat16}'
+    for each in float32 bfloat16; do
+        snakemake --cores 2 accuracy_table --config results=results/$each \\
+            "training={precision: $each}"
+    done
     python benchmarks/precision.py results/float32 results/bfloat16
 
 Prints, for each network and dataset of two finished runs, the mean accuracy over seeds in per cent

@@ -35,7 +35,7 @@ def test_a_file_of_another_format_is_refused(tmp_path):
     data = torch.load(path, weights_only=True)
     del data["format"]  # as before there were formats
     torch.save(data, path)
-    with pytest.raises(InputError, match="format.*is 1.*make it anew"):
+    with pytest.raises(InputError, match=r"format.*is 1.*make it anew"):
         load_networks(path)
 
 

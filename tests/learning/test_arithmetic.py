@@ -7,12 +7,12 @@ import pytest
 import torch
 
 from rippletwin.learning import arithmetic
-from rippletwin.learning.arithmetic import Arithmetic, choose_arithmetic, choose_device
+from rippletwin.learning.arithmetic import FLOAT32, Arithmetic, choose_arithmetic, choose_device
 from rippletwin.learning.networks import build
 from rippletwin.learning.training import TrainingSettings, predict, train
 
 CPUINFO = Path("/proc/cpuinfo")
-BFLOAT16 = Arithmetic(precision=torch.bfloat16)
+BFLOAT16 = Arithmetic(torch.device("cpu"), torch.bfloat16)
 
 
 @pytest.fixture
@@ -81,7 +81,7 @@ def test_mixed_precision_learns_as_well_and_keeps_float32_weights():
     x, y = bright_quarters(64, 0)
     settings = TrainingSettings(batch_size=8, learning_rate=1e-2, max_epochs=20)
     networks, seen = [], set()
-    for each in (Arithmetic(), BFLOAT16):
+    for each in (FLOAT32, BFLOAT16):
         network = build("cnn2d_3_1", 2)
         hook = network.features[3].register_forward_hook(lambda layer, _, out: seen.add(out.dtype))
         network, history = train(network, x, y, settings, 0, arithmetic=each)

@@ -31,8 +31,8 @@ def shapes(network, x):
 
 
 def test_cnn1d_341_100_has_the_shapes_of_the_paper():
-    """Every layer's output is the paper's table's, kernel, stride and width too; a pool comes before
-    its ReLU."""
+    """Every layer's output is the paper's table's, kernel, stride and width too. A pool comes
+    before its ReLU."""
     network = build("cnn1d_341_100", channels=2)
     assert shapes(network, torch.zeros(1, 2, 3072)) == [
         ("Conv2d", (64, 1, 59)),
@@ -52,8 +52,8 @@ def test_cnn1d_341_100_has_the_shapes_of_the_paper():
 
 
 def test_cnn2d_3_1_has_the_shapes_of_the_paper():
-    """Every layer's output is the paper's table's, kernel, stride and width too; a pool comes before
-    its ReLU."""
+    """Every layer's output is the paper's table's, kernel, stride and width too. A pool comes
+    before its ReLU."""
     network = build("cnn2d_3_1", channels=2)
     assert shapes(network, torch.zeros(1, 2, 256, 256)) == [
         ("Conv2d", (64, 256, 256)),

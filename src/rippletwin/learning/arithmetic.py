@@ -22,8 +22,8 @@ PRECISIONS = ("auto", "float32", "bfloat16")
 class Arithmetic:
     """The device of a training, and the precision of its products."""
 
-    device: torch.device = torch.device("cpu")
-    precision: torch.dtype = torch.float32
+    device: torch.device
+    precision: torch.dtype
 
     def __str__(self) -> str:
         return f"{str(self.precision).removeprefix('torch.')} on {self.device.type}"
@@ -32,6 +32,10 @@ class Arithmetic:
         """A context in which convolutions and products have the precision."""
         reduced = self.precision is not torch.float32
         return torch.autocast(self.device.type, self.precision, enabled=reduced)
+
+
+FLOAT32 = Arithmetic(torch.device("cpu"), torch.float32)
+"""The same on every machine."""
 
 
 def choose_arithmetic(gpu: str | bool = "auto", precision: str = "auto") -> Arithmetic:

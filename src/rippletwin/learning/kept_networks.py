@@ -15,7 +15,6 @@ from rippletwin.learning.conformal import Conformal
 from rippletwin.learning.networks import restore_networks
 from rippletwin.learning.training import activation_statistics, predict
 
-
 FORMAT = 2
 """Of the files: counts up when what networks calculate, or what is kept of them, changes."""
 

@@ -33,12 +33,12 @@ def restore_networks(
     name: str,
     channels: int,
     weights: Iterable[dict],
-    device: torch.device = torch.device("cpu"),
+    device: torch.device | str = "cpu",
 ) -> Iterator[Classifier]:
     """Trained networks of an architecture, one for each of `weights` (their state dictionaries).
 
-    name, channels : as for ``build``; device : where they calculate. Raises KeyError for an unknown name, RuntimeError for weights
-    of another architecture.
+    name, channels : as for ``build``; device : where they calculate. Raises KeyError for an unknown
+    name, RuntimeError for weights of another architecture.
     """
     for state in weights:
         network = build(name, channels)

@@ -19,7 +19,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from rippletwin.learning.arithmetic import Arithmetic
+from rippletwin.learning.arithmetic import FLOAT32, Arithmetic
 from rippletwin.learning.networks import Classifier
 
 
@@ -60,7 +60,7 @@ def train(
     settings: TrainingSettings,
     seed: int,
     progress: Callable[[int, History], None] | None = None,
-    arithmetic: Arithmetic = Arithmetic(),
+    arithmetic: Arithmetic = FLOAT32,
 ) -> tuple[Classifier, History]:
     """Adam on the cross entropy of (x, y) until the rule above stops it; deterministic in ``seed``.
 
