@@ -10,7 +10,7 @@ from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.reading_errors import FIRST_SOURCE_SD
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Uncertainty
 from rippletwin.case.recording_advice import BAND_HZ
-from rippletwin.explanation.explain import HIGHEST_HZ
+from rippletwin.explanation.preparation import HIGHEST_HZ
 from rippletwin.explanation.search.stepwise_search import applicable_candidates
 from rippletwin.explanation.verdict.expected_confusion import (
     CHANGE,
