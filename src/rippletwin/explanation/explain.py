@@ -2,12 +2,12 @@
 
 The steps of the method, each with the module that takes it:
 
- 1. Observe: harmonics of every recording and of its halves       preparation
+ 1. Observe: harmonics of every recording and of its halves       stages.preparation
  2. Find contradictions in the data                               checks.data_contradictions
- 3. Prepare: phase modulation of the shaft, base twin             preparation
+ 3. Prepare: phase modulation of the shaft, base twin             stages.preparation
  4. Search: stepwise selection of effects                         search.stepwise_search
- 5. Search again with the modulation by the explained line        search.staged_search
- 6. Couple the pump to the line and resume the search             search.staged_search
+ 5. Search again with the modulation by the explained line        stages.staged_search
+ 6. Couple the pump to the line and resume the search             stages.staged_search
  7. Judge the support of each effect, drop what has none          checks.support
  8. Find the intervals of the effects' parameters                 checks.profile_intervals
  9. Fit passive networks, which need no name                      search.passive_networks
@@ -55,9 +55,9 @@ from rippletwin.explanation.localise.remainder import find_remainder
 from rippletwin.explanation.localise.shaft_order_intervals import add_amplitude_intervals
 from rippletwin.explanation.localise.shaft_orders import analyse_shaft_orders
 from rippletwin.explanation.localise.source_free_fits import refit_source_free
-from rippletwin.explanation.preparation import HIGHEST_HZ, observe_all, select_fitted_as
 from rippletwin.explanation.search.passive_networks import accepted_network, fit_passive_networks
-from rippletwin.explanation.search.staged_search import (
+from rippletwin.explanation.stages.preparation import HIGHEST_HZ, observe_all, select_fitted_as
+from rippletwin.explanation.stages.staged_search import (
     Progress,
     fit_base_only,
     prepare_stage,

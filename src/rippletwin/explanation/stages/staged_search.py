@@ -17,7 +17,6 @@ from rippletwin.explanation.localise.phase_modulation import (
     modulation_differs,
 )
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders, analyse_shaft_orders
-from rippletwin.explanation.preparation import HIGHEST_HZ, prepare_base
 from rippletwin.explanation.search.sheet_tolerance import (
     fit_with_wider_tolerances,
     scale_tolerances,
@@ -25,6 +24,7 @@ from rippletwin.explanation.search.sheet_tolerance import (
     with_coordinates_of,
 )
 from rippletwin.explanation.search.stepwise_search import Search, resume_search, search_effects
+from rippletwin.explanation.stages.preparation import HIGHEST_HZ, prepare_base
 from rippletwin.spectra.observation import Observation
 from rippletwin.twin.pump_line_coupling import couple_pump_to_line
 from rippletwin.twin.twin import Twin
