@@ -27,10 +27,10 @@ from tqdm import tqdm
 from rippletwin.calibration.misfit import relative_misfit
 from rippletwin.calibration.smooth_source import smooth_basis
 from rippletwin.case.load import load_case
-from rippletwin.explanation.explain import HIGHEST_HZ
 from rippletwin.explanation.fit_jobs import open_workers
 from rippletwin.explanation.search.single_effects import fit_single_effects
 from rippletwin.explanation.search.stepwise_search import applicable_candidates
+from rippletwin.explanation.stages.preparation import HIGHEST_HZ
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
 from rippletwin.spectra.observation import observe
 from rippletwin.twin.twin import Twin

@@ -18,9 +18,10 @@ import time
 
 import numpy as np
 
-from rippletwin.explanation.explain import explain_observations, prepare_base
+from rippletwin.explanation.explain import explain_observations
 from rippletwin.explanation.fit_jobs import FitJob, open_workers
 from rippletwin.explanation.search.passive_networks import fit_passive_networks
+from rippletwin.explanation.stages.preparation import prepare_base
 from rippletwin.explanation.verdict.verdict_file import verdict_dict
 from rippletwin.line.frequency_domain.line_network import Insert
 from rippletwin.twin.effects.base import Effect, Place, on_line, position_place

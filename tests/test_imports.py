@@ -46,6 +46,7 @@ EXPLANATION = (
     ("thresholds", "fit_starts"),
     ("fit_jobs",),
     ("search", "localise"),
+    ("stages",),
     ("checks",),
     ("verdict",),
 )

@@ -36,12 +36,6 @@ def describe() -> dict:
     }
 
 
-def has_bfloat16() -> bool:
-    """Whether the processor multiplies bfloat16 matrices in hardware."""
-    instructions = describe()["instructions"]
-    return instructions["avx512_bf16"] or instructions["amx_bf16"]
-
-
 def versions(packages: tuple[str, ...]) -> dict[str, str | None]:
     """Installed version of each package, None where it is not installed."""
     found: dict[str, str | None] = {}

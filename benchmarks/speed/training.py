@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from rippletwin.learning.arithmetic import multiplies_bfloat16
 from rippletwin.learning.malloc_settings import MALLOC_ENVIRONMENT
 from rippletwin.learning.networks import build
 from speed import machine
@@ -100,13 +101,14 @@ def compare(name: str, shape: tuple[int, ...], rate: float, quick: bool) -> tupl
 def run(quick: bool = False) -> Result:
     """Time of an epoch of both loops for several architectures."""
     torch.set_num_threads(1)
-    bfloat16 = machine.has_bfloat16()
+    bfloat16 = multiplies_bfloat16()
     targets = {
         "2D at 256 pixels": 5.0 if bfloat16 else 1.5,
         "2D at 64 pixels": 3.0 if bfloat16 else 1.5,
         "1D": 2.0,
     }
-    rate = machine.product_rate()
+    rate = machine.product_rate(bfloat16)
+    kind = "bfloat16" if bfloat16 else "float32"
     rows, ratios = [], {group: [] for group in targets}
     for name, shape, group in CASES:
         if quick and (math.prod(shape) > 4096 or "resnet" in name):
@@ -122,7 +124,6 @@ def run(quick: bool = False) -> Result:
         )
         for group, found in ratios.items()
     ]
-    kind = "has" if bfloat16 else "has no"
     return Result(
         point=5,
         title="Training",
@@ -130,7 +131,8 @@ def run(quick: bool = False) -> Result:
             f"An epoch in batches of {BATCH}, one thread. The plain loop has torch's default "
             "layout, allocator and optimiser, and 1D convolutions on time windows. Both epochs "
             "end with the validation on a fifth of the samples.",
-            f"The processor {kind} bfloat16 instructions, which sets the targets of 2D networks.",
+            f"The processor has {'' if bfloat16 else 'no '}bfloat16 instructions, which sets the "
+            f"targets of 2D networks; the tool's products are {kind}.",
         ],
         claims=claims,
         tables=[
@@ -141,7 +143,7 @@ def run(quick: bool = False) -> Result:
             )
         ],
         bound=[
-            f"torch multiplies large float32 matrices at {rate / 1e9:.0f} GFLOP/s on one "
+            f"torch multiplies large {kind} matrices at {rate / 1e9:.0f} GFLOP/s on one "
             "thread. The last column is the rate of the convolutions' operations, forward and "
             "backward, over that. What the product's rate leaves is the most that a faster step "
             "could gain without fewer or narrower operations."

@@ -15,6 +15,7 @@ import torch
 from torch import nn
 
 from rippletwin.learning.architectures import ARCHITECTURES, Architecture
+from rippletwin.learning.arithmetic import choose_arithmetic
 from rippletwin.learning.networks import MAPS, build
 from rippletwin.learning.training import TrainingSettings, train
 
@@ -90,9 +91,10 @@ def plain_epoch(name: str, x: np.ndarray, y: np.ndarray) -> None:
 
 
 def tool_epoch(name: str, x: np.ndarray, y: np.ndarray) -> None:
-    """One epoch of the tool's training, its validation included."""
+    """One epoch of the tool's training as it is configured by default, its validation included."""
     settings = TrainingSettings(batch_size=BATCH, max_epochs=1, validation_fraction=1 - FIT_SHARE)
-    train(build(name, x.shape[1]), x, y, settings, seed=0)
+    arithmetic = choose_arithmetic(gpu=False)
+    train(build(name, x.shape[1]), x, y, settings, seed=0, arithmetic=arithmetic)
 
 
 def samples(count: int, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:

@@ -11,10 +11,10 @@ from rippletwin.calibration.fit import Fit, Hypothesis
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.shaft_angles import align_shaft_angles
 from rippletwin.case.load import load_case
-from rippletwin.explanation.explain import observe_whole_and_halves, prepare_base
 from rippletwin.explanation.fit_jobs import Continuation, FitJob, FromTheta, Workers
 from rippletwin.explanation.fit_starts import transfer_theta
 from rippletwin.explanation.search.stepwise_search import applicable_candidates
+from rippletwin.explanation.stages.preparation import observe_whole_and_halves, prepare_base
 from rippletwin.twin.parameters import coordinates
 from rippletwin.twin.twin import Twin
 

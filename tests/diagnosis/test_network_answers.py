@@ -29,6 +29,16 @@ def test_kept_networks_answer_as_before(tmp_path):
     assert after.classes == ("H", "S", "C1", "C2") and after.channels == ["p1", "p2"]
 
 
+def test_a_file_of_another_format_is_refused(tmp_path):
+    """What its networks and p-values mean is not known: the message says so, and what to do."""
+    path = saved(tmp_path, kept())
+    data = torch.load(path, weights_only=True)
+    del data["format"]  # as before there were formats
+    torch.save(data, path)
+    with pytest.raises(InputError, match=r"format.*is 1.*make it anew"):
+        load_networks(path)
+
+
 def test_either_severity_is_a_cylinder_and_shares_are_counted(monkeypatch):
     """By hand: of eight answers five are C1 or C2, three S; one in eight is unlike."""
     said = np.array([[2, 3, 2, 1], [1, 1, 3, 2]])

@@ -10,8 +10,8 @@ from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.reading_errors import FIRST_SOURCE_SD
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Uncertainty
 from rippletwin.case.recording_advice import BAND_HZ
-from rippletwin.explanation.explain import HIGHEST_HZ
 from rippletwin.explanation.search.stepwise_search import applicable_candidates
+from rippletwin.explanation.stages.preparation import HIGHEST_HZ
 from rippletwin.explanation.verdict.expected_confusion import (
     CHANGE,
     _Rival,

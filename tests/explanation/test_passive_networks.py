@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rippletwin.explanation.checks.profile_intervals import effect_intervals
-from rippletwin.explanation.explain import prepare_base
 from rippletwin.explanation.fit_jobs import FitJob, open_workers
 from rippletwin.explanation.search.passive_networks import fit_passive_networks
+from rippletwin.explanation.stages.preparation import prepare_base
 from rippletwin.explanation.verdict.verdict_file import _remainder
 from rippletwin.line.frequency_domain.line_network import Insert
 from rippletwin.twin.effects.base import Effect, Place, on_line, position_place

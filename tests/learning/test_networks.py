@@ -31,41 +31,43 @@ def shapes(network, x):
 
 
 def test_cnn1d_341_100_has_the_shapes_of_the_paper():
-    """Every layer's output is the paper's table's, kernel, stride and width too."""
+    """Every layer's output is the paper's table's, kernel, stride and width too. A pool comes
+    before its ReLU."""
     network = build("cnn1d_341_100", channels=2)
     assert shapes(network, torch.zeros(1, 2, 3072)) == [
-        ("Conv2d", (64, 1, 59)),
-        ("ReLU", (64, 1, 59)),
+        ("CyclicConvolution", (64, 1, 59)),
         ("MaxPool2d", (64, 1, 30)),
-        ("Conv2d", (64, 1, 30)),
         ("ReLU", (64, 1, 30)),
+        ("Conv2d", (64, 1, 30)),
         ("MaxPool2d", (64, 1, 30)),
+        ("ReLU", (64, 1, 30)),
         ("AdaptiveAvgPool2d", (64, 1, 1)),
         ("Linear", (4,)),
     ]
     first, second = network.features[0], network.features[3]
     assert (first.kernel_size, first.stride) == ((1, 341), (1, 100))
     assert (second.kernel_size, second.stride) == ((1, 3), (1, 1))
-    pools = [(pool.kernel_size, pool.stride) for pool in (network.features[2], network.features[5])]
+    pools = [(pool.kernel_size, pool.stride) for pool in (network.features[1], network.features[4])]
     assert pools == [((1, 3), (1, 2)), ((1, 3), 1)]
 
 
 def test_cnn2d_3_1_has_the_shapes_of_the_paper():
-    """Every layer's output is the paper's table's, kernel, stride and width too."""
+    """Every layer's output is the paper's table's, kernel, stride and width too. A pool comes
+    before its ReLU."""
     network = build("cnn2d_3_1", channels=2)
     assert shapes(network, torch.zeros(1, 2, 256, 256)) == [
         ("Conv2d", (64, 256, 256)),
-        ("ReLU", (64, 256, 256)),
         ("MaxPool2d", (64, 128, 128)),
-        ("Conv2d", (64, 128, 128)),
         ("ReLU", (64, 128, 128)),
+        ("Conv2d", (64, 128, 128)),
         ("MaxPool2d", (64, 64, 64)),
+        ("ReLU", (64, 64, 64)),
         ("AdaptiveAvgPool2d", (64, 1, 1)),
         ("Linear", (4,)),
     ]
     for convolution in (network.features[0], network.features[3]):
         assert (convolution.kernel_size, convolution.stride) == ((3, 3), (1, 1))
-    for pool in (network.features[2], network.features[5]):
+    for pool in (network.features[1], network.features[4]):
         assert (pool.kernel_size, pool.stride) == (2, 2)
 
 
@@ -111,6 +113,24 @@ def test_time_networks_equal_a_one_dimensional_convolution():
     y = nn.functional.conv1d(y, second.weight[:, :, 0], second.bias, padding=1).relu()
     y = nn.functional.max_pool1d(y, 3, 1, 1).mean(-1)
     torch.testing.assert_close(network(x), network.head(y), rtol=1e-5, atol=1e-6)
+
+
+@pytest.mark.parametrize(("name", "shape"), [("cnn1d_3_1", (96,)), ("cnn2d_3_1", (16, 16))])
+def test_a_pool_before_its_relu_changes_nothing(name, shape):
+    """Logits and all gradients are those of the paper's order, ReLU before pool."""
+    torch.manual_seed(0)
+    network, x = build(name, channels=2), torch.randn(3, 2, *shape)
+    first, pool, relu, second, last_pool, last_relu = network.features
+    logits = network(x)
+    logits.square().sum().backward()
+    gradients = [p.grad.clone() for p in network.parameters()]
+    network.features = nn.Sequential(first, relu, pool, second, last_relu, last_pool)
+    network.zero_grad()
+    in_order = network(x)
+    in_order.square().sum().backward()
+    assert torch.equal(logits, in_order)
+    for one, other in zip(gradients, network.parameters(), strict=True):
+        torch.testing.assert_close(one, other.grad, rtol=1e-6, atol=1e-7)
 
 
 def test_cyclic_padding_sees_two_revolutions():

@@ -14,6 +14,8 @@ rule attention:
     priority: 30
     resources:
         mem_mb=2000,
+    params:
+        gpu=config["training"]["gpu"],
     script:
         "../scripts/attention.py"
 

@@ -13,6 +13,8 @@ rule evaluate_compound:
     priority: 30
     resources:
         mem_mb=2000,
+    params:
+        gpu=config["training"]["gpu"],
     script:
         "../scripts/evaluate_compound.py"
 

@@ -14,6 +14,7 @@ rule evaluate:
     resources:
         mem_mb=2000,
     params:
+        gpu=config["training"]["gpu"],
         learnt_share=learnt_share_of,
     script:
         "../scripts/evaluate.py"

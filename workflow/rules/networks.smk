@@ -18,6 +18,7 @@ rule keep_networks:
         mem_mb=2000,
     params:
         signal=lambda wildcards: DATASETS[wildcards.dataset].signal,
+        gpu=config["training"]["gpu"],
         noise=config["noise"]["factor"],
         learnt_share=learnt_share_of,
     script:

@@ -18,6 +18,8 @@ rule train:
         settings=lambda wildcards: config["training"][
             ARCHITECTURES[wildcards.architecture].family
         ],
+        gpu=config["training"]["gpu"],
+        precision=config["training"]["precision"],
         learnt_share=learnt_share_of,
         cylinder=cylinder_class_of,
     script:

@@ -15,11 +15,12 @@ from rippletwin.learning.windows import first_of_each_state
 
 report_progress = open_log(snakemake)
 params, paths = snakemake.params, snakemake.input
-rows = []
+rows, arithmetics = [], set()
 for (dataset, architecture), predictions, histories in zip(
     params.cells, paths.predictions, paths.histories, strict=True
 ):
     endings = [History(**h) for h in json.loads(Path(histories).read_text())]
+    arithmetics |= {ending.arithmetic for ending in endings}
     answers = pd.read_csv(predictions)
     severity = None if dataset in params.randomised else params.severity
     protocol = answers[first_of_each_state(answers.truth, answers.recording)]
@@ -42,6 +43,7 @@ networks learnt a range of severities.
 
 {accuracy_table(results, paper.iloc[:0], params.columns, "accuracy_either")}
 {int(results.converged.sum())} of {len(results)} trainings met the convergence rule.
+Products were {" or ".join(sorted(arithmetics))}.
 """
 store.write_text(snakemake.output.page, page)
 report_progress(f"{len(results)} trainings, {int(results.converged.sum())} of them converged")

@@ -7,6 +7,7 @@ import xarray as xr
 from job import open_log
 from rippletwin import store
 from rippletwin.learning.architectures import CLASSES
+from rippletwin.learning.arithmetic import choose_device
 from rippletwin.learning.attention_summary import fault_attention, recording_attention
 from rippletwin.learning.grad_cam import attention_density, attention_map, fault_region
 from rippletwin.learning.networks import restore_networks
@@ -25,7 +26,7 @@ spread = spread_windows(recorded.state.values, WINDOWS)
 windows = [recorded.signal.values[at] for at in spread.values()]
 trained = torch.load(snakemake.input.weights, weights_only=True)
 network = snakemake.wildcards.architecture, first_turn.shape[1]
-first, *others = restore_networks(*network, trained)
+first, *others = restore_networks(*network, trained, choose_device(snakemake.params.gpu))
 shares = [fault_attention(net, x, dict(zip(faults, regions))) for net in (first, *others)]
 attended, blind = (np.array(share) for share in zip(*shares))
 heat = attention_density(attention_map(first, first_turn, np.arange(len(CLASSES))))

@@ -7,6 +7,7 @@ import torch
 from job import open_log
 from rippletwin import store
 from rippletwin.learning.architectures import CLASSES
+from rippletwin.learning.arithmetic import choose_device
 from rippletwin.learning.dataset import split_by_time
 from rippletwin.learning.networks import restore_networks
 from rippletwin.learning.training import predict
@@ -19,9 +20,10 @@ x, truth = recorded.signal.values[kept], recorded.state.values[kept]
 
 tables = []
 trained = torch.load(snakemake.input.weights, weights_only=True)
-for seed, network in enumerate(
-    restore_networks(snakemake.wildcards.architecture, x.shape[1], trained)
-):
+networks = restore_networks(
+    snakemake.wildcards.architecture, x.shape[1], trained, choose_device(snakemake.params.gpu)
+)
+for seed, network in enumerate(networks):
     predicted, probability = predict(network, x)
     table = pd.DataFrame(probability, columns=[f"p_{name}" for name in CLASSES]).round(5)
     table.insert(0, "predicted", np.array(CLASSES)[predicted])

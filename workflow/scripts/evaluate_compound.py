@@ -7,6 +7,7 @@ import torch
 from job import open_log
 from rippletwin import store
 from rippletwin.learning.architectures import CLASSES
+from rippletwin.learning.arithmetic import choose_device
 from rippletwin.learning.networks import restore_networks
 from rippletwin.learning.training import predict
 
@@ -17,9 +18,10 @@ x, faults = samples.signal.values, np.array(samples.label.attrs["classes"])[samp
 
 tables = []
 trained = torch.load(snakemake.input.weights, weights_only=True)
-for seed, network in enumerate(
-    restore_networks(snakemake.wildcards.architecture, x.shape[1], trained)
-):
+networks = restore_networks(
+    snakemake.wildcards.architecture, x.shape[1], trained, choose_device(snakemake.params.gpu)
+)
+for seed, network in enumerate(networks):
     predicted, _ = predict(network, x)
     tables.append(
         pd.DataFrame({"seed": seed, "recording": faults, "predicted": np.array(CLASSES)[predicted]})

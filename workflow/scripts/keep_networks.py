@@ -10,6 +10,7 @@ import torch
 
 from job import open_log
 from rippletwin import store
+from rippletwin.learning.arithmetic import choose_device
 from rippletwin.learning.conformal import PROMISED_RATE, fit_conformal
 from rippletwin.learning.dataset import each_once, split_by_time
 from rippletwin.learning.kept_networks import KeptNetworks
@@ -27,7 +28,7 @@ noise = recorded.noise_std.values
 )
 weights = torch.load(snakemake.input.weights, weights_only=True)
 conformal = []
-for network in restore_networks(name, x.shape[1], weights):
+for network in restore_networks(name, x.shape[1], weights, choose_device(params.gpu)):
     learnt, others = (activation_statistics(network, samples) for samples in (x, held_out))
     conformal.append(fit_conformal(learnt, y, others))
 kept = KeptNetworks(

@@ -10,6 +10,7 @@ from job import open_log
 from rippletwin import store
 from rippletwin.learning.accuracy import UNKNOWN
 from rippletwin.learning.architectures import CLASSES
+from rippletwin.learning.arithmetic import choose_arithmetic
 from rippletwin.learning.dataset import split_by_time
 from rippletwin.learning.networks import build
 from rippletwin.learning.training import TrainingSettings, train
@@ -18,6 +19,7 @@ from rippletwin.learning.windows import first_of_each_state
 report_progress = open_log(snakemake)
 params, paths = snakemake.params, snakemake.input.samples
 settings = TrainingSettings(**params.settings, threads=snakemake.threads)
+arithmetic = choose_arithmetic(params.gpu, params.precision)
 
 
 def samples(path):
@@ -43,12 +45,14 @@ for seed in range(params.seeds):
         settings,
         seed,
         lambda epoch, so_far: print(f"epoch {epoch}: {so_far.validation_loss[-1]:.4f}"),
+        arithmetic,
     )
     weights.append(network.state_dict())
     histories.append(asdict(history))
+    accuracy = history.validation_accuracy[history.best_epoch]
     report_progress(
-        f"seed {seed + 1} of {params.seeds}: {history.epochs} epochs, {history.reason}, "
-        f"validation accuracy {history.validation_accuracy[history.best_epoch]:.1%}"
+        f"seed {seed + 1} of {params.seeds}: {history.epochs} epochs in {arithmetic}, "
+        f"{history.reason}, validation accuracy {accuracy:.1%}"
     )
 # Through an open file: by name, torch writes the name into the file.
 with store.whole(snakemake.output.weights) as scratch, scratch.open("wb") as file:

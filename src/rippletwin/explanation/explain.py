@@ -2,12 +2,12 @@
 
 The steps of the method, each with the module that takes it:
 
- 1. Observe: harmonics of every recording and of its halves       spectra.observation
+ 1. Observe: harmonics of every recording and of its halves       stages.preparation
  2. Find contradictions in the data                               checks.data_contradictions
- 3. Prepare: phase modulation of the shaft, base twin             localise.phase_modulation
+ 3. Prepare: phase modulation of the shaft, base twin             stages.preparation
  4. Search: stepwise selection of effects                         search.stepwise_search
- 5. Search again with the modulation by the explained line        localise.phase_modulation
- 6. Couple the pump to the line and resume the search             twin.pump_line_coupling
+ 5. Search again with the modulation by the explained line        stages.staged_search
+ 6. Couple the pump to the line and resume the search             stages.staged_search
  7. Judge the support of each effect, drop what has none          checks.support
  8. Find the intervals of the effects' parameters                 checks.profile_intervals
  9. Fit passive networks, which need no name                      search.passive_networks
@@ -27,15 +27,10 @@ The steps of the method, each with the module that takes it:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Sequence
+from dataclasses import replace
 
-from threadpoolctl import threadpool_limits
-
-from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
-from rippletwin.case.model import Case, Recording, Rig
+from rippletwin.case.model import Case, Rig
 from rippletwin.errors import InputError
 from rippletwin.explanation.checks.alarms import fit_each_observation, read_alarms
 from rippletwin.explanation.checks.bootstrap import bootstrap_null
@@ -56,37 +51,21 @@ from rippletwin.explanation.checks.support import (
 )
 from rippletwin.explanation.fit_jobs import FitJob, PlainCalibration, open_workers
 from rippletwin.explanation.localise.free_corrections import locate_mismatch
-from rippletwin.explanation.localise.phase_modulation import (
-    estimate_phase_modulation,
-    modulation_differs,
-    with_phase_modulation,
-)
 from rippletwin.explanation.localise.remainder import find_remainder
 from rippletwin.explanation.localise.shaft_order_intervals import add_amplitude_intervals
-from rippletwin.explanation.localise.shaft_orders import ShaftOrders, analyse_shaft_orders
+from rippletwin.explanation.localise.shaft_orders import analyse_shaft_orders
 from rippletwin.explanation.localise.source_free_fits import refit_source_free
 from rippletwin.explanation.search.passive_networks import accepted_network, fit_passive_networks
-from rippletwin.explanation.search.sheet_tolerance import (
-    fit_with_wider_tolerances,
-    scale_tolerances,
-    tolerance_scale,
-    with_coordinates_of,
+from rippletwin.explanation.stages.preparation import HIGHEST_HZ, observe_all, select_fitted_as
+from rippletwin.explanation.stages.staged_search import (
+    Progress,
+    fit_base_only,
+    prepare_stage,
+    search_in_stages,
 )
-from rippletwin.explanation.search.stepwise_search import Search, resume_search, search_effects
 from rippletwin.explanation.verdict.decision import decide
 from rippletwin.explanation.verdict.explanation import Explanation
-from rippletwin.spectra.frequency_selection import select_fitted_frequencies
-from rippletwin.spectra.observation import Observation, observe, revolutions_of
-from rippletwin.twin.forward_model import ForwardModel
-from rippletwin.twin.pump_line_coupling import couple_pump_to_line
-from rippletwin.twin.twin import Twin
-
-HIGHEST_HZ = 4000.0  # of the harmonics that are fitted
-MAX_MODEL_ERROR_FOR_COUPLING = 10.0 * MIN_MODEL_ERROR
-"""Relative model error above which pressure and flow at the pump are too uncertain."""
-MAX_RESUMED = 2  # times
-
-Progress = Callable[[str, int, int], None]
+from rippletwin.spectra.observation import Observation
 
 
 def explain(
@@ -107,7 +86,7 @@ def explain(
             "none has state: healthy",
             "explaining needs at least one healthy recording",
         )
-    observations, early, late = _observe_all(case, processes)
+    observations, early, late = observe_all(case, processes)
     contradiction = find_contradictions(case.rig, case.healthy, observations, early, late)
     explanation = explain_observations(
         case.rig, observations, early, late, processes, progress, contradiction, draws
@@ -131,17 +110,13 @@ def explain_observations(
     contradiction  why the data contradict themselves, if they do; then nothing is searched for
     """
     # Steps 3 to 6: search
-    modulation = estimate_phase_modulation(rig, observations, HIGHEST_HZ)
-    base, data = prepare_base(rig, observations, modulation)
-    state = _State(base, data, modulation)
+    stage = prepare_stage(rig, observations)
     if contradiction:
-        search = _fit_base_only(state)
+        search = fit_base_only(stage)
     else:
-        search = _search(state, processes, progress)
-        state, search = _search_again(state, search, observations, processes, progress)
-        state, search = _resume_search(state, search, processes, progress)
-    base, data = state.base, state.observations
-    early, late = _select_fitted(early, rig, data), _select_fitted(late, rig, data)
+        stage, search = search_in_stages(stage, observations, processes, progress)
+    base, data = stage.base, stage.observations
+    early, late = select_fitted_as(early, rig, data), select_fitted_as(late, rig, data)
     halves = (early[0], late[0]) if len(data) == 1 and late else None
     judged = Judged(search.best, (), ())
     with open_workers(base, data, processes) as workers:
@@ -204,136 +179,3 @@ def explain_observations(
         remainder=remainder,
         null_distribution=null_distribution,
     )
-
-
-@dataclass(frozen=True)
-class _State:
-    """What is fitted: the base twin, the observations, and the modulation of their ripple."""
-
-    base: Twin
-    observations: list[Observation]
-    modulation: ShaftOrders | None
-
-
-def _observe_all(case: Case, processes: int) -> tuple[list, list, list]:
-    """Step 1: observations of the healthy recordings, and of their early and late halves."""
-    # Threads suffice: most of the time goes to linear algebra on large arrays, which releases the
-    # interpreter. Each uses one thread of its own.
-    with threadpool_limits(1), ThreadPoolExecutor(max(processes, 1)) as pool:
-        parts = list(pool.map(partial(observe_whole_and_halves, rig=case.rig), case.healthy))
-    whole = [part[0] for part in parts]
-    early, late = ([part[k] for part in parts if len(part) > 1] for k in (1, 2))
-    return whole, early, late
-
-
-def observe_whole_and_halves(recording: Recording, rig: Rig) -> list[Observation]:
-    """The observation of a recording; for a periodic one also those of both halves."""
-    if recording.kind != "periodic":
-        return [observe(recording, rig, HIGHEST_HZ)]
-    revolutions = revolutions_of(recording, rig)
-    half = len(revolutions.windows) // 2
-    parts = [
-        replace(revolutions, windows=revolutions.windows[part], speed_hz=revolutions.speed_hz[part])
-        for part in (slice(None), slice(0, half), slice(half, None))
-    ]
-    return [observe(recording, rig, HIGHEST_HZ, revolutions=part) for part in parts]
-
-
-def prepare_base(
-    rig: Rig, observations: Sequence[Observation], modulation: ShaftOrders | None = None
-) -> tuple[Twin, list[Observation]]:
-    """Step 3: the twin without effects, not yet fitted, and the observations as they are fitted.
-
-    `modulation` is that of the shaft (`localise.phase_modulation`).
-    """
-    highest_hz = HIGHEST_HZ if observations[0].orders is not None else None
-    data = select_fitted_frequencies(
-        with_phase_modulation(observations, modulation), rig, highest_hz
-    )
-    base = Twin(rig, data, uncertain_pump=True, changing_state=True)
-    # Simulate the pump before the worker processes start: the twin keeps the result.
-    ForwardModel(base, data)
-    return base, data
-
-
-def _fit_base_only(state: _State) -> Search:
-    """The fitted base in place of a search."""
-    with open_workers(state.base, state.observations, 1) as workers:
-        (fit,) = workers.fit([FitJob(())])
-    return Search(fit, [], fit)
-
-
-def _search(state: _State, processes: int, progress: Progress | None) -> Search:
-    """Step 4: stepwise selection of effects."""
-    with open_workers(state.base, state.observations, processes) as workers:
-        return search_effects(workers, progress)
-
-
-def _search_again(
-    state: _State,
-    search: Search,
-    observations: Sequence[Observation],
-    processes: int,
-    progress: Progress | None,
-) -> tuple[_State, Search]:
-    """Step 5: search again if the explained line gives another phase modulation.
-
-    `observations` have all shaft orders.
-    """
-    modulation = analyse_shaft_orders(search.best.twin, observations, HIGHEST_HZ)
-    if not modulation_differs(modulation, state.modulation, state.observations):
-        return state, search
-    base, data = prepare_base(state.base.rig, observations, modulation)
-    state = _State(base, data, modulation)
-    return state, _search(state, processes, progress)
-
-
-def _resume_search(
-    state: _State, search: Search, processes: int, progress: Progress | None
-) -> tuple[_State, Search]:
-    """Step 6: let a simulated pump respond to the line's pressure, widen the data sheet's
-    tolerances by what the fit shows, and resume the search."""
-    coupled = None
-    if search.best.model_error < MAX_MODEL_ERROR_FOR_COUPLING:
-        coupled = couple_pump_to_line(search.best.twin, state.observations)
-    search, scale = _widen_tolerances(state, search, processes)
-    if coupled is None and scale == 1.0:
-        return state, search
-    data = coupled or state.observations
-    for _ in range(MAX_RESUMED):
-        rig = scale_tolerances(state.base.rig, scale)
-        base = Twin(rig, data, uncertain_pump=True, changing_state=True)
-        with open_workers(base, data, processes) as workers:
-            search = resume_search(workers, with_coordinates_of(search, base), progress)
-        state = _State(base, data, state.modulation)
-        scale = tolerance_scale(search.best)  # the response of the pump may have hidden it
-        if scale == 1.0:
-            break
-    return state, search
-
-
-def _widen_tolerances(state: _State, search: Search, processes: int) -> tuple[Search, float]:
-    """The search with its best explanation under wider tolerances of the data sheet, if they gain,
-    and the factor on them."""
-    with open_workers(state.base, state.observations, processes) as workers:
-        wider = fit_with_wider_tolerances(workers, search.best)
-    if wider is None:
-        return search, 1.0
-    factor = wider.twin.rig.tolerance_scale / state.base.rig.tolerance_scale
-    return replace(search, best=wider), factor * tolerance_scale(wider)
-
-
-def _select_fitted(
-    halves: Sequence[Observation], rig: Rig, data: Sequence[Observation]
-) -> list[Observation]:
-    """The halves of recordings as the whole ones, `data`, are fitted."""
-    whole = {o.label: o for o in data}
-    fitted = [
-        replace(
-            half,
-            flow_ripple=whole[half.label].flow_ripple,
-            modulation=whole[half.label].modulation,
-        )
-        for half in halves
-    ]
-    return select_fitted_frequencies(fitted, rig, HIGHEST_HZ)

@@ -32,9 +32,9 @@ def grad_cam(
         torch.as_tensor(x, dtype=torch.float32).split(batch_size), targets.split(batch_size)
     ):
         maps = network.feature_maps(inputs)
-        weight = network.head.weight[classes] / maps[0, 0].numel()
+        weight = network.head.weight[classes.to(maps.device)] / maps[0, 0].numel()
         heats.append(torch.einsum("nkhw,nk->nhw", maps, weight).relu())
-    return torch.cat(heats).numpy()
+    return torch.cat(heats).cpu().numpy()
 
 
 def attention_map(

@@ -15,6 +15,9 @@ from rippletwin.learning.conformal import Conformal
 from rippletwin.learning.networks import restore_networks
 from rippletwin.learning.training import activation_statistics, predict
 
+FORMAT = 2
+"""Of the files: counts up when what networks calculate, or what is kept of them, changes."""
+
 
 @dataclass(frozen=True)
 class KeptNetworks:
@@ -55,7 +58,7 @@ class KeptNetworks:
 
     def save(self, path: str | Path) -> None:
         """Write them to `path`: tensors, lists, text and numbers only."""
-        data = vars(self) | {"classes": list(self.classes)}
+        data = vars(self) | {"classes": list(self.classes), "format": FORMAT}
         data["conformal"] = [
             {name: torch.as_tensor(values) for name, values in asdict(each).items()}
             for each in self.conformal
@@ -68,16 +71,20 @@ class KeptNetworks:
 def load_networks(path: str | Path) -> KeptNetworks:
     """The networks of a file that `KeptNetworks.save` wrote.
 
-    Raises InputError where the file holds something else.
+    Raises InputError where the file holds something else, or has another format.
     """
+    remedy = "Let the workflow make it anew"
     try:
         data = torch.load(path, weights_only=True)
-        conformal = [
-            Conformal(**{name: values.numpy() for name, values in each.items()})
-            for each in data.pop("conformal")
-        ]
-        return KeptNetworks(**data | {"conformal": conformal, "classes": tuple(data["classes"])})
+        parts, written = data.pop("conformal"), data.pop("format", 1)
+        if written == FORMAT:
+            conformal = [
+                Conformal(**{name: values.numpy() for name, values in each.items()})
+                for each in parts
+            ]
+            rest = {"conformal": conformal, "classes": tuple(data["classes"])}
+            return KeptNetworks(**data | rest)
     except Exception:  # torch raises a dozen kinds for a damaged file
-        raise InputError(
-            path, "networks", "holds no kept networks", "Let the workflow make it anew"
-        ) from None
+        raise InputError(path, "networks", "holds no kept networks", remedy) from None
+    found = f"is {written}, and this version of rippletwin reads {FORMAT}"
+    raise InputError(path, "format", found, remedy)

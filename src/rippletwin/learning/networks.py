@@ -29,16 +29,21 @@ def build(name: str, channels: int, classes: int = len(CLASSES)) -> Classifier:
     return network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
 
-def restore_networks(name: str, channels: int, weights: Iterable[dict]) -> Iterator[Classifier]:
+def restore_networks(
+    name: str,
+    channels: int,
+    weights: Iterable[dict],
+    device: torch.device | str = "cpu",
+) -> Iterator[Classifier]:
     """Trained networks of an architecture, one for each of `weights` (their state dictionaries).
 
-    name, channels : as for ``build``. Raises KeyError for an unknown name, RuntimeError for weights
-    of another architecture.
+    name, channels : as for ``build``; device : where they calculate. Raises KeyError for an unknown
+    name, RuntimeError for weights of another architecture.
     """
     for state in weights:
         network = build(name, channels)
         network.load_state_dict(state)
-        yield network
+        yield network.to(device)
 
 
 class Classifier(nn.Module):
@@ -68,7 +73,7 @@ class Classifier(nn.Module):
     def _standardised(self, x: torch.Tensor) -> torch.Tensor:
         if self.architecture.domain == "time":
             x = x.unsqueeze(-2)
-        x = (x - self.architecture.silence) / self.scale
+        x = (x.to(self.scale.device) - self.architecture.silence) / self.scale
         return x.contiguous(memory_format=torch.channels_last)
 
     def activation_statistics(self, x: torch.Tensor) -> torch.Tensor:
@@ -95,7 +100,9 @@ def _plain(a: Architecture, channels: int) -> tuple[nn.Sequential, int]:
     )
     layers = []
     for convolution, pool in zip((_first(a, channels), _same(a.domain, MAPS, MAPS)), pools):
-        layers += [convolution, nn.ReLU(inplace=True), pool]
+        # The greatest of a pool's inputs stays the greatest behind a ReLU, so that their order does
+        # not matter, but this one has fewer numbers to pass.
+        layers += [convolution, pool, nn.ReLU(inplace=True)]
     return nn.Sequential(*layers), MAPS
 
 
@@ -142,12 +149,24 @@ class BasicBlock(nn.Module):
         return self.activation(self.residual(x) + self.shortcut(x))
 
 
+class CyclicConvolution(nn.Conv2d):
+    """A convolution of one-row images whose ends are joined.
+
+    torch's own cyclic padding gives the same, but leaves channels-last order, and the copy back
+    takes half as long as the convolution.
+    """
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        """x (n, channels, 1, M) -> maps (n, width, 1, columns)"""
+        if ends := int(self.padding[1]):
+            x = torch.cat([x[..., -ends:], x, x[..., :ends]], -1)
+        return nn.functional.conv2d(x, self.weight, self.bias, self.stride)
+
+
 def _first(a: Architecture, channels: int, bias: bool = True) -> nn.Conv2d:
     if a.domain == "time":
         kernel, stride, padding = (1, a.kernel), (1, a.stride), (0, a.padding)
-        return nn.Conv2d(
-            channels, MAPS, kernel, stride, padding, bias=bias, padding_mode="circular"
-        )
+        return CyclicConvolution(channels, MAPS, kernel, stride, padding, bias=bias)
     return nn.Conv2d(channels, MAPS, a.kernel, a.stride, a.padding, bias=bias)
 
 

@@ -19,6 +19,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from rippletwin.learning.arithmetic import FLOAT32, Arithmetic
 from rippletwin.learning.networks import Classifier
 
 
@@ -37,7 +38,7 @@ class TrainingSettings:
 
 @dataclass
 class History:
-    """Per epoch: mean losses and validation accuracy; and how it ended."""
+    """Per epoch: mean losses and validation accuracy; how it ended, and what it computed with."""
 
     training_loss: list[float] = field(default_factory=list)
     validation_loss: list[float] = field(default_factory=list)
@@ -45,6 +46,7 @@ class History:
     best_epoch: int = 0
     converged: bool = False
     reason: str = "max_epochs"  # or "target" or "plateau"
+    arithmetic: str = ""
 
     @property
     def epochs(self) -> int:
@@ -58,37 +60,44 @@ def train(
     settings: TrainingSettings,
     seed: int,
     progress: Callable[[int, History], None] | None = None,
+    arithmetic: Arithmetic = FLOAT32,
 ) -> tuple[Classifier, History]:
     """Adam on the cross entropy of (x, y) until the rule above stops it; deterministic in ``seed``.
 
     x : (n, channels, M) or (n, channels, size, size); y : (n,) class indices.
     The network's weights are drawn anew from ``seed``; ``network.scale`` becomes the root mean
     square of the training part of x about silence. progress(epoch, history) is called after every
-    epoch. Sets torch's thread count to ``settings.threads``. Raises ValueError where a class has no
-    sample in one of the two parts.
+    epoch. The returned network is on the processor. Sets torch's thread count to
+    ``settings.threads``. Raises ValueError where a class has no sample in one of the two parts.
     """
     torch.set_num_threads(settings.threads)
     rng = np.random.default_rng(seed)
     fit, validation = stratified_split(y, settings.validation_fraction, rng)
-    images, labels = torch.as_tensor(x, dtype=torch.float32), torch.as_tensor(y)
+    device = arithmetic.device
+    images = torch.as_tensor(x, dtype=torch.float32, device=device)
+    labels = torch.as_tensor(y, device=device)
     initialise(network, seed)
+    network.to(device)
     ripple = images[fit] - network.architecture.silence
     network.scale.fill_(float(ripple.square().mean().sqrt()) or 1.0)
     optimiser = torch.optim.Adam(network.parameters(), lr=settings.learning_rate, fused=True)
-    history, best = History(), None
+    history, best = History(arithmetic=str(arithmetic)), None
 
     for epoch in range(settings.max_epochs):
         network.train()
-        order, total = torch.as_tensor(rng.permutation(fit)), 0.0
+        order, total = torch.as_tensor(rng.permutation(fit), device=device), 0.0
         for batch in order.split(settings.batch_size):
             if len(batch) < 2:  # batch normalisation needs two
                 continue
-            loss = nn.functional.cross_entropy(network(images[batch]), labels[batch])
+            with arithmetic.mixed():
+                logits = network(images[batch])
+            loss = nn.functional.cross_entropy(logits.float(), labels[batch])
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
             total += float(loss.detach()) * len(batch)
-        logits = _logits(network, images[validation])
+        with arithmetic.mixed():
+            logits = _logits(network, images[validation]).float()
         history.training_loss.append(total / len(fit))
         loss = nn.functional.cross_entropy(logits, labels[validation])
         history.validation_loss.append(float(loss))
@@ -110,7 +119,7 @@ def train(
             break
 
     network.load_state_dict(best)
-    return network.eval(), history
+    return network.to("cpu").eval(), history
 
 
 def stopping_reason(validation_loss: list[float], settings: TrainingSettings) -> str | None:
@@ -153,7 +162,7 @@ def predict(
     network: Classifier, x: np.ndarray, batch_size: int = 64
 ) -> tuple[np.ndarray, np.ndarray]:
     """Class indices (n,) and probabilities (n, classes) of x, in its own unit."""
-    logits = _logits(network, torch.as_tensor(x, dtype=torch.float32), batch_size)
+    logits = _logits(network, torch.as_tensor(x, dtype=torch.float32), batch_size).cpu()
     return logits.argmax(1).numpy(), logits.softmax(1).numpy()
 
 
@@ -162,7 +171,7 @@ def activation_statistics(network: Classifier, x: np.ndarray, batch_size: int = 
     """``Classifier.activation_statistics`` (n, D) of x."""
     network.eval()
     batches = torch.as_tensor(x, dtype=torch.float32).split(batch_size)
-    return torch.cat([network.activation_statistics(batch) for batch in batches]).numpy()
+    return torch.cat([network.activation_statistics(batch) for batch in batches]).cpu().numpy()
 
 
 @torch.no_grad()

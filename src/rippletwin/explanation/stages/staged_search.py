@@ -1,0 +1,134 @@
+"""Steps 4 to 6 of `explain`: search, and search again with what the first search has shown.
+
+The explained line gives a better modulation of the shaft, the pressure at the pump, to which a
+simulated pump responds, and the tolerances that the data sheet should have stated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
+from rippletwin.case.model import Rig
+from rippletwin.explanation.fit_jobs import FitJob, open_workers
+from rippletwin.explanation.localise.phase_modulation import (
+    estimate_phase_modulation,
+    modulation_differs,
+)
+from rippletwin.explanation.localise.shaft_orders import ShaftOrders, analyse_shaft_orders
+from rippletwin.explanation.search.sheet_tolerance import (
+    fit_with_wider_tolerances,
+    scale_tolerances,
+    tolerance_scale,
+    with_coordinates_of,
+)
+from rippletwin.explanation.search.stepwise_search import Search, resume_search, search_effects
+from rippletwin.explanation.stages.preparation import HIGHEST_HZ, prepare_base
+from rippletwin.spectra.observation import Observation
+from rippletwin.twin.pump_line_coupling import couple_pump_to_line
+from rippletwin.twin.twin import Twin
+
+MAX_MODEL_ERROR_FOR_COUPLING = 10.0 * MIN_MODEL_ERROR
+"""Relative model error above which pressure and flow at the pump are too uncertain."""
+MAX_RESUMED = 2  # times
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What is fitted: the base twin, the observations, and the modulation of their ripple."""
+
+    base: Twin
+    observations: list[Observation]
+    modulation: ShaftOrders | None
+
+
+def prepare_stage(rig: Rig, observations: Sequence[Observation]) -> Stage:
+    """The first stage, with the modulation of the shaft by a line that is only calibrated."""
+    modulation = estimate_phase_modulation(rig, observations, HIGHEST_HZ)
+    return Stage(*prepare_base(rig, observations, modulation), modulation)
+
+
+def fit_base_only(stage: Stage) -> Search:
+    """The fitted base in place of a search."""
+    with open_workers(stage.base, stage.observations, 1) as workers:
+        (fit,) = workers.fit([FitJob(())])
+    return Search(fit, [], fit)
+
+
+def search_in_stages(
+    stage: Stage,
+    observations: Sequence[Observation],
+    processes: int = 2,
+    progress: Progress | None = None,
+) -> tuple[Stage, Search]:
+    """Search for effects in all stages: the last stage and its search.
+
+    observations  with all shaft orders
+    progress      gets what is being fitted, how many fits are done and how many there are
+    """
+    search = _search(stage, processes, progress)
+    stage, search = _search_again(stage, search, observations, processes, progress)
+    return _resume_search(stage, search, processes, progress)
+
+
+def _search(stage: Stage, processes: int, progress: Progress | None) -> Search:
+    """Stepwise selection of effects."""
+    with open_workers(stage.base, stage.observations, processes) as workers:
+        return search_effects(workers, progress)
+
+
+def _search_again(
+    stage: Stage,
+    search: Search,
+    observations: Sequence[Observation],
+    processes: int,
+    progress: Progress | None,
+) -> tuple[Stage, Search]:
+    """Search again if the explained line gives another phase modulation.
+
+    `observations` have all shaft orders.
+    """
+    modulation = analyse_shaft_orders(search.best.twin, observations, HIGHEST_HZ)
+    if not modulation_differs(modulation, stage.modulation, stage.observations):
+        return stage, search
+    base, data = prepare_base(stage.base.rig, observations, modulation)
+    stage = Stage(base, data, modulation)
+    return stage, _search(stage, processes, progress)
+
+
+def _resume_search(
+    stage: Stage, search: Search, processes: int, progress: Progress | None
+) -> tuple[Stage, Search]:
+    """Let a simulated pump respond to the line's pressure, widen the data sheet's
+    tolerances by what the fit shows, and resume the search."""
+    coupled = None
+    if search.best.model_error < MAX_MODEL_ERROR_FOR_COUPLING:
+        coupled = couple_pump_to_line(search.best.twin, stage.observations)
+    search, scale = _widen_tolerances(stage, search, processes)
+    if coupled is None and scale == 1.0:
+        return stage, search
+    data = coupled or stage.observations
+    for _ in range(MAX_RESUMED):
+        rig = scale_tolerances(stage.base.rig, scale)
+        base = Twin(rig, data, uncertain_pump=True, changing_state=True)
+        with open_workers(base, data, processes) as workers:
+            search = resume_search(workers, with_coordinates_of(search, base), progress)
+        stage = Stage(base, data, stage.modulation)
+        scale = tolerance_scale(search.best)  # the response of the pump may have hidden it
+        if scale == 1.0:
+            break
+    return stage, search
+
+
+def _widen_tolerances(stage: Stage, search: Search, processes: int) -> tuple[Search, float]:
+    """The search with its best explanation under wider tolerances of the data sheet, if they gain,
+    and the factor on them."""
+    with open_workers(stage.base, stage.observations, processes) as workers:
+        wider = fit_with_wider_tolerances(workers, search.best)
+    if wider is None:
+        return search, 1.0
+    factor = wider.twin.rig.tolerance_scale / stage.base.rig.tolerance_scale
+    return replace(search, best=wider), factor * tolerance_scale(wider)
