@@ -12,7 +12,7 @@ with either severity, the difference with its 95 % interval (Welch 1947), and th
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -59,9 +59,9 @@ def compare(one: pd.DataFrame, other: pd.DataFrame) -> list[list[str]]:
 
 
 def main() -> None:
-    runs = [Path(folder) for folder in sys.argv[1:3]]
-    if len(runs) != 2:
-        sys.exit(__doc__)
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("runs", nargs=2, type=Path, help="results folders of two finished runs")
+    runs = parser.parse_args().runs
     tables = [pd.read_csv(run / "accuracy.csv") for run in runs]
     names = [run.name for run in runs]
     header = ["network", "dataset", *names, "difference", *(f"epochs, {name}" for name in names)]

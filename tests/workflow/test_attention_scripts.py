@@ -57,7 +57,7 @@ def cells(tmp_path):
             tmp_path,
             {"o": tmp_path / f"{name}.zarr"},
             {"dataset": "CFD-MOC-P", "architecture": name},
-            {},
+            {"gpu": False},
             probes=probes,
             recorded=tmp_path / "recorded.zarr",
             weights=tmp_path / f"{name}.pt",

@@ -91,7 +91,8 @@ def test_networks_of_a_range_of_severities_are_kept_and_used(tmp_path):
         tmp_path,
         {"weights": tmp_path / "weights.pt", "history": tmp_path / "history.json"},
         wildcards,
-        {"seeds": 1, "settings": TRAINING, "learnt_share": 0.0, "cylinder": None},
+        {"seeds": 1, "settings": TRAINING, "learnt_share": 0.0, "cylinder": None}
+        | {"gpu": False, "precision": "float32"},
         samples=[tmp_path / "samples.zarr"],
     )
     folder = tmp_path / "networks" / DATASET
@@ -102,7 +103,7 @@ def test_networks_of_a_range_of_severities_are_kept_and_used(tmp_path):
         tmp_path,
         outputs,
         wildcards,
-        {"signal": "pressure", "noise": 0.15, "learnt_share": 0.0},
+        {"signal": "pressure", "noise": 0.15, "learnt_share": 0.0, "gpu": False},
         **stores,
         recorded=tmp_path / "recorded.zarr",
         weights=tmp_path / "weights.pt",

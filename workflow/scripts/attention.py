@@ -19,9 +19,8 @@ report_progress = open_log(snakemake)
 torch.set_num_threads(snakemake.threads)
 probes, recorded = store.load(snakemake.input.probes), store.load(snakemake.input.recorded)
 x = {name: probes.signal.values[probes.state.values == name] for name in CLASSES}
-faults = CLASSES[1:]
+faults, first_turn = CLASSES[1:], np.stack([x[name][0] for name in CLASSES])
 regions = np.array([fault_region(x["H"], x[fault]) for fault in faults])
-first_turn = np.stack([x[name][0] for name in CLASSES])
 spread = spread_windows(recorded.state.values, WINDOWS)
 windows = [recorded.signal.values[at] for at in spread.values()]
 trained = torch.load(snakemake.input.weights, weights_only=True)

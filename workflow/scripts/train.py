@@ -49,10 +49,9 @@ for seed in range(params.seeds):
     )
     weights.append(network.state_dict())
     histories.append(asdict(history))
-    accuracy = history.validation_accuracy[history.best_epoch]
     report_progress(
         f"seed {seed + 1} of {params.seeds}: {history.epochs} epochs in {arithmetic}, "
-        f"{history.reason}, validation accuracy {accuracy:.1%}"
+        f"{history.reason}, validation accuracy {history.best_accuracy:.1%}"
     )
 # Through an open file: by name, torch writes the name into the file.
 with store.whole(snakemake.output.weights) as scratch, scratch.open("wb") as file:

@@ -91,7 +91,7 @@ def result_row(architecture: str, dataset: str, seed: int, scored: dict, history
             "epochs": history.epochs,
             "converged": history.converged,
             "validation_loss": history.validation_loss[history.best_epoch],
-            "validation_accuracy": 100 * history.validation_accuracy[history.best_epoch],
+            "validation_accuracy": 100 * history.best_accuracy,
         }
     return row
 

@@ -52,6 +52,11 @@ class History:
     def epochs(self) -> int:
         return len(self.validation_loss)
 
+    @property
+    def best_accuracy(self) -> float:
+        """Validation accuracy of the best epoch, 0 to 1."""
+        return self.validation_accuracy[self.best_epoch]
+
 
 def train(
     network: Classifier,
