@@ -15,43 +15,31 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
-from scipy import stats
 
 from rippletwin.learning.architectures import ARCHITECTURES
 from rippletwin.learning.markdown import markdown_table
+from rippletwin.learning.paper_claims import paired_difference
 
 SCORE = "accuracy_either"  # per cent
-
-
-def difference(one: np.ndarray, other: np.ndarray) -> tuple[float, float]:
-    """Mean of `other` less that of `one`, and half the width of its 95 % interval, for values
-    (seeds,)."""
-    change = float(other.mean() - one.mean())
-    if one.std() == other.std() == 0:
-        return change, 0.0
-    low, high = stats.ttest_ind(other, one, equal_var=False).confidence_interval(0.95)
-    return change, float(high - low) / 2
+CELL = ["architecture", "dataset"]
 
 
 def compare(one: pd.DataFrame, other: pd.DataFrame) -> list[list[str]]:
     """Rows of the table: network, dataset, both accuracies and their difference in per cent, and
     the epochs that both took."""
-    cells = ["architecture", "dataset"]
-    second = dict(list(other.groupby(cells)))
+    tables = [dict(list(run.groupby(CELL, sort=False))) for run in (one, other)]
     rows = []
-    for cell, first in one.groupby(cells, sort=False):
-        if cell not in second:
-            continue
-        pair = (first, second[cell])
-        change, width = difference(*(each[SCORE].to_numpy() for each in pair))
+    for cell in (cell for cell in tables[0] if cell in tables[1]):
+        pair = [table[cell] for table in tables]
+        scores = [each[SCORE].agg(["mean", "std", "count"]) for each in pair]
+        change, low, high = paired_difference(*(score.tolist() for score in reversed(scores)))
         rows.append(
             [
                 ARCHITECTURES[cell[0]].title,
                 cell[1],
-                *(f"{each[SCORE].mean():.1f}" for each in pair),
-                f"{change:+.1f} ± {width:.1f}",
+                *(f"{score['mean']:.1f}" for score in scores),
+                f"{change:+.1f} ({low:+.1f} to {high:+.1f})",
                 *(f"{each.epochs.mean():.1f}" for each in pair),
             ]
         )
