@@ -48,7 +48,7 @@ def machine_words(records: list[dict]) -> str:
     has = [name for name, there in first["instructions"].items() if there]
     lacks = [name for name, there in first["instructions"].items() if not there]
     caches = ", ".join(f"{name} {size}" for name, size in first["caches"].items())
-    versions = {k: v for r in records for k, v in (r["machine"]["versions"] | r["peers"]).items()}
+    versions = known_versions(records)
     lines = [
         "## Machine and versions",
         "",
@@ -62,6 +62,18 @@ def machine_words(records: list[dict]) -> str:
     if len(machines) > 1:
         lines.append("* The sections were measured on different machines.")
     return "\n".join(lines) + "\n"
+
+
+def known_versions(records: list[dict]) -> dict[str, str | None]:
+    """Version of each package; None where no record has one.
+
+    A program in another Python has its version in the record of its benchmark alone.
+    """
+    known: dict[str, str | None] = {}
+    for record in records:
+        for name, version in (record["machine"]["versions"] | record["peers"]).items():
+            known[name] = version or known.get(name)
+    return known
 
 
 def summary(results: list[Result]) -> str:

@@ -22,7 +22,7 @@ from speed import (
     training,
     workflow,
 )
-from speed.page import advantage, write
+from speed.page import advantage, known_versions, write
 from speed.result import Claim, Result, Table
 from speed.timing import alternate, median_ratio
 
@@ -107,6 +107,13 @@ def test_the_page_says_plainly_what_is_missed(tmp_path):
     assert all(name in text for name in lacking)
     assert "<svg" in picture.read_text()
     assert Result.from_json(record(result)["result"]) == result
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_version_that_one_record_knows_is_kept(turned):
+    """In either order: a program of another Python is measured by one benchmark alone."""
+    records = [{"machine": {"versions": {"a": "1"}}, "peers": {"b": peer}} for peer in ("2", None)]
+    assert known_versions(records[:: -1 if turned else 1]) == {"a": "1", "b": "2"}
 
 
 def test_the_page_of_the_docs_is_that_of_the_results(tmp_path):

@@ -53,6 +53,18 @@ def test_slopes_are_what_another_pump_makes():
     assert np.linalg.norm(truth) > 0.005 * np.linalg.norm(changes[0])
 
 
+def test_slopes_of_a_port_that_opens_slowly_are_there():
+    """A port that opens over 80 degrees, and over 92 when its opening is a standard deviation
+    longer, never opens wholly then. The slope is what that pump makes, to a quarter."""
+    area, slow = 4e-7, PUMP | {"port_opening_deg": 80.0}
+    slower = slow | {"port_opening_deg": 80.0 * (1 + UNCERTAIN["port_opening_deg"])}
+    changes = [simulated(pump, Slipper(area)) - simulated(pump) for pump in (slow, slower)]
+    truth = changes[1] - changes[0]
+    slopes = leak_flow(slow, OIL, SPEED, PRESSURE, FAULTS["slipper"]).pump_slopes(area)
+    found = slopes[list(UNCERTAIN).index("port_opening_deg")][ORDERS]
+    assert np.linalg.norm(found - truth) < 0.25 * np.linalg.norm(truth)
+
+
 def test_a_leak_has_a_discharge_coefficient_of_its_own_where_the_sheet_has_none():
     """An area of 0.7 stands for as much leak as a larger one of the default pump's 0.65."""
     pump = {"pistons": 9}

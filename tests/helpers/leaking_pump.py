@@ -6,6 +6,8 @@ recording to the next; the twin of the data sheet works in the frequency domain.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor
@@ -54,4 +56,15 @@ def record(label, fault=None, turn=0.0, rng=None, wave_speed=WAVE_SPEED, diamete
         source="nominal",
         flow_ripple=None,
         sensors=SENSORS,
+    )
+
+
+def first_sensor(observation: Observation) -> Observation:
+    """The observation as a line with the first sensor alone gives it."""
+    return replace(
+        observation,
+        values=observation.values[:1],
+        covariance=observation.covariance[:, :1, :1],
+        mean=observation.mean[:1],
+        sensors=observation.sensors[:1],
     )

@@ -66,18 +66,22 @@ def test_pump_between_open_tanks_delivers_what_it_displaces():
     assert ripple.flow.mean() == pytest.approx(Geometry().displacement * SPEED / 60, rel=2e-3)
 
 
-@pytest.mark.parametrize("speed,load", [(500.0, 4e6), (1500.0, 20e6)])
-def test_incompressible_leak_free_mean_flow_is_displacement(speed, load):
-    """With a fluid a thousand times stiffer and no leak the mean is displacement x speed.
+@pytest.mark.parametrize(
+    "speed,load,opening", [(500.0, 4e6, 30.0), (1500.0, 20e6, 30.0), (500.0, 4e6, 100.0)]
+)
+def test_incompressible_leak_free_mean_flow_is_displacement(speed, load, opening):
+    """With a fluid a thousand times stiffer and no leak the mean is displacement x speed, however
+    slowly the ports open.
 
     Less what the pistons move while the ports are shut, half the overlap before and after each
     dead centre, which no outlet sees: a share 1 - cos(overlap/2).
     """
     stiff = {"bulk_modulus": 1.4e12, "air_fraction": 0.0, "case_leakage": 0.0}
+    stiff["port_opening_deg"] = opening
     ripple = simulate(stiff, OIL, speed, ConstantPressure(load))
     open_share = np.cos(np.radians(Geometry().port_overlap_deg / 2))
     expected = Geometry().displacement * speed / 60 * open_share
-    assert ripple.flow.mean() == pytest.approx(expected, rel=5e-4)
+    assert ripple.flow.mean() == pytest.approx(expected, rel=1e-3)
 
 
 def test_stiff_fluid_and_ideal_ports_give_the_kinematic_flow():
@@ -144,7 +148,7 @@ def test_realistic_size(piped):
     [
         ({"piston": 9}, ConstantPressure(LOAD)),
         ({"port_area": -1e-4}, ConstantPressure(LOAD)),
-        ({"port_opening_deg": 100}, ConstantPressure(LOAD)),
+        ({"port_overlap_deg": 180.0}, ConstantPressure(LOAD)),
     ],
 )
 def test_impossible_geometry_is_named(pump, outlet):

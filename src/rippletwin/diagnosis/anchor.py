@@ -30,10 +30,12 @@ class Anchor:
     """A healthy recording at the operating point of the unknown one, its shaft angle as recorded.
 
     flow (F,) at the pump, m3/s, and rest (S, F), Pa, that no flow explains, at shaft orders (F,).
-    variance (S, F) is that of the readings: noise, and what another operating point makes unsure.
+    variance (S, F) is that of the readings' noise. unsure (2, F) are mean squares, Pa2, by which
+    another operating point makes them unsure: as a flow at the pump would, and as none does.
     angle, rad, is how far the recording's shaft is ahead of the simulated pump's, but for whole
     pitches of the pistons. misfit (F,) is the twin's own of the healthy ripple, relative, as it is
-    about each order. distance is that of the operating points, 0 where they are the same.
+    about each order, and line_misfit (F,) the part of it that is the line's: with one sensor all.
+    distance is that of the operating points, 0 where they are the same.
     """
 
     label: str
@@ -41,8 +43,10 @@ class Anchor:
     flow: np.ndarray
     rest: np.ndarray
     variance: np.ndarray
+    unsure: np.ndarray
     angle: float
     misfit: np.ndarray
+    line_misfit: np.ndarray
     distance: float
 
 
@@ -83,34 +87,56 @@ def make_anchor(
     turned = simulated * np.exp(1j * orders * angle)
     left = healthy.values - response * turned
     misfit = relative_misfit(left, healthy.values, orders, pump["pistons"])
-    variance = healthy.variance
+    line_misfit = misfit
+    if len(rest) > 1:
+        whole = np.sqrt(scale_of_rest(len(rest))) * rest
+        line_misfit = relative_misfit(whole, healthy.values, orders, pump["pistons"])
+    unsure = np.zeros((2, count))
     if apart:
         now = even_flow(here, orders, pump["pistons"])
         flow = flow + (now - simulated) * np.exp(1j * orders * angle)
         share = min(apart / FAR, 1.0)
         rest = (1.0 - share) * rest
-        unsure = np.mean(np.abs(line.response()[:, :count] * flow) ** 2, axis=0)
-        variance = variance + (misfit * share) ** 2 * unsure
-    return Anchor(healthy.label, orders, flow, rest, variance, angle, misfit, apart)
+        power = np.mean(np.abs(line.response()[:, :count] * flow) ** 2, axis=0)
+        unsure = (share * np.array([misfit, line_misfit])) ** 2 * power
+    return Anchor(
+        label=healthy.label,
+        orders=orders,
+        flow=flow,
+        rest=rest,
+        variance=healthy.variance,
+        unsure=unsure,
+        angle=angle,
+        misfit=misfit,
+        line_misfit=line_misfit,
+        distance=apart,
+    )
+
+
+def scale_of_rest(sensors: int) -> float:
+    """The power of an error at all sensors over what of it no flow explains."""
+    return sensors / max(sensors - 1, 1)  # a flow takes one in `sensors`
 
 
 def without_recording(anchor: Anchor, simulated: np.ndarray, response: np.ndarray, pistons: int):
     """The anchor that the twin alone is: its own flow, simulated (F,), through its line, a response
     (S, F), as wrong about each order as the recording of `anchor` shows it to be."""
     turned = simulated * np.exp(1j * anchor.orders * anchor.angle)
-    left = response * (anchor.flow - turned) + anchor.rest
-    own, power = anchor.orders % pistons == 0, np.mean(np.abs(left) ** 2, axis=0)
-    wrong = np.empty_like(power)
+    own, sensors = anchor.orders % pistons == 0, len(anchor.rest)
+    along, across = response * (anchor.flow - turned), np.sqrt(scale_of_rest(sensors)) * anchor.rest
+    powers = np.mean(np.abs([along, across]) ** 2, axis=1)
+    wrong = np.empty_like(powers)
     for which in (own, ~own):
         if np.any(which):
             count = min(ABOUT, int(np.sum(which)))
-            wrong[which] = uniform_filter1d(power[which], count, mode="nearest")
+            wrong[:, which] = uniform_filter1d(powers[:, which], count, mode="nearest")
     return replace(
         anchor,
         label="the twin alone",
         flow=simulated,
         rest=np.zeros_like(anchor.rest),
-        variance=np.broadcast_to(wrong, anchor.variance.shape),
+        variance=np.zeros_like(anchor.variance),
+        unsure=wrong,
         angle=0.0,
     )
 
@@ -148,6 +174,10 @@ def relative_misfit(left, readings, orders: np.ndarray, pistons: int) -> np.ndar
     next to no power count with their neighbours."""
     own = np.flatnonzero(orders % pistons == 0)
     powers = [np.mean(np.abs(x[:, own]) ** 2, axis=0) for x in (left, readings)]
-    about = [uniform_filter1d(power, min(ABOUT, len(own)), mode="nearest") for power in powers]
-    relative = np.minimum(np.sqrt(about[0] / np.maximum(about[1], 1e-300)), 1.0)
+    # Sums that move along can end a little below zero.
+    left, whole = (
+        np.maximum(uniform_filter1d(power, min(ABOUT, len(own)), mode="nearest"), 0.0)
+        for power in powers
+    )
+    relative = np.minimum(np.sqrt(left / np.maximum(whole, 1e-300)), 1.0)
     return np.interp(orders, [0, *orders[own]], [0.0, *relative])

@@ -58,6 +58,7 @@ def gather(d: Diagnosis) -> DiagnosedNumbers:
     model, best = d.model, d.best
     model.linearise_line(best.mode)
     parts = model.parts(best.mode)
+    at_sensors, variance = model.division.at_sensors, model.variance(parts, best.errors)
     leaks = {}
     for name, density in best.areas.items():
         middle, low, high = map(float, np.exp(density.quantiles([0.5, 0.025, 0.975])))
@@ -70,9 +71,9 @@ def gather(d: Diagnosis) -> DiagnosedNumbers:
         sensors=[s.name for s in model.line.twin.rig.sensors],
         probabilities=dict(d.probabilities),
         orders=[int(k) for k in model.orders],
-        measured=_rounded(np.abs(model.values - parts.healthy)),
-        predicted=_rounded(np.abs(parts.change)),
-        allowed=_rounded(np.sqrt(model.variance(parts, best.errors))),
+        measured=_rounded(np.abs(at_sensors(model.values - parts.healthy))),
+        predicted=_rounded(np.abs(at_sensors(parts.change))),
+        allowed=_rounded(np.sqrt(model.division.variance_at_sensors(variance))),
         leaks=leaks,
     )
 

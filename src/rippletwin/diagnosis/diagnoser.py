@@ -11,7 +11,7 @@ from scipy.special import logsumexp
 from rippletwin.diagnosis.anchor import distance, even_flow, make_anchor, without_recording
 from rippletwin.diagnosis.diagnosis import Diagnosis
 from rippletwin.diagnosis.drifting_line import DriftingLine
-from rippletwin.diagnosis.evidence import ErrorPrior, StateEvidence, scatter_of, weigh_states
+from rippletwin.diagnosis.evidence import ErrorPrior, StateEvidence, compare_healthy, weigh_states
 from rippletwin.diagnosis.faults.base import Fault
 from rippletwin.diagnosis.faults.library import state_name, states_of
 from rippletwin.diagnosis.observation_model import ObservationModel
@@ -38,17 +38,17 @@ class Diagnoser:
 
     def __init__(self, twin: Twin, faults: Sequence[Fault], anchored: bool = True):
         self.twin, self.faults, self.anchored = twin, tuple(faults), anchored
-        self._priors: dict[tuple[str, ...], ErrorPrior] = {}
+        self._learned: dict[tuple[str, ...], tuple[ErrorPrior, list[np.ndarray]]] = {}
 
     def __call__(self, observation, healthy: Sequence, start: float = 0.0) -> Diagnosis:
         """The diagnosis of a periodic observation, anchored to the first of `healthy`; the others
         tell how far healthy recordings of one operating point scatter. `start` as in
         `ObservationModel`."""
-        model = self.model(observation, healthy[0], start)
         labels = tuple(each.label for each in healthy)
-        if labels not in self._priors:  # recordings of one operating point share it
-            self._priors[labels] = self._error_prior(healthy)
-        prior = self._priors[labels]
+        if labels not in self._learned:  # recordings of one operating point share it
+            self._learned[labels] = self._learn_errors(healthy)
+        prior, repeats = self._learned[labels]
+        model = self.model(observation, healthy[0], start, repeats)
         weighed = weigh_states(model, states_of(self.faults), prior)
         probabilities = _probabilities(weighed)
         best = max(weighed, key=lambda w: probabilities[state_name(w.state)])
@@ -61,8 +61,11 @@ class Diagnoser:
             model=model,
         )
 
-    def model(self, observation, healthy, start: float = 0.0) -> ObservationModel:
-        """The observation model of an observation, anchored to a healthy one."""
+    def model(
+        self, observation, healthy, start: float = 0.0, repeats: Sequence[np.ndarray] = ()
+    ) -> ObservationModel:
+        """The observation model of an observation, anchored to a healthy one. `repeats` as in
+        `ObservationModel`."""
         pressure = _rounded(load_pressure_of(self.twin, observation))
         speed_rpm = _rounded(60.0 * observation.speed_hz)
         given = healthy.flow_ripple
@@ -79,17 +82,20 @@ class Diagnoser:
         flows = {
             fault.name: leak_flow(pump, fluid, speed_rpm, pressure, fault) for fault in self.faults
         }
-        return ObservationModel(observation, anchor, line, flows, start)
+        return ObservationModel(observation, anchor, line, flows, repeats, start)
 
-    def _error_prior(self, healthy: Sequence) -> ErrorPrior:
-        """What the scatter of healthy repeats says of the errors."""
+    def _learn_errors(self, healthy: Sequence) -> tuple[ErrorPrior, list[np.ndarray]]:
+        """What healthy repeats say of the errors, and changes of the pump's flow from one of them
+        to the next."""
         prior = ErrorPrior()
         if not self.anchored:  # the twin's errors, which repeats share, are in the anchor
-            return prior
+            return prior, []
         first, *others = healthy
         repeats = [o for o in others if not between(o, first)][:MOST_REPEATS]
-        scatters = [scatter_of(self.model(o, first), prior) for o in repeats]
-        return replace(prior, scatter=float(np.exp(np.mean(np.log([prior.scatter, *scatters])))))
+        found = [compare_healthy(self.model(o, first), prior) for o in repeats]
+        scatters = [scatter for scatter, _ in found]
+        scatter = float(np.exp(np.mean(np.log([prior.scatter, *scatters]))))
+        return replace(prior, scatter=scatter), [change for _, change in found]
 
 
 def between(one, other) -> float:

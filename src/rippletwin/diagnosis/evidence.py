@@ -15,8 +15,9 @@ import numpy as np
 from scipy.special import logsumexp
 
 from rippletwin.diagnosis.faults.base import Fault
+from rippletwin.diagnosis.hypothesis import Errors, Hypothesis
 from rippletwin.diagnosis.integration import Density, explore
-from rippletwin.diagnosis.observation_model import Errors, Hypothesis, ObservationModel
+from rippletwin.diagnosis.observation_model import ObservationModel
 from rippletwin.diagnosis.screening import Candidate, Screen
 
 LIMITS_HZ = (1000.0, 2000.0, np.inf)  # up to which angle and drift are followed, in turn
@@ -74,12 +75,13 @@ def weigh_states(
     return [_weigh(model, candidates, prior) for candidates in ranked.values()]
 
 
-def scatter_of(model: ObservationModel, prior: ErrorPrior) -> float:
-    """Relative scatter that a recording known to be healthy shows against its anchor."""
+def compare_healthy(model: ObservationModel, prior: ErrorPrior) -> tuple[float, np.ndarray]:
+    """Relative scatter that a recording known to be healthy shows against its anchor, and the
+    change (F,) of the pump's flow from there, m3/s, as the anchor's shaft stands."""
     best = Screen(model).healthy()[0]
     mode = Hypothesis((), (), (), best.turn, np.zeros(len(model.line.drifts)))
     mode = model.followed(mode, Errors(prior.scatter, prior.change), LIMITS_HZ)
-    return _best_errors(model, mode, prior)[0].scatter
+    return _best_errors(model, mode, prior)[0].scatter, model.change_of_flow(mode)
 
 
 def _weigh(

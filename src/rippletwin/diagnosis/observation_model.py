@@ -4,20 +4,25 @@
 
 The change is that of the pump's flow through the twin's line. A hypothesis names the leaks, their
 areas and pistons, the shaft angle between the recordings and how far the line's state has drifted.
+
+Readings are divided into a part along the line's response to a flow at the pump and others across
+it (`Division`). The pump's errors are along it alone, so that the others show how the line's state
+has drifted, and whether it is still the same line.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from rippletwin.diagnosis.anchor import Anchor
+from rippletwin.diagnosis.division import Division
 from rippletwin.diagnosis.drifting_line import DriftingLine
 from rippletwin.diagnosis.faults.base import Fault
+from rippletwin.diagnosis.hypothesis import Errors, Hypothesis, Parts
 from rippletwin.diagnosis.likelihood import Marginal, complex_columns, marginal
 from rippletwin.diagnosis.pump_flow import LeakFlow
 from rippletwin.spectra.frequency_selection import select_frequencies
@@ -28,74 +33,22 @@ SOURCE_DRIFT, SOURCE_WAVES = 0.01, 4
 CHANGE_WAVES = 6  # cosines over the frequency in which the change's relative error is smooth
 SMOOTH_SHARE = 0.5  # of the change's relative error, in each of these
 AREA_SD = 0.1  # relative: discharge coefficients of leaks are between 0.6 and 0.8
+SENSOR_SCATTER = 0.001  # relative, of each sensor from one recording to another
 MIN_CHANGE_ERROR = 0.04  # relative, of the change by a leak behind the best of twins
 MAX_SHARE = 2.0  # of a measured change over the predicted one, up to which errors grow with it
 MAX_USUAL_ERROR = 0.3  # relative, of a leak's change behind the worst of twins
 ALIKE = 8.0  # readings whose errors go together: those of a line are as wide as its resonances
 NEIGHBOURS = 9  # shaft orders over which a power is averaged
+WHOLE = slice(None)
 BETWEEN = 0.01  # share of a power whose errors show at orders that have none of it
-
-
-@dataclass(frozen=True)
-class Hypothesis:
-    """State, leak areas (m2) and pistons of its faults, shaft angle (rad), drift in sds (D,).
-
-    Pistons count in pitches from the anchor's; `turn` is the angle by which the recording's shaft
-    is ahead of the anchor's.
-    """
-
-    state: tuple[Fault, ...]
-    areas: tuple[float, ...]
-    pistons: tuple[int, ...]
-    turn: float
-    drift: np.ndarray
-
-    def beside(self, k: int) -> tuple[float, ...]:
-        """Areas of the other leaks."""
-        return self.areas[:k] + self.areas[k + 1 :]
-
-
-@dataclass(frozen=True)
-class Parts:
-    """A prediction, Pa, all turned by the shaft angle.
-
-    healthy   (S, F) what the healthy pump would make
-    drifted   (S, F) share of it that the drift of the line has made
-    leaks     (K, S, F) what each leak adds
-    slopes    (D, S, F) derivatives of the reading by the drift
-    pump      (P, S, F) what one standard deviation of each of the pump's numbers makes of them
-    spread    (F,) power, Pa2, that the leaks would make if their flow were the same at all orders
-    measured  the measured change over that by leaks, at most `MAX_SHARE`
-    """
-
-    healthy: np.ndarray
-    drifted: np.ndarray
-    leaks: np.ndarray
-    slopes: np.ndarray
-    pump: np.ndarray
-    spread: np.ndarray
-    measured: float
-
-    @cached_property
-    def change(self) -> np.ndarray:
-        """What all leaks add (S, F)."""
-        return self.leaks.sum(axis=0)
-
-
-@dataclass(frozen=True)
-class Errors:
-    """Errors of a prediction: `scatter`, relative, of the healthy ripple, and `change` of what
-    changes in it, over what the twin's own misfit of the healthy ripple leads to expect."""
-
-    scatter: float
-    change: float
 
 
 class ObservationModel:
     """The recording `observation`, its anchor and line, and the leaks' flows by fault name.
 
-    `start`, in revolutions, is how far the shaft turns from the recording's first sample to where
-    the observation's shaft angle counts from.
+    `repeats` are changes (F',) of the pump's flow, m3/s, by which healthy recordings differ from
+    the anchor. `start`, in revolutions, is how far the shaft turns from the recording's first
+    sample to where the observation's shaft angle counts from.
     """
 
     def __init__(
@@ -104,20 +57,24 @@ class ObservationModel:
         anchor: Anchor,
         line: DriftingLine,
         flows: Mapping[str, LeakFlow],
+        repeats: Sequence[np.ndarray] = (),
         start: float = 0.0,
     ):
         self.start = start
         self.observation = select_frequencies(observation, slice(len(anchor.orders)))
+        self.sensors = len(observation.values)
         self.anchor, self.line, self.flows = anchor, line, flows
         self.orders = anchor.orders
+        self._repeats = np.zeros((len(repeats), len(self.orders)), complex)
+        for known, change in zip(self._repeats, repeats):
+            count = min(len(known), len(change))
+            known[:count] = change[:count]
         self.pistons = int(line.twin.rig.pump["pistons"])
-        self.values = self.observation.values
-        self.noise = anchor.variance + self.observation.variance
         self._waves = _cosines(self.observation.frequency_hz, CHANGE_WAVES)
-        self._expected = np.hypot(MIN_CHANGE_ERROR, anchor.misfit)
-        self.usual_error = min(float(np.median(self._expected)), MAX_USUAL_ERROR)
-        self._base: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        self._expected = np.hypot(MIN_CHANGE_ERROR, [anchor.misfit, anchor.line_misfit])
+        self.usual_error = min(float(np.median(self._expected[0])), MAX_USUAL_ERROR)
         self._undrifted = line.response()[:, : len(self.orders)]
+        self._divide(np.zeros(len(line.drifts)))
 
     # predictions
 
@@ -166,31 +123,44 @@ class ObservationModel:
         )
         return self.line.reset_orifice(np.array(hypothesis.drift, float), lost)
 
-    def linearise_line(self, hypothesis: Hypothesis) -> None:
-        """From here on the line is linear in the drift about that of the hypothesis."""
-        drift = self.state_of_line(hypothesis)
-        self._base = drift, self.line.response(drift), self.line.slopes(drift)
+    def change_of_flow(self, hypothesis: Hypothesis) -> np.ndarray:
+        """Change (F,) of the pump's flow from that of the hypothesis to the recording's, m3/s, as
+        the anchor's shaft stands; the line is that of the last linearisation."""
+        parts = self.parts(hypothesis)
+        left = (self.values - parts.healthy - parts.change)[0] / self.response[0]
+        return left * np.exp(-1j * self.orders * hypothesis.turn)
 
-    @property
-    def response(self) -> np.ndarray:
-        """Readings (S, F), Pa s/m3, for unit flow, where the line was last linearised."""
-        return self._base[1][:, : len(self.orders)]
+    def linearise_line(self, hypothesis: Hypothesis) -> None:
+        """From here on the line is linear in the drift about that of the hypothesis, and readings
+        are divided as its response has them."""
+        self._divide(self.state_of_line(hypothesis))
+
+    def _divide(self, drift: np.ndarray) -> None:
+        response, slopes = self.line.response(drift), self.line.slopes(drift)
+        response, slopes = response[:, : len(self.orders)], slopes[..., : len(self.orders)]
+        self._at, self.division = drift, Division(response)
+        divide = self.division.divide
+        self.response, self._slopes = divide(response), divide(slopes)
+        self._before, self._rest = divide(self._undrifted), divide(self.anchor.rest)
+        self.values = divide(self.observation.values)
+        noise = self.anchor.variance + self.observation.variance
+        self.noise = self.division.divide_variance(noise)
 
     def parts(self, hypothesis: Hypothesis) -> Parts:
         """The prediction of a hypothesis, divided."""
-        at, _, slopes = self._base
-        slopes = slopes[..., : len(self.orders)]
-        moved = self.response + np.tensordot(self.state_of_line(hypothesis) - at, slopes, 1)
+        slopes = self._slopes
+        moved = self.response + np.tensordot(self.state_of_line(hypothesis) - self._at, slopes, 1)
         leaks = self.change(hypothesis)
         flow = self.anchor.flow + np.sum(leaks, axis=0)
         turn = np.exp(1j * self.orders * hypothesis.turn)
-        healthy = (moved * self.anchor.flow + self.anchor.rest) * turn
+        healthy = (moved * self.anchor.flow + self._rest) * turn
         added = moved * leaks[:, None] * turn
         return Parts(
             healthy=healthy,
-            drifted=(moved - self._undrifted) * self.anchor.flow * turn,
+            drifted=(moved - self._before) * self.anchor.flow * turn,
             leaks=added,
             slopes=slopes * flow * turn,
+            repeats=moved * self._repeats[:, None] * turn,
             pump=moved * self._pump_slopes(hypothesis)[:, None] * turn,
             spread=local_power(moved) * np.mean(np.abs(leaks.sum(axis=0)) ** 2),
             measured=self._measured_share(healthy, added.sum(axis=0)),
@@ -199,11 +169,16 @@ class ObservationModel:
     # likelihood
 
     def evaluate(
-        self, hypothesis: Hypothesis, errors: Errors, highest_hz: float = np.inf
+        self,
+        hypothesis: Hypothesis,
+        errors: Errors,
+        highest_hz: float = np.inf,
+        part: slice = WHOLE,
     ) -> Marginal:
-        """Marginal likelihood of the recording below a frequency. The first amplitudes are those of
-        the shaft angle, in `TURN_SD`, and of the drift."""
-        return self._evaluate(self.parts(hypothesis), hypothesis.drift, errors, highest_hz)
+        """Marginal likelihood of the recording below a frequency, or of a part of the divided
+        readings. The first amplitudes are those of the shaft angle, in `TURN_SD`, and of the
+        drift."""
+        return self._evaluate(self.parts(hypothesis), hypothesis.drift, errors, highest_hz, part)
 
     def log_likelihoods(self, hypothesis: Hypothesis, errors: Sequence[Errors]) -> np.ndarray:
         """Log likelihoods (len(errors),) under errors of different sizes."""
@@ -212,36 +187,45 @@ class ObservationModel:
         return np.array([each.log_likelihood for each in found])
 
     def _evaluate(
-        self, parts: Parts, drift: np.ndarray, errors: Errors, highest_hz: float = np.inf
+        self,
+        parts: Parts,
+        drift: np.ndarray,
+        errors: Errors,
+        highest_hz: float = np.inf,
+        part=WHOLE,
     ) -> Marginal:
         below = self.observation.frequency_hz <= highest_hz
-        sure, expected = self._coherence(errors), self.expected_reading(parts, errors)
+        sure, expected = self._sure(errors), self.expected_reading(parts, errors)
         columns = self._columns(parts, expected, sure)
         # The drift is about zero: where it has been followed, back to there in a straight line.
         residual = self.values - expected + sure * np.tensordot(drift, parts.slopes, 1)
         variance = self.variance(parts, errors)
-        return marginal(residual[:, below], variance[:, below], columns[..., below], ALIKE)
+        columns = columns[:, part, below]
+        return marginal(residual[part, below], variance[part, below], columns, ALIKE)
 
     def variance(self, parts: Parts, errors: Errors) -> np.ndarray:
-        """Variance (S, F), Pa2, of the readings' independent errors. What the twin says of a change
-        is relatively wrong, whether a leak makes it or a drift of the line. A pulse of wrong shape
-        errs at all orders, also at those where the twin's own pulse has next to nothing."""
-        scatter = errors.scatter**2 * self.scatter_power(parts.healthy)
+        """Variance (S, F), Pa2, of the divided readings' independent errors. What the twin says of
+        a change is relatively wrong, whether a leak makes it or a drift of the line. A pulse of
+        wrong shape errs at all orders, also at those where the twin's own pulse has next to
+        nothing. The errors that a flow makes at all sensors add up in the first part."""
         leaks = local_power(parts.change) + BETWEEN * parts.spread
         changed = parts.measured**2 * leaks + self.power_by_class(parts.drifted)
-        return self.noise + scatter + (1.0 - self._coherence(errors)) * changed
+        healthy, scatters = self.scatter_power(parts.healthy), (errors.scatter, SENSOR_SCATTER)
+        flow, across = (
+            scatter**2 * healthy + unsure + (1.0 - errors.coherence(expected)) * changed
+            for scatter, unsure, expected in zip(scatters, self.anchor.unsure, self._expected)
+        )
+        return self.noise + np.array([self.sensors * flow, *[across] * (self.sensors - 1)])
 
     def expected_reading(self, parts: Parts, errors: Errors) -> np.ndarray:
         """The reading (S, F) to expect: changes count by as much as they are sure."""
         changed = parts.drifted + parts.change
-        return parts.healthy - parts.drifted + self._coherence(errors) * changed
+        return parts.healthy - parts.drifted + self._sure(errors) * changed
 
-    def _coherence(self, errors: Errors) -> np.ndarray:
-        """Share (F,) of a predicted change that is to be expected, 1/(1 + e^2) for a relative error
-        e of the prediction (Carroll, Ruppert, Stefanski and Crainiceanu 2006, Measurement Error in
-        Nonlinear Models, section 4.1). The rest of its power is error: where the twin knows
-        nothing, a change says nothing of its size."""
-        return 1.0 / (1.0 + (errors.change * self._expected) ** 2)
+    def _sure(self, errors: Errors) -> np.ndarray:
+        """Share (S, F) of a predicted change that is to be expected."""
+        flow, across = (errors.coherence(expected) for expected in self._expected)
+        return np.array([flow, *[across] * (self.sensors - 1)])
 
     def _measured_share(self, healthy: np.ndarray, change: np.ndarray) -> float:
         """The measured change over the predicted one. Errors of a leak's change are relative to
@@ -286,13 +270,19 @@ class ObservationModel:
         turning = TURN_SD * 1j * self.orders * expected
         source = SOURCE_DRIFT * parts.healthy * self._waves[:SOURCE_WAVES, None]
         # The first wave is constant: it would be a leak of another size, which AREA_SD has.
-        size = SMOOTH_SHARE * np.sqrt(1.0 - sure) * parts.measured
+        size = SMOOTH_SHARE * np.sqrt(1.0 - sure[0]) * parts.measured
         waves = size * self._waves[1:, None]
         smooth = map(complex_columns, (source, *(waves * leak for leak in parts.leaks)))
         # Relative to the predicted change these would favour large leaks, relative to the measured
         # one small ones: their geometric mean favours neither.
         leak = sure * np.sqrt(parts.measured)
-        known = turning[None], sure * parts.slopes, leak * AREA_SD * parts.leaks, leak * parts.pump
+        known = (
+            turning[None],
+            sure * parts.slopes,
+            parts.repeats,
+            leak * AREA_SD * parts.leaks,
+            leak * parts.pump,
+        )
         return np.concatenate([*known, *smooth])
 
 

@@ -41,6 +41,7 @@ SCALE_SD = 0.05  # of the flow's logarithm: ratios between sensors leave the lin
 HIGHEST_HZ = 2500.0  # up to which the flow is fitted
 RELATIVE_ERROR, LEAST_ERROR = 0.1, 0.03  # of the flow at an order, and over the flow's rms
 MOST_SDS = 4.0  # from the data sheet
+MOST_OVERLAP_DEG = 90.0  # so that ports are open for half of the time that they could be
 STEP = 0.05  # of difference quotients, in standard deviations
 EVALUATIONS = 8
 ALIGNMENT_ROUNDS = 3
@@ -126,8 +127,7 @@ def _numbers(pump: dict, x: np.ndarray) -> dict:
         name: getattr(sheet, name) * float(np.exp(sd * u))
         for (name, sd), u in zip(PRIOR_SD.items(), x)
     }
-    most = 0.5 * (179.0 - found["port_overlap_deg"])  # ports are open for half a revolution
-    found["port_opening_deg"] = min(found["port_opening_deg"], most)
+    found["port_overlap_deg"] = min(found["port_overlap_deg"], MOST_OVERLAP_DEG)
     return found | {
         "port_timing_deg": sheet.port_timing_deg + TIMING_SD_DEG * float(x[len(PRIOR_SD)])
     }

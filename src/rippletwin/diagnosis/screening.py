@@ -18,7 +18,8 @@ import numpy as np
 
 from rippletwin.diagnosis.anchor import correlation
 from rippletwin.diagnosis.faults.base import Fault
-from rippletwin.diagnosis.observation_model import Hypothesis, ObservationModel
+from rippletwin.diagnosis.hypothesis import Hypothesis
+from rippletwin.diagnosis.observation_model import ObservationModel
 
 TOLERANCE = 0.1  # relative error of a prediction that the score forgives
 SCATTER = 0.005  # relative scatter of the healthy ripple, in the score
@@ -57,10 +58,10 @@ class Screen:
         model.linearise_line(nothing)
         parts = model.parts(nothing)
         healthy, slopes = parts.healthy, parts.slopes
-        self._response = model.response
+        self._response, self._values = model.response, model.values
         drifted = np.sum(np.abs(slopes) ** 2, axis=(0, 1))
         drifted = drifted / np.maximum(np.sum(np.abs(healthy) ** 2, axis=0), 1e-300)
-        power = model.power_by_class(model.values)
+        power = model.power_by_class(self._values)
         forgiven = np.minimum(TOLERANCE**2 + drifted, 1.0) * power
         scatter = SCATTER**2 * model.scatter_power(healthy)
         self._weight = 1.0 / (model.noise + forgiven + scatter)
@@ -71,7 +72,7 @@ class Screen:
         self._healthy = self._term(healthy)
         # Pitches are counted from the shaft angle at which the pistons' orders are alike.
         even = self._weight * (model.orders % model.pistons == 0)
-        score = correlation(healthy, model.values, model.orders, even, self._count)
+        score = correlation(healthy, self._values, model.orders, even, self._count)
         first = int(np.argmax(score[:ANGLES]))
         self._start = first - ANGLES // 2
         self._leaks: dict[str, list[tuple[float, _Term]]] = {}
@@ -126,7 +127,7 @@ class Screen:
         model = self.model
         return _Term(
             reading,
-            correlation(reading, model.values, model.orders, self._weight, self._count),
+            correlation(reading, self._values, model.orders, self._weight, self._count),
             float(np.sum(self._weight * np.abs(reading) ** 2)),
         )
 

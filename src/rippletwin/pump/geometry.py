@@ -54,8 +54,10 @@ class Geometry:
                 f"pump key suction_pressure = {geometry.suction_pressure}, a gauge pressure, must "
                 "be above that of a vacuum"
             )
-        if geometry.port_overlap_deg + 2 * geometry.port_opening_deg > 180.0:
-            raise ValueError("port_overlap_deg + 2 port_opening_deg exceeds half a revolution")
+        if geometry.port_overlap_deg >= 180.0:
+            raise ValueError(
+                f"pump key port_overlap_deg = {geometry.port_overlap_deg} must be below 180"
+            )
         return geometry
 
     @property
@@ -87,6 +89,8 @@ class Geometry:
 
     def _opening(self, phi):
         """0 to 1; it starts and ends as the square of the angle, like a triangular relief groove.
+
+        A port that takes more than half of its time to open never opens wholly.
 
         (Edge & Darling 1989, J. Dyn. Sys. Meas. Control 111, 307, found such grooves best.)
         """
