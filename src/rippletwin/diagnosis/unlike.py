@@ -87,7 +87,7 @@ def _of_residual(
     p = 0.0
     for i, scatter in enumerate(SCATTERS):
         for k, change in enumerate(CHANGES):
-            errors = Errors(float(scatter), float(change))
+            errors = Errors(float(scatter), float(change), across=float(change))
             ratio = float(np.mean(model.variance(parts, errors)[part] / usual))
             freedom = count / ALIKE / 2.0
             p += chances[i, k] * gammaincc(freedom, freedom * misfit / (count * ratio))
