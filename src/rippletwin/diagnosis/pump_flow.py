@@ -70,7 +70,7 @@ def _with_sheet_s_discharge(pump: dict, stated: float | None) -> dict:
     same flow through its ports. A coefficient that was fitted is that of the ports, not of leaks.
     """
     fitted = pump.get("discharge_coefficient")
-    if fitted is None:
+    if fitted in (None, stated):
         return pump
     ratio = fitted / (stated or Geometry.discharge_coefficient)
     area = ratio * pump.get("port_area", Geometry.port_area)
