@@ -19,6 +19,7 @@ def report_page(rows: list[dict], origin: dict) -> str:
     (whether the tool has changes that are not committed).
     """
     columns = summary.columns_of(rows)
+    shared = summary.shared_rows(rows)
     return "\n".join(
         [
             "# How often `rippletwin diagnose` is right on a population of rigs",
@@ -26,8 +27,15 @@ def report_page(rows: list[dict], origin: dict) -> str:
             *_origin(rows, columns, origin),
             "## Scores",
             "",
+            "Over the recordings that a column has answered: a network does so at the operating "
+            "point that it has learnt.",
+            "",
             *_scores(columns),
+            *(_scores_of_shared(shared) if len(shared) < len(rows) else []),
             "## Smallest leak found at 5 % false alarms",
+            "",
+            "The alarm is raised above the log odds against healthy that 5 % of the healthy "
+            "recordings exceed. Intervals are from resampled rigs.",
             "",
             *_smallest(columns),
             "![detection](figures/detection.png)",
@@ -39,16 +47,13 @@ def report_page(rows: list[dict], origin: dict) -> str:
 
 def _origin(rows: list[dict], columns: dict[str, list[dict]], origin: dict) -> list[str]:
     changed = " The tool has changes that are not committed." if origin["not_committed"] else ""
-    each = {name: {(row["rig"], row["label"]) for row in made} for name, made in columns.items()}
-    shared = len(next(iter(each.values()), ()))
     every = len({(row["rig"], row["label"]) for row in rows})
     return [
         f"{every} recordings of {len({row['rig'] for row in rows})} rigs, drawn from tree "
         f"`{origin['commit'][:12]}` and trial number {origin['number']} by "
         f"`snakemake diagnosis_trial`.{changed} The protocol is in docs/diagnosis_trial.md.",
         "",
-        f"A column is METHOD@TWIN. Every score is over the {shared} recordings that all columns "
-        "have answered: networks answer at the operating point that they have learnt.",
+        "A column is METHOD@TWIN.",
         "",
         *_table(("column", "misfit of the twin", "twin, s", "diagnosis of a rig, s"),
                 [(name, *_costs(made)) for name, made in columns.items()]),
@@ -79,7 +84,13 @@ def _scores(columns: dict[str, list[dict]]) -> list[str]:
         (same[0].what, same[0].target, *(str(score.rate) for score in same))
         for same in zip(*tables, strict=True)
     ]
-    return _table(("score", "target", *columns), lines)
+    answered = "Recordings answered", "", *(str(len(rows)) for rows in columns.values())
+    return _table(("score", "target", *columns), [answered, *lines])
+
+
+def _scores_of_shared(rows: list[dict]) -> list[str]:
+    heading = "## Scores over the recordings that all columns have answered"
+    return [heading, "", *_scores(summary.columns_of(rows))]
 
 
 def _smallest(columns: dict[str, list[dict]]) -> list[str]:
@@ -89,12 +100,7 @@ def _smallest(columns: dict[str, list[dict]]) -> list[str]:
         (name, *line) for name, rows in columns.items() for line in _smallest_of_column(rows, rng)
     ]
     heads = [f"found in {100 * p:.0f} %" for p in detection.FOUND]
-    return [
-        "The alarm is raised above the log odds against healthy that 5 % of the healthy recordings "
-        "exceed. Intervals are from resampled rigs.",
-        "",
-        *_table(("column", "alarm above", "false alarms", "fault", "severity", *heads), lines),
-    ]
+    return _table(("column", "alarm above", "false alarms", "fault", "severity", *heads), lines)
 
 
 def _smallest_of_column(rows: list[dict], rng: np.random.Generator) -> list[tuple[str, ...]]:

@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from diagnosis_trial import detection
-from diagnosis_trial.summary import ANSWERS, SINGLE, STATES, columns_of, confusion_matrix
+from diagnosis_trial.summary import (
+    ANSWERS,
+    SINGLE,
+    STATES,
+    columns_of,
+    confusion_matrix,
+    shared_rows,
+)
 from rippletwin.case.words import name_state
 from rippletwin.report.content import Figure, Population, draw_figures
 from rippletwin.report.matrix_picture import draw_matrix
@@ -17,9 +24,9 @@ POINTS = 120  # of a drawn curve
 def chart_population(rows: list[dict]) -> Population:
     """Charts of the rows of `diagnosis_trial.score.score_rig`, column by column.
 
-    Over the recordings that all columns have answered, as on the trial's own page.
+    Over the recordings that all columns have answered.
     """
-    columns = columns_of(rows)
+    columns = columns_of(shared_rows(rows))
     curves = [
         chart
         for name, chosen in columns.items()

@@ -23,11 +23,16 @@ PLAIN = 0.05  # change of the ripple from which a state counts as plain
 
 
 def columns_of(rows: list[dict]) -> dict[str, list[dict]]:
-    """Column -> its rows, of the recordings that all columns have answered."""
-    columns = list(dict.fromkeys(row["column"] for row in rows))
+    """Column -> its rows, one for each recording that it has answered."""
+    columns = dict.fromkeys(row["column"] for row in rows)
+    return {name: [row for row in rows if row["column"] == name] for name in columns}
+
+
+def shared_rows(rows: list[dict]) -> list[dict]:
+    """The rows of the recordings that all columns have answered."""
+    columns = len({row["column"] for row in rows})
     answers = Counter((row["rig"], row["label"]) for row in rows)
-    shared = [row for row in rows if answers[row["rig"], row["label"]] == len(columns)]
-    return {name: [row for row in shared if row["column"] == name] for name in columns}
+    return [row for row in rows if answers[row["rig"], row["label"]] == columns]
 
 
 def score_table(rows: list[dict]) -> list[Score]:

@@ -15,6 +15,7 @@ from diagnosis_trial.summary import (
     reliability_table,
     score_table,
     severity_table,
+    shared_rows,
 )
 
 
@@ -75,10 +76,12 @@ def two_columns() -> list[dict]:
 
 def test_columns_are_compared_on_the_recordings_that_all_have_answered():
     """A network that answers at one operating point must not be compared with easier ones."""
-    found = columns_of(two_columns())
+    found = columns_of(shared_rows(two_columns()))
     assert list(found) == ["anchored@calibrated", "PRA@nominal"]
     labels = [{(row["rig"], row["label"]) for row in made} for made in found.values()]
     assert labels[0] == labels[1] and len(labels[0]) == 20
+    every = [len(made) for made in columns_of(two_columns()).values()]
+    assert every == [len(rows()), 20]
 
 
 def test_page_and_pictures_are_written(tmp_path):
@@ -87,7 +90,7 @@ def test_page_and_pictures_are_written(tmp_path):
     for made in (rows(), rows(1)[:1], two_columns()):
         columns = len(columns_of(made))
         page = report_page(made, origin)
-        assert page.count("\n## ") == 2 + columns
+        assert page.count("\n## ") == 2 + columns + (columns > 1)
         assert "nan" not in page and "| slipper |" in page
         paths = draw_figures(made, tmp_path)
         assert all(path.stat().st_size > 5000 for path in paths)

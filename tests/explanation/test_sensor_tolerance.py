@@ -62,15 +62,17 @@ def test_the_delay_of_a_sensor_is_known_to_the_lag_of_the_others(fitted):
     assert np.array_equal(wide.twin.theta, fit.twin.theta)
 
 
-def test_interval_ends_grow_about_the_value(fitted):
-    """Proves that traced intervals keep their skewness and grow as the standard deviation does."""
+def test_interval_ends_grow_on_either_side(fitted):
+    """Proves that the tolerances' variance is added to that of either end of a traced interval,
+    whichever is the sharper, as independent errors are."""
     fit, observations = fitted
     k, theta = fit.twin.index[NAME], fit.twin.theta
-    ends = (theta[k] - fit.sd[k], theta[k] + 2.0 * fit.sd[k])
+    ends = (theta[k] - fit.sd[k], theta[k] + 3.0 * fit.sd[k])
     wide = add_sensor_tolerance(replace(fit, interval_ends={k: ends}), observations)
-    low, high = wide.interval_ends[k]
-    assert (high - theta[k]) / (theta[k] - low) == pytest.approx(2.0)
-    assert theta[k] - low == pytest.approx(wide.sd[k], rel=0.05)
+    added = 1.96 * np.sqrt(wide.sd[k] ** 2 - fit.sd[k] ** 2)
+    for old, new in zip(ends, wide.interval_ends[k]):
+        assert abs(new - theta[k]) == pytest.approx(np.hypot(old - theta[k], added), rel=0.01)
+        assert (new > theta[k]) == (old > theta[k])
 
 
 def test_a_source_free_fit_stays(fitted):

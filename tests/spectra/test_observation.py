@@ -171,6 +171,19 @@ def test_both_noise_estimates_find_the_noise():
     assert noise_cycle_scatter(windows) == pytest.approx(noise, rel=0.05)
 
 
+@pytest.mark.parametrize("shape", ["ramp", "half a wave"])
+def test_drift_of_a_sensor_makes_no_harmonics(shape):
+    """A drift of the sensors by 20 and -10 kPa over the recording changes no order below the
+    pistons' by more than 2 Pa. The ramp in each revolution would change the first by 95 Pa, and a
+    drift that comes back by 3.6 Pa. Truth: the same ripple without drift."""
+    clean = ripple(harmonics(np.random.default_rng(6)))
+    time = np.linspace(0.0, 1.0, clean.shape[1])
+    slow = {"ramp": time, "half a wave": np.sin(np.pi * time)}[shape]
+    drifted = clean + np.array([[2e4], [-1e4]]) * slow
+    values = [observe(recording(p), RIG).values for p in (clean, drifted)]
+    assert np.abs(values[1] - values[0])[:, : PISTONS - 1].max() < 2.0
+
+
 def test_piston_harmonics_only_and_highest_frequency():
     """The choice of orders is a choice only: the values kept are the same to 1e-5."""
     clean = ripple(harmonics(np.random.default_rng(6)), seconds=1.0)

@@ -13,6 +13,7 @@ from rippletwin.calibration.posterior import Posterior
 from rippletwin.twin.effects.base import Effect, Place
 from rippletwin.twin.twin import Twin
 
+HALF_INTERVAL = 1.96  # of 95 %, in standard deviations
 Hypothesis = tuple[tuple[Effect, Place], ...]
 """Effects of a twin, each at its place; () is the line without any."""
 
@@ -59,7 +60,7 @@ class Fit:
 
     def interval(self, k: int) -> tuple[float, float]:
         """95 % interval of parameter k, in theta's coordinates."""
-        reach = 1.96 * self.sd[k]
+        reach = HALF_INTERVAL * self.sd[k]
         return self.interval_ends.get(k, (self.twin.theta[k] - reach, self.twin.theta[k] + reach))
 
     @property

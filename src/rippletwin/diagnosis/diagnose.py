@@ -91,13 +91,15 @@ def healthy_beside(case: Case, recordings: Sequence[Recording]) -> list[Recordin
 
 
 def recalibrate_twin(twin: Twin, healthy: Sequence[Recording], read: ReadOnce) -> Twin:
-    """The twin with line and pump fitted to healthy recordings as `calibrate_line` and
-    `calibrate_pump` do, or as it is: whichever leaves less of the healthy ripples."""
+    """The twin as it is, with its pump fitted to healthy recordings (`calibrate_pump`), or with its
+    line fitted to them first (`calibrate_line`): whichever leaves least of the healthy ripples."""
     observations = [read(each)[0] for each in healthy]
-    other = calibrate_line(twin, observations)
-    other = calibrate_pump(other, one_each_point(observations))
-    # A twin that is right already would only lose what its line owes to the ripple.
-    return min((twin, other), key=lambda each: healthy_misfit(each, observations))
+    points = one_each_point(observations)
+    # A line that is right already would lose what it owes to the ripple: ratios between sensors say
+    # nothing of the way from the pump to the first sensor.
+    lines = with_fitted_pump(twin), calibrate_line(twin, observations)
+    tried = [twin, *(calibrate_pump(line, points) for line in lines)]
+    return min(tried, key=lambda each: healthy_misfit(each, observations))
 
 
 def diagnose_one(

@@ -41,6 +41,7 @@ class Parts:
     pump      (P, S, F) what one standard deviation of each of the pump's numbers makes of them
     spread    (F,) power, Pa2, that the leaks would make if their flow were the same at all orders
     measured  the measured change over that by leaks, or the most that errors grow by
+    explained (F,) power, Pa2, of the measured change that the leaks explain, if of the right size
     """
 
     healthy: np.ndarray
@@ -51,6 +52,7 @@ class Parts:
     pump: np.ndarray
     spread: np.ndarray
     measured: float
+    explained: np.ndarray
 
     @cached_property
     def change(self) -> np.ndarray:
@@ -61,14 +63,17 @@ class Parts:
 @dataclass(frozen=True)
 class Errors:
     """Errors of a prediction: `scatter`, relative, of the healthy ripple, and `change` of what
-    changes in it, over what the twin's own misfit of the healthy ripple leads to expect."""
+    changes in it along the response to a flow, over what the twin's own misfit of the healthy
+    ripple leads to expect; `across` is the same across the response."""
 
     scatter: float
     change: float
+    across: float = 1.0
 
-    def coherence(self, expected: np.ndarray) -> np.ndarray:
-        """Share (F,) of a predicted change that is to be expected, 1/(1 + e^2) for a relative error
-        e of the prediction, whose median is `expected` (F,) (Carroll, Ruppert, Stefanski and
-        Crainiceanu 2006, Measurement Error in Nonlinear Models, section 4.1). The rest of its power
-        is error: where the twin knows nothing, a change says nothing of its size."""
-        return 1.0 / (1.0 + (self.change * expected) ** 2)
+
+def coherence(error: np.ndarray) -> np.ndarray:
+    """Share of a predicted change that is to be expected, 1/(1 + e^2) for a relative error e of the
+    prediction (Carroll, Ruppert, Stefanski and Crainiceanu 2006, Measurement Error in Nonlinear
+    Models, section 4.1). The rest of its power is error: where the twin knows nothing, a change
+    says nothing of its size."""
+    return 1.0 / (1.0 + error**2)

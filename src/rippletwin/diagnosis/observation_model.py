@@ -22,7 +22,7 @@ from rippletwin.diagnosis.anchor import Anchor
 from rippletwin.diagnosis.division import Division
 from rippletwin.diagnosis.drifting_line import DriftingLine
 from rippletwin.diagnosis.faults.base import Fault
-from rippletwin.diagnosis.hypothesis import Errors, Hypothesis, Parts
+from rippletwin.diagnosis.hypothesis import Errors, Hypothesis, Parts, coherence
 from rippletwin.diagnosis.likelihood import Marginal, complex_columns, marginal
 from rippletwin.diagnosis.pump_flow import LeakFlow
 from rippletwin.spectra.frequency_selection import select_frequencies
@@ -164,6 +164,7 @@ class ObservationModel:
             pump=moved * self._pump_slopes(hypothesis)[:, None] * turn,
             spread=local_power(moved) * np.mean(np.abs(leaks.sum(axis=0)) ** 2),
             measured=self._measured_share(healthy, added.sum(axis=0)),
+            explained=_explained_power(self.values - healthy, added.sum(axis=0)),
         )
 
     # likelihood
@@ -208,12 +209,17 @@ class ObservationModel:
         a change is relatively wrong, whether a leak makes it or a drift of the line. A pulse of
         wrong shape errs at all orders, also at those where the twin's own pulse has next to
         nothing. The errors that a flow makes at all sensors add up in the first part."""
+        healthy, drifted = self.scatter_power(parts.healthy), self.power_by_class(parts.drifted)
         leaks = local_power(parts.change) + BETWEEN * parts.spread
-        changed = parts.measured**2 * leaks + self.power_by_class(parts.drifted)
-        healthy, scatters = self.scatter_power(parts.healthy), (errors.scatter, SENSOR_SCATTER)
+        # Across the response a leak makes nothing, whatever its size: what it explains of the
+        # measured change counts.
+        changes = parts.measured**2 * leaks, parts.explained
+        scatters = errors.scatter, SENSOR_SCATTER
         flow, across = (
-            scatter**2 * healthy + unsure + (1.0 - errors.coherence(expected)) * changed
-            for scatter, unsure, expected in zip(scatters, self.anchor.unsure, self._expected)
+            scatter**2 * healthy + unsure + (1.0 - sure) * (change + drifted)
+            for scatter, unsure, sure, change in zip(
+                scatters, self.anchor.unsure, self._both_sure(errors), changes
+            )
         )
         return self.noise + np.array([self.sensors * flow, *[across] * (self.sensors - 1)])
 
@@ -224,8 +230,13 @@ class ObservationModel:
 
     def _sure(self, errors: Errors) -> np.ndarray:
         """Share (S, F) of a predicted change that is to be expected."""
-        flow, across = (errors.coherence(expected) for expected in self._expected)
+        flow, across = self._both_sure(errors)
         return np.array([flow, *[across] * (self.sensors - 1)])
+
+    def _both_sure(self, errors: Errors) -> tuple[np.ndarray, np.ndarray]:
+        """The same (F,) along the response and across it."""
+        along, across = self._expected
+        return coherence(errors.change * along), coherence(errors.across * across)
 
     def _measured_share(self, healthy: np.ndarray, change: np.ndarray) -> float:
         """The measured change over the predicted one. Errors of a leak's change are relative to
@@ -284,6 +295,16 @@ class ObservationModel:
             leak * parts.pump,
         )
         return np.concatenate([*known, *smooth])
+
+
+def _explained_power(measured: np.ndarray, predicted: np.ndarray) -> np.ndarray:
+    """Local power (F,) of a measured change (S, F), times the share of it that the predicted one
+    explains at the best size: their coherence."""
+    powers = [np.sum(np.abs(x) ** 2) for x in (measured, predicted)]
+    if not all(powers):
+        return np.zeros(measured.shape[1])
+    share = np.abs(np.vdot(predicted, measured)) ** 2 / np.prod(powers)
+    return share * local_power(measured)
 
 
 def local_power(readings: np.ndarray) -> np.ndarray:

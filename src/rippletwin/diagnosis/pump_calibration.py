@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
+from rippletwin.case.model import Fluid
 from rippletwin.diagnosis.anchor import alignment, even_flow, flow_at_pump
 from rippletwin.diagnosis.drifting_line import DriftingLine
 from rippletwin.diagnosis.pump_flow import (
@@ -29,10 +30,9 @@ from rippletwin.twin.twin import Twin
 PRIOR_SD = {
     "bulk_modulus": 0.08,
     "dead_volume": 0.15,
-    "port_area": 0.15,
+    "port_area": 0.17,  # and with it the ports' discharge coefficient
     "port_opening_deg": 0.5,
     "port_overlap_deg": 0.5,
-    "discharge_coefficient": 0.07,
     "air_fraction": 2.0,
 }
 """Standard deviations of logarithms about the data sheet: relief grooves lengthen an opening, and
@@ -44,6 +44,7 @@ MOST_SDS = 4.0  # from the data sheet
 MOST_OVERLAP_DEG = 90.0  # so that ports are open for half of the time that they could be
 STEP = 0.05  # of difference quotients, in standard deviations
 EVALUATIONS = 8
+ROUNDS = 2
 ALIGNMENT_ROUNDS = 3
 
 
@@ -70,17 +71,25 @@ def calibrate_pump(twin: Twin, healthy: Sequence) -> Twin:
     pump = dict(twin.rig.pump)
     if len(twin.rig.sensors) < 2 or set(pump) == {"pistons"} or not healthy:
         return twin
-    flows = [_measured_flow(twin, observation) for observation in healthy]
+    fitted = twin
+    for _ in range(ROUNDS):  # the flow is told beside the chambers of the pump that was fitted
+        flows = [_measured_flow(fitted, observation) for observation in healthy]
+        fitted = _with_pump(twin, pump | _fit_numbers(pump, twin.rig.fluid, flows))
+    return fitted
+
+
+def _fit_numbers(pump: dict, fluid: Fluid, flows: Sequence[_Flow]) -> dict:
+    """The numbers that come nearest to the flows, about those of `pump`."""
 
     def residuals(x: np.ndarray) -> np.ndarray:
         numbers, scale = pump | _numbers(pump, x), np.exp(SCALE_SD * x[-1])
-        left = [_residual(numbers, twin.rig.fluid, flow, scale) for flow in flows]
+        left = [_residual(numbers, fluid, flow, scale) for flow in flows]
         return np.concatenate([*left, x])
 
     start = np.zeros(len(PRIOR_SD) + 2)
     ends = -MOST_SDS, MOST_SDS
     found = least_squares(residuals, start, bounds=ends, diff_step=STEP, max_nfev=EVALUATIONS)
-    return _with_pump(twin, pump | _numbers(pump, found.x))
+    return _numbers(pump, found.x)
 
 
 def one_each_point(observations: Sequence, digits: int = 2) -> list:

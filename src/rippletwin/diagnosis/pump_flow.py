@@ -52,7 +52,8 @@ def with_fitted_pump(twin: Twin, mean_flow: float | None = None, speed_hz: float
         pump = _scaled(Geometry.from_dict(pump), mean_flow / speed_hz)
     own = {p.name for p in twin.parameters if p.place == "pump"}
     own.update(f"{kind}[{label}]" for label in twin.labels for kind in ("angle", "state"))
-    pump |= {key: value for key, value in twin.fitted_pump().items() if value is not None}
+    fitted = {key: value for key, value in twin.fitted_pump().items() if value is not None}
+    pump = _with_sheet_s_discharge(pump | fitted, pump.get("discharge_coefficient"))
     kept = [name not in own for name in twin.index]
     return Twin(
         replace(twin.rig, pump=pump),
@@ -62,6 +63,18 @@ def with_fitted_pump(twin: Twin, mean_flow: float | None = None, speed_hz: float
         theta=twin.theta[kept],
         guessed_load=twin.guessed_load,
     )
+
+
+def _with_sheet_s_discharge(pump: dict, stated: float | None) -> dict:
+    """The pump with the discharge coefficient of the data sheet, None where it states none, and the
+    same flow through its ports. A coefficient that was fitted is that of the ports, not of leaks.
+    """
+    fitted = pump.get("discharge_coefficient")
+    if fitted in (None, stated):
+        return pump
+    ratio = fitted / (stated or Geometry.discharge_coefficient)
+    area = ratio * pump.get("port_area", Geometry.port_area)
+    return pump | {"port_area": area, "discharge_coefficient": stated}
 
 
 def load_pressure_of(twin: Twin, observation) -> float:

@@ -44,9 +44,9 @@ def judge_residual(model: ObservationModel, best: StateEvidence, prior: ErrorPri
     if p >= UNLIKE:
         return Unlikeness(p)
     parts = model.parts(best.mode)
-    residual = model.division.at_sensors(model.values - model.expected_reading(parts, best.errors))
+    residual = model.values - model.expected_reading(parts, best.errors)
     usual = model.variance(parts, Errors(prior.scatter, prior.change))
-    size = np.sqrt(np.mean(np.abs(residual) ** 2, axis=0) / np.mean(usual, axis=0))
+    size = np.sqrt(np.mean(np.abs(residual) ** 2 / usual, axis=0))
     largest = np.argsort(-size)[:MOST_ORDERS]
     orders = sorted(int(model.orders[k]) for k in largest if size[k] > STANDS_OUT)
     return Unlikeness(p, tuple(orders), _element(model, residual, usual, of_pump, of_line))
@@ -87,7 +87,7 @@ def _of_residual(
     p = 0.0
     for i, scatter in enumerate(SCATTERS):
         for k, change in enumerate(CHANGES):
-            errors = Errors(float(scatter), float(change))
+            errors = Errors(float(scatter), float(change), across=float(change))
             ratio = float(np.mean(model.variance(parts, errors)[part] / usual))
             freedom = count / ALIKE / 2.0
             p += chances[i, k] * gammaincc(freedom, freedom * misfit / (count * ratio))
@@ -99,7 +99,8 @@ def _element(model: ObservationModel, residual, variance, of_pump, of_line) -> s
     all of the residual, or "line"; None for a single sensor, which cannot tell."""
     if of_pump < of_line:
         return "source" if model.sensors > 1 else None
-    by_sensor = np.sum(np.abs(residual) ** 2 / np.mean(variance, axis=0), axis=1)
+    at_sensors = model.division.at_sensors(residual)
+    by_sensor = np.sum(np.abs(at_sensors) ** 2 / np.mean(variance, axis=0), axis=1)
     if model.sensors > 1 and by_sensor.max() > ONE_SENSOR * by_sensor.sum():
         return f"sensor {model.line.twin.rig.sensors[int(np.argmax(by_sensor))].name}"
     return "line"

@@ -129,7 +129,8 @@ def _observe_periodic(
     highest = _highest(max_frequency_hz, recording.sampling_rate_hz)
     orders = np.arange(1, int(highest / speed_hz) + 1)
     _check_any(recording, orders > 0)
-    spectra = np.stack([peak_amplitudes(window)[:, orders] for window in revolutions.windows])
+    windows = without_drift(revolutions.windows)
+    spectra = np.stack([peak_amplitudes(window)[:, orders] for window in windows])
     values, covariance = harmonics_at_mean_speed(spectra, revolutions.speed_hz, orders, progress)
     if piston_harmonics_only:
         kept = orders % rig.pump["pistons"] == 0
@@ -149,6 +150,16 @@ def _observe_periodic(
         flow_ripple=recording.flow_ripple,
         sensors=rig.sensors,
     )
+
+
+def without_drift(windows: np.ndarray) -> np.ndarray:
+    """Revolutions (R, S, M) without the ramps that slow drift of a sensor, or of the pressure, adds
+    to them. The mean of a revolution drifts by as much as the next ones differ."""
+    if len(windows) < 2:
+        return windows
+    slope = np.gradient(windows.mean(axis=2), axis=0)
+    samples = windows.shape[2]
+    return windows - slope[..., None] * ((np.arange(samples) + 0.5) / samples - 0.5)
 
 
 def _check_any(recording: Recording, kept: np.ndarray) -> None:

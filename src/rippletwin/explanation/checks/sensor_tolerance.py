@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rippletwin.calibration.fit import Fit
+from rippletwin.calibration.fit import HALF_INTERVAL, Fit
 from rippletwin.calibration.laplace import FLAT_CURVATURE
 from rippletwin.calibration.posterior import Posterior
 
@@ -49,10 +49,11 @@ def add_sensor_tolerance(fit: Fit, observations: Sequence) -> Fit:
     hessian[own, own] += 1.0
     exact = np.linalg.inv(hessian[:count, :count])
     wide = np.linalg.inv(hessian)[:count, :count]
-    growth = np.sqrt(np.maximum(np.diag(wide) / np.diag(exact), 1.0))
+    added = HALF_INTERVAL * np.sqrt(np.maximum(np.diag(wide - exact), 0.0))
 
     def grown(k: int, end: float) -> float:
-        return float(theta[k] + growth[k] * (end - theta[k]))
+        away = end - theta[k]
+        return float(theta[k] + np.copysign(np.hypot(away, added[k]), away))
 
     ends = {k: (grown(k, low), grown(k, high)) for k, (low, high) in fit.interval_ends.items()}
     return replace(fit, covariance=fit.covariance + wide - exact, interval_ends=ends)

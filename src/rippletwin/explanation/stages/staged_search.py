@@ -102,12 +102,12 @@ def _search_again(
 def _resume_search(
     stage: Stage, search: Search, processes: int, progress: Progress | None
 ) -> tuple[Stage, Search]:
-    """Let a simulated pump respond to the line's pressure, widen the data sheet's
-    tolerances by what the fit shows, and resume the search."""
+    """Widen the data sheet's tolerances by what the fit shows, let a simulated pump respond to the
+    line's pressure, and resume the search."""
+    search, scale = _widen_tolerances(stage, search, processes)
     coupled = None
     if search.best.model_error < MAX_MODEL_ERROR_FOR_COUPLING:
         coupled = couple_pump_to_line(search.best.twin, stage.observations)
-    search, scale = _widen_tolerances(stage, search, processes)
     if coupled is None and scale == 1.0:
         return stage, search
     data = coupled or stage.observations
