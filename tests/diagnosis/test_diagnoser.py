@@ -13,9 +13,10 @@ import leaking_pump
 from rippletwin.diagnosis.diagnosed_numbers import gather
 from rippletwin.diagnosis.diagnoser import Diagnoser
 from rippletwin.diagnosis.diagnosis_file import diagnosis_dict
-from rippletwin.diagnosis.evidence import ErrorPrior, compare_healthy
+from rippletwin.diagnosis.evidence import ErrorPrior, _at_best_pitch, compare_healthy
 from rippletwin.diagnosis.faults.library import select_faults
-from rippletwin.diagnosis.hypothesis import Hypothesis
+from rippletwin.diagnosis.hypothesis import Errors, Hypothesis
+from rippletwin.diagnosis.screening import Screen
 from rippletwin.diagnosis.unlike import combine, judge_residual
 from rippletwin.figures import fault_posterior
 from rippletwin.pump.faults import Cylinder, Slipper
@@ -153,6 +154,33 @@ def test_changes_between_healthy_recordings_are_learned():
         for healthy in ([anchor], [anchor, changed("again", 1.0)])
     ]
     assert p_values[0] < 0.01 < 0.3 < p_values[1]
+
+
+def test_the_pitch_is_judged_by_the_likelihood():
+    """A pump of unequal pistons, whose healthy orders beside the pistons' tell the whole shaft
+    angle, turned by two pitches and more. Where the rough scores prefer another pitch, the
+    likelihood gives the true one back, and that candidate is the first."""
+    rng = np.random.default_rng(5)
+    anchor, leaking = (
+        leaking_pump.record(name, fault, turn, rng)
+        for name, fault, turn in (("anchor", None, 0.0), ("slipper", Slipper(1e-7, 2), TURN))
+    )
+    model = Diagnoser(Twin(leaking_pump.rig(), [anchor]), ()).model(anchor, anchor)
+    orders, response = model.orders, model.line.response()[:, : len(model.orders)]
+    own = orders % leaking_pump.PISTONS == 0
+    unequal = np.where(own, 0.0, 1e-8) * np.exp(2j * np.pi * rng.uniform(size=len(orders)))
+    anchor = replace(anchor, values=anchor.values + response * unequal)
+    turned = response * unequal * np.exp(1j * orders * TURN)
+    leaking = replace(leaking, values=leaking.values + turned)
+    model = Diagnoser(Twin(leaking_pump.rig(), [anchor]), select_faults()).model(leaking, anchor)
+    candidates = Screen(model).one(select_faults()[0])
+    apart = np.angle(np.exp(1j * (np.array([c.turn for c in candidates]) - TURN)))
+    wrong = next(k for k in range(len(candidates)) if abs(apart[k]) > 0.5)
+    preferred = replace(candidates[wrong], score=candidates[0].score + 50.0)
+    rest = [c for k, c in enumerate(candidates) if k != wrong]
+    found, mode = _at_best_pitch(model, [preferred, *rest], Errors(0.005, 1.0))
+    assert abs(np.angle(np.exp(1j * (mode.turn - TURN)))) < 0.05
+    assert found[0].turn == mode.turn and found[0].score == max(c.score for c in found)
 
 
 def test_two_p_values_together_are_even_where_each_is():

@@ -87,10 +87,9 @@ def compare_healthy(model: ObservationModel, prior: ErrorPrior) -> tuple[float, 
 def _weigh(
     model: ObservationModel, candidates: Sequence[Candidate], prior: ErrorPrior
 ) -> StateEvidence:
-    best = candidates[0]
-    drift = np.zeros(len(model.line.drifts))
-    mode = Hypothesis(best.state, best.areas, best.pistons, best.turn, drift)
     errors = Errors(prior.scatter, prior.change)
+    candidates, mode = _at_best_pitch(model, candidates, errors)
+    best = candidates[0]
     for _ in range(ROUNDS):
         mode = model.followed(mode, errors, LIMITS_HZ)
         mode = _at_best_areas(model, mode, errors)
@@ -111,6 +110,34 @@ def _weigh(
     # A twin that errs by so much about a change errs by as much about its size.
     areas = {name: density.widened(model.usual_error) for name, density in areas.items()}
     return StateEvidence(best.state, float(log_evidence), mode, errors, areas, pistons)
+
+
+def _at_best_pitch(
+    model: ObservationModel, candidates: Sequence[Candidate], errors: Errors
+) -> tuple[list[Candidate], Hypothesis]:
+    """The candidates, the best first, and the best as a hypothesis. The screen forgives the healthy
+    orders beside the pistons' so much that it can miss the pitch: the best candidate of each is
+    scored again by the likelihood, with the drift of the first."""
+    first = candidates[0]
+    drift = np.zeros(len(model.line.drifts))
+    mode = Hypothesis(first.state, first.areas, first.pistons, first.turn, drift)
+    drift = model.followed(mode, errors, LIMITS_HZ).drift
+
+    def hypothesis(c: Candidate) -> Hypothesis:
+        return Hypothesis(c.state, c.areas, c.pistons, c.turn, drift)
+
+    scored: dict[int, float] = {}  # what to add to the scores of a pitch
+    pitches = [
+        round((c.turn - first.turn) * model.pistons / (2.0 * np.pi)) % model.pistons
+        for c in candidates
+    ]
+    for pitch, candidate in zip(pitches, candidates):  # the best of a pitch comes first
+        if pitch not in scored:
+            exact = model.evaluate(hypothesis(candidate), errors).log_likelihood
+            scored[pitch] = exact - candidate.score
+    again = [replace(c, score=c.score + scored[pitch]) for pitch, c in zip(pitches, candidates)]
+    again.sort(key=lambda c: c.score, reverse=True)
+    return again, hypothesis(again[0])
 
 
 def _log_places(model: ObservationModel, state: Sequence[Fault]) -> float:
