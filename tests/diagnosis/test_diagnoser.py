@@ -183,9 +183,9 @@ def test_the_pitch_is_judged_by_the_likelihood():
     assert found[0].turn == mode.turn and found[0].score == max(c.score for c in found)
 
 
-def test_two_p_values_together_are_even_where_each_is():
-    """Of two independent even numbers the combined p-value is even too, and a test that says
-    nothing beside another leaves it less telling, but within a factor of its logarithm."""
+def test_two_p_values_together_are_uniform_where_each_is():
+    """The combined p-value of two independent uniform numbers is uniform. Beside a p-value of 1 a
+    small one grows by the factor that Fisher's formula has."""
     pairs = np.random.default_rng(0).uniform(size=(4000, 2))
     combined = [combine(*pair) for pair in pairs]
     assert kstest(combined, "uniform").pvalue > 0.01

@@ -97,7 +97,7 @@ def recalibrate_twin(twin: Twin, healthy: Sequence[Recording], read: ReadOnce) -
     points = one_each_point(observations)
     # A line that is right already would lose what it owes to the ripple: ratios between sensors say
     # nothing of the way from the pump to the first sensor.
-    lines = with_fitted_pump(twin), calibrate_line(twin, observations)
+    lines = twin, calibrate_line(twin, observations)
     tried = [twin, *(calibrate_pump(line, points) for line in lines)]
     return min(tried, key=lambda each: healthy_misfit(each, observations))
 

@@ -78,8 +78,7 @@ def weigh_states(
 def compare_healthy(model: ObservationModel, prior: ErrorPrior) -> tuple[float, np.ndarray]:
     """Relative scatter that a recording known to be healthy shows against its anchor, and the
     change (F,) of the pump's flow from there, m3/s, as the anchor's shaft stands."""
-    best = Screen(model).healthy()[0]
-    mode = Hypothesis((), (), (), best.turn, np.zeros(len(model.line.drifts)))
+    mode = _hypothesis(Screen(model).healthy()[0], np.zeros(len(model.line.drifts)))
     mode = model.followed(mode, Errors(prior.scatter, prior.change), LIMITS_HZ)
     return _best_errors(model, mode, prior)[0].scatter, model.change_of_flow(mode)
 
@@ -119,13 +118,8 @@ def _at_best_pitch(
     orders beside the pistons' so much that it can miss the pitch: the best candidate of each is
     scored again by the likelihood, with the drift of the first."""
     first = candidates[0]
-    drift = np.zeros(len(model.line.drifts))
-    mode = Hypothesis(first.state, first.areas, first.pistons, first.turn, drift)
+    mode = _hypothesis(first, np.zeros(len(model.line.drifts)))
     drift = model.followed(mode, errors, LIMITS_HZ).drift
-
-    def hypothesis(c: Candidate) -> Hypothesis:
-        return Hypothesis(c.state, c.areas, c.pistons, c.turn, drift)
-
     scored: dict[int, float] = {}  # what to add to the scores of a pitch
     pitches = [
         round((c.turn - first.turn) * model.pistons / (2.0 * np.pi)) % model.pistons
@@ -133,11 +127,16 @@ def _at_best_pitch(
     ]
     for pitch, candidate in zip(pitches, candidates):  # the best of a pitch comes first
         if pitch not in scored:
-            exact = model.evaluate(hypothesis(candidate), errors).log_likelihood
+            exact = model.evaluate(_hypothesis(candidate, drift), errors).log_likelihood
             scored[pitch] = exact - candidate.score
     again = [replace(c, score=c.score + scored[pitch]) for pitch, c in zip(pitches, candidates)]
     again.sort(key=lambda c: c.score, reverse=True)
-    return again, hypothesis(again[0])
+    return again, _hypothesis(again[0], drift)
+
+
+def _hypothesis(candidate: Candidate, drift: np.ndarray) -> Hypothesis:
+    c = candidate
+    return Hypothesis(c.state, c.areas, c.pistons, c.turn, drift)
 
 
 def _log_places(model: ObservationModel, state: Sequence[Fault]) -> float:

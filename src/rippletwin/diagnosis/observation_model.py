@@ -221,7 +221,7 @@ class ObservationModel:
                 scatters, self.anchor.unsure, self._both_sure(errors), changes
             )
         )
-        return self.noise + np.array([self.sensors * flow, *[across] * (self.sensors - 1)])
+        return self.noise + self._in_rows(self.sensors * flow, across)
 
     def expected_reading(self, parts: Parts, errors: Errors) -> np.ndarray:
         """The reading (S, F) to expect: changes count by as much as they are sure."""
@@ -230,8 +230,11 @@ class ObservationModel:
 
     def _sure(self, errors: Errors) -> np.ndarray:
         """Share (S, F) of a predicted change that is to be expected."""
-        flow, across = self._both_sure(errors)
-        return np.array([flow, *[across] * (self.sensors - 1)])
+        return self._in_rows(*self._both_sure(errors))
+
+    def _in_rows(self, along: np.ndarray, across: np.ndarray) -> np.ndarray:
+        """The rows (S, F) of divided readings: one along the response, alike ones across it."""
+        return np.array([along, *[across] * (self.sensors - 1)])
 
     def _both_sure(self, errors: Errors) -> tuple[np.ndarray, np.ndarray]:
         """The same (F,) along the response and across it."""

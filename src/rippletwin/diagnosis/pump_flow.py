@@ -53,7 +53,7 @@ def with_fitted_pump(twin: Twin, mean_flow: float | None = None, speed_hz: float
     own = {p.name for p in twin.parameters if p.place == "pump"}
     own.update(f"{kind}[{label}]" for label in twin.labels for kind in ("angle", "state"))
     fitted = {key: value for key, value in twin.fitted_pump().items() if value is not None}
-    pump = _with_sheet_s_discharge(pump | fitted, pump.get("discharge_coefficient"))
+    pump = _with_stated_discharge(pump | fitted, pump.get("discharge_coefficient"))
     kept = [name not in own for name in twin.index]
     return Twin(
         replace(twin.rig, pump=pump),
@@ -65,7 +65,7 @@ def with_fitted_pump(twin: Twin, mean_flow: float | None = None, speed_hz: float
     )
 
 
-def _with_sheet_s_discharge(pump: dict, stated: float | None) -> dict:
+def _with_stated_discharge(pump: dict, stated: float | None) -> dict:
     """The pump with the discharge coefficient of the data sheet, None where it states none, and the
     same flow through its ports. A coefficient that was fitted is that of the ports, not of leaks.
     """

@@ -54,8 +54,8 @@ def judge_residual(model: ObservationModel, best: StateEvidence, prior: ErrorPri
 
 def combine(one: float, other: float) -> float:
     """The p-value of two independent tests together (Fisher 1932, Statistical Methods for Research
-    Workers, section 21.1): the probability that the product of two even numbers in [0, 1] is as
-    small as theirs."""
+    Workers, section 21.1): the probability that the product of two uniform random numbers in
+    [0, 1] is as small as theirs."""
     product = one * other
     return float(product * (1.0 - np.log(product))) if product > 0.0 else 0.0
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rippletwin.calibration.fit import HALF_INTERVAL
 from rippletwin.case.model import Case
 from rippletwin.case.quantities import (
     unit_of,
@@ -21,7 +22,6 @@ from rippletwin.case.words import name_effect, name_parameter, name_state
 from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.twin import Twin
 
-INTERVAL_SD = 1.96  # half a 95 % interval
 UNDETERMINED_SD = 0.9  # of a prior's: a posterior that wide says that the data tell nothing
 DIFFERENCE_DECIMALS = 2  # of a difference in per cent, mm or tolerances
 
@@ -77,7 +77,7 @@ def _parameter_row(p: Parameter, u: float, sd: float | None) -> list[Cell]:
     value, nominal = float(p.value(u)), p.nominal
     ends = None
     if sd is not None:
-        low, high = (float(p.value(u + side * INTERVAL_SD * sd)) for side in (-1, 1))
+        low, high = (float(p.value(u + side * HALF_INTERVAL * sd)) for side in (-1, 1))
         ends = low, high
     interval = "unknown" if ends is None else write_interval(ends, unit)
     if sd is not None and sd > UNDETERMINED_SD:

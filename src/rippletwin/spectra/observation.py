@@ -129,8 +129,9 @@ def _observe_periodic(
     highest = _highest(max_frequency_hz, recording.sampling_rate_hz)
     orders = np.arange(1, int(highest / speed_hz) + 1)
     _check_any(recording, orders > 0)
-    windows = without_drift(revolutions.windows)
+    windows = revolutions.windows
     spectra = np.stack([peak_amplitudes(window)[:, orders] for window in windows])
+    spectra -= spectra_of_drift(windows.mean(axis=2), windows.shape[2], orders)
     values, covariance = harmonics_at_mean_speed(spectra, revolutions.speed_hz, orders, progress)
     if piston_harmonics_only:
         kept = orders % rig.pump["pistons"] == 0
@@ -152,14 +153,14 @@ def _observe_periodic(
     )
 
 
-def without_drift(windows: np.ndarray) -> np.ndarray:
-    """Revolutions (R, S, M) without the ramps that slow drift of a sensor, or of the pressure, adds
-    to them. The mean of a revolution drifts by as much as the next ones differ."""
-    if len(windows) < 2:
-        return windows
-    slope = np.gradient(windows.mean(axis=2), axis=0)
-    samples = windows.shape[2]
-    return windows - slope[..., None] * ((np.arange(samples) + 0.5) / samples - 0.5)
+def spectra_of_drift(means: np.ndarray, samples: int, orders: np.ndarray) -> np.ndarray:
+    """Peak amplitudes (R, S, K) of the ramps that slow drift of a sensor, or of the pressure, adds
+    to revolutions of so many samples, whose means are (R, S). The mean of a revolution drifts by as
+    much as the next ones differ."""
+    if len(means) < 2:
+        return np.zeros((*means.shape, len(orders)))
+    ramp = (np.arange(samples) + 0.5) / samples
+    return np.gradient(means, axis=0)[..., None] * peak_amplitudes(ramp)[orders]
 
 
 def _check_any(recording: Recording, kept: np.ndarray) -> None:

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rippletwin.calibration.fit import Fit
+from rippletwin.calibration.fit import HALF_INTERVAL, Fit
 from rippletwin.explanation.localise.modulation_fit import fit_modulation
 from rippletwin.explanation.localise.order_flow import (
     estimate_order_flow,
@@ -27,7 +27,6 @@ from rippletwin.twin.forward_model import ForwardModel
 
 DRAWS = 60
 MIN_VALID_SHARE = 0.9  # of the draws for which the line has a finite response
-NORMAL_QUANTILE = 1.96
 
 
 def add_amplitude_intervals(
@@ -64,7 +63,7 @@ def add_amplitude_intervals(
     effects = []
     for effect, column in zip(shaft_orders.effects, values.T):
         centre = 2.0 * effect.value - np.mean(column)
-        reach = NORMAL_QUANTILE * np.std(column, ddof=1)
+        reach = HALF_INTERVAL * np.std(column, ddof=1)
         interval = (max(float(centre - reach), 0.0), float(centre + reach))
         effects.append(replace(effect, interval=interval))
     return replace(shaft_orders, effects=tuple(effects))
