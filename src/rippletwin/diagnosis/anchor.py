@@ -1,8 +1,8 @@
 """The healthy recording that a recording of unknown state is compared with.
 
-What the twin gets wrong about the healthy pump is known from the healthy recording and need not be
-paid for again: the flow that the recording asks for at the pump, and what no flow at the pump
-explains, are taken from it and brought to the operating point of the unknown recording.
+The healthy recording shows what the twin gets wrong about the healthy pump. So the flow at the pump
+that the recording needs, and what no flow at the pump explains, are taken from it and brought to
+the operating point of the unknown recording.
 """
 
 from __future__ import annotations
