@@ -129,7 +129,7 @@ def test_no_effect_and_effects_outside_the_library():
     only_supported = verdict("named", claim("leak") | {"support": "supported"})
     assert failure(score_example(none, only_supported)) is None
     outside = truth(kind="outside")
-    outside["effects"][0]["name"] = "accumulator"
+    outside["effects"][0]["name"] = "resonator"
     assert failure(score_example(outside, verdict("unexplained"))) is None
     assert failure(score_example(outside, verdict("named", claim("leak")))) == "misnamed"
     assert failure(score_example(outside, verdict("consistent"))) == "not noticed"

@@ -152,14 +152,15 @@ def test_what_remains_is_told_with_place_and_law():
         (["entrained_air", "line_volume"], (9e6, 9.5e6), False, []),
         (["entrained_air", "line_volume"], (None,), False, []),
         (["load_volume"], (9e6,), False, ["a small volume of gas"]),
-        (["line_volume"], (9e6,), True, []),
+        (["load_volume"], (9e6,), True, []),
         (["unsteady_friction"], (9e6,), False, []),
     ],
 )
 def test_what_one_pressure_cannot_tell_apart(names, pressures, is_gas, told):
     """At pressures within 5 % a liquid that stiffens fits as well as entrained air, and gas as well
     as a volume of liquid. The sentences say so there, and nowhere else."""
-    said = pressure_sentences(names, pressures, is_gas)
+    observations = [SimpleNamespace(load_pressure=p) for p in pressures]
+    said = pressure_sentences(names, observations, is_gas)
     assert len(said) == len(told)
     assert all(words in sentence for words, sentence in zip(told, said))
 

@@ -55,6 +55,7 @@ from rippletwin.explanation.localise.remainder import find_remainder
 from rippletwin.explanation.localise.shaft_order_intervals import add_amplitude_intervals
 from rippletwin.explanation.localise.shaft_orders import analyse_shaft_orders
 from rippletwin.explanation.localise.source_free_fits import refit_source_free
+from rippletwin.explanation.search.gas_rivals import fit_gas_rivals
 from rippletwin.explanation.search.passive_networks import accepted_network, fit_passive_networks
 from rippletwin.explanation.stages.preparation import HIGHEST_HZ, observe_all, select_fitted_as
 from rippletwin.explanation.stages.staged_search import (
@@ -130,6 +131,8 @@ def explain_observations(
             if network is not None and set(judged.best.hypothesis) <= set(network.hypothesis):
                 network, judged = judge_beside_network(workers, search.base, network, judged)
                 search = replace(search, best=judged.best, passive_networks=[network, *networks])
+            gas = fit_gas_rivals(workers, search.best)
+            search = replace(search, rivals=[*search.rivals, *gas])
             contradiction = find_swapped_sensors(base, data, search)
         # Steps 11 to 14: checks
         point_fits = fit_each_observation(workers, search.base)

@@ -17,6 +17,7 @@ from rippletwin.explanation.fit_jobs import (
     progress_callback,
     rank_by_evidence,
 )
+from rippletwin.explanation.search.gas_rivals import GAS, has_one_pressure
 from rippletwin.explanation.search.position_search import move_to_best_position
 from rippletwin.explanation.search.single_effects import fit_single_effects
 from rippletwin.explanation.search.stepwise_moves import (
@@ -51,7 +52,7 @@ def applicable_candidates(
     """The effects at their places that these observations can show.
 
     An input impedance shows neither source nor sensors. Entrained air needs a mean pressure, hence
-    a periodic recording.
+    a periodic recording. A volume of gas needs two: at one it is a volume of liquid (`gas_rivals`).
     """
     kinds = {o.kind for o in observations}
     applicable = []
@@ -59,6 +60,8 @@ def applicable_candidates(
         if kinds == {"input_impedance"} and effect.element in ("source", "sensor"):
             continue
         if effect.name == "entrained_air" and "periodic" not in kinds:
+            continue
+        if effect.name == GAS and has_one_pressure(observations):
             continue
         if effect.name in SHAFT_ORDER_EFFECTS:
             continue
