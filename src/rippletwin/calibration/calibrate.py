@@ -151,7 +151,7 @@ def _warnings(twin: Twin, mode: Mode, after: Misfit) -> tuple[str, ...]:
     for p, u, s in zip(twin.parameters, twin.theta, sd):
         value, value_sd = float(p.value(u)), p.value_sd(u, s)
         if p.flat:
-            if p.unit == "rad" and value_sd > ANGLE_SD:
+            if value_sd > ANGLE_SD:
                 out.append(f"{p.name} is not determined by the data")
             continue
         if p.prior.scale == 0.0 or not p.stated:

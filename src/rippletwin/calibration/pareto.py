@@ -24,6 +24,7 @@ from rippletwin.calibration.calibrate import (
 )
 from rippletwin.calibration.frequency_continuation import continuation_limits
 from rippletwin.calibration.likelihood import EVENNESS, Likelihood
+from rippletwin.calibration.misfit import with_likely_amplitude
 from rippletwin.calibration.shaft_angles import align_shaft_angles
 from rippletwin.twin.twin import Twin
 
@@ -105,9 +106,12 @@ def calibrate_pareto(
 
 
 def sensor_misfits(likelihood: Likelihood, theta: np.ndarray) -> np.ndarray:
-    """Squared relative misfit (S,) of each sensor at theta (P,), all observations together."""
+    """Squared relative misfit (S,) of each sensor at theta (P,), all observations together; a free
+    source has its most likely amplitude."""
     left = total = np.zeros(1)
-    for measured, h, _ in likelihood.by_observation(likelihood.predict(theta)):
+    parts = likelihood.by_observation(likelihood.predict(theta))
+    for o, (measured, h, _) in zip(likelihood.observations, parts):
+        h = with_likely_amplitude(o, h, measured)
         left = left + np.sum(np.abs(measured - h) ** 2, axis=1)
         total = total + np.sum(np.abs(measured) ** 2, axis=1)
     return left / total

@@ -198,6 +198,10 @@ class Twin:
             k += len(own)
         return out
 
+    def applied_effects(self, theta: np.ndarray) -> list[tuple]:
+        """`effect_values` in the order in which a line takes them (`Effect.rank`)."""
+        return sorted(self.effect_values(theta), key=lambda each: each[0].rank)
+
     @property
     def friction_law(self) -> str:
         """Friction law of the line with its effects."""
@@ -218,7 +222,7 @@ class Twin:
         ripple = None
         if observation.kind == "periodic" and observation.source != "free":
             ripple = self._nominal_ripple(observation)
-        return operating_point(self.rig, observation, ripple)
+        return operating_point(self.rig, observation, ripple, self.guessed_load)
 
     def respond(
         self,
@@ -226,16 +230,14 @@ class Twin:
         speed_hz: float,
         load_pressure: float,
         orders: np.ndarray,
-        friction: str | None = None,
     ) -> np.ndarray:
         """Sensors' pressure harmonics (S, F) at shaft `orders` (F,) for any flow ripple, angle 0.
 
         This is how the ripple of a faulty pump is propagated in the frequency domain. Where the
         data sheet gives no orifice coefficient, it follows from the mean flow of `ripple`.
         """
-        twin = self if friction is None else self.with_(friction=friction)
         condition = OperatingCondition.at_orders(orders, speed_hz, load_pressure, ripple)
-        return twin.predict([condition])[0]
+        return self.predict([condition])[0]
 
     def reference_impedance(self, theta: np.ndarray, observation) -> float:
         """Reference of an input impedance, Pa s/m3: rho a/A of the first segment.
