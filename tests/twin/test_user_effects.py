@@ -122,8 +122,8 @@ def test_a_bad_file_is_bad_input(own, old, new, field, words):
 
 
 def test_an_effect_of_the_source_is_tried_too():
-    """Effects at shaft orders are given a shaft: those of the library pass as a user's would. One whose
-    flow is not finite is refused."""
+    """Effects at shaft orders are given a shaft: those of the library pass as a user's would. One
+    whose flow is not finite is refused."""
     for name in ("piston_spread", "speed_fluctuation"):
         check_on_rig(replace(library.EFFECTS[name], file="own.py"), rig())
 

@@ -121,7 +121,7 @@ def test_networks_of_a_range_of_severities_are_kept_and_used(tmp_path):
     assert "| healthy | slipper | changed |" in (tmp_path / "unlike.md").read_text()
     (kept,) = find_networks(tmp_path, leaking_pump.rig()).values()
     signal = store.load(tmp_path / "recorded.zarr").signal.values
-    answers = [judge_windows(kept, signal[k : k + 10]) for k in (0, 10, 20)]
+    answers = [judge_windows(kept.classes, *kept.answers(signal[k : k + 10])) for k in (0, 10, 20)]
     print(answers)
     assert answers[1]["state"] == "slipper" and answers[1]["share"] == 1.0
     rates = pd.read_csv(outputs["rates"]).set_index("truth").unlike
