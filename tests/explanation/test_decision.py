@@ -1,15 +1,18 @@
 """The decision: from the support of effects and the alarms to a verdict."""
 
+from contextlib import nullcontext
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from made_fits import made_fit
+from rippletwin.explanation import explain
 from rippletwin.explanation.checks.alarms import Alarms
 from rippletwin.explanation.checks.bootstrap import NullDistribution
 from rippletwin.explanation.checks.robustness import Robustness
-from rippletwin.explanation.checks.support import Support, support_level
+from rippletwin.explanation.checks.support import Judged, Support, support_level
 from rippletwin.explanation.localise.source_free_fits import compare_evidence
 from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.thresholds import (
@@ -268,3 +271,44 @@ def test_probabilities_of_much_evidence_are_numbers():
     search = Search(base, [best, other], best, [best, best])
     probability = posterior_probabilities(search, best)["viscoelastic_wall"]
     assert probability == pytest.approx(1.0 / (1.0 + np.exp(-1.0)))
+
+
+@pytest.mark.parametrize(
+    ("alarms", "wiring", "verdict"),
+    [
+        (NO_ALARM, "", "calibration_only"),
+        (MISFIT_RAISED, "", "unexplained"),
+        (NO_ALARM, "p1 and p2 are exchanged", "bad_data"),
+    ],
+)
+def test_the_scores_are_those_of_what_is_accepted(monkeypatch, alarms, wiring, verdict):
+    """Where the explanation is rejected, as a suggestion or for wrong wiring, the line alone is
+    accepted and cross-validated. A suggestion that is accepted keeps its scores."""
+    base, best = made_fit(0.0), made_fit(100.0, HOSE)
+    search = Search(base, [best], best)
+    sheet = (SimpleNamespace(rivals=True),)
+    stand_ins = {
+        "prepare_stage": lambda *_: SimpleNamespace(base=None, observations=[None]),
+        "search_in_stages": lambda stage, *_: (stage, search),
+        "open_workers": lambda *_: nullcontext(SimpleNamespace(fit=lambda jobs: [None])),
+        "_judge_explanation": lambda *_: (
+            search,
+            Judged(best, (support("suggested"),), ()),
+            wiring,
+        ),
+        "fit_each_observation": lambda *_: [],
+        "read_alarms": lambda *_: alarms,
+        "refit_source_free": lambda *_: [],
+        "cross_validate": lambda w, base, fit, *_: SimpleNamespace(of=fit, model_error=0.004),
+        "compare_without_each_effect": lambda *_: sheet,
+        "add_sensor_tolerance": lambda fit, _: fit,
+        "locate_mismatch": lambda *_: None,
+        "find_remainder": lambda *_: None,
+        "analyse_shaft_orders": lambda *_: None,
+    }
+    for name, stand_in in stand_ins.items():
+        monkeypatch.setattr(explain, name, stand_in)
+    found = explain.explain_observations(SimpleNamespace(delay=0.01), [None])
+    assert found.decision.verdict == verdict
+    assert found.validation.of is found.decision.accepted
+    assert found.decision.accepted is (best if verdict == "unexplained" else base)

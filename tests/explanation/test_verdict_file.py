@@ -36,7 +36,6 @@ def explanation():
         alarms=Alarms(0.004, (0.1, "load"), (0.1, "load"), (0.5, "point 1")),
         validation=Validation(scores, scores, scores, ("recording 1",), 0.0, 0.004),
         decision=Decision("consistent", base),
-        point_fits=(),
         shaft_orders=MODULATION,
     )
 
