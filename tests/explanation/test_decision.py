@@ -264,6 +264,24 @@ def test_other_positions_are_those_of_the_best_hypothesis():
     assert rival_fits(search) == [same]
 
 
+def test_another_position_that_the_best_fit_has_left_behind_is_no_rival():
+    """The best fit has come to a better mode since the positions were searched."""
+    base, best = made_fit(0.0), made_fit(50.0, HOSE)
+    near = made_fit(50.1 - EQUIVALENT_LOG_BAYES_FACTOR, HOSE)
+    far = made_fit(49.9 - EQUIVALENT_LOG_BAYES_FACTOR, HOSE)
+    assert rival_fits(Search(base, [best], best, other_positions=[near, far])) == [near]
+
+
+def test_a_hypothesis_in_two_orders_has_one_probability():
+    """A hose and a volume were found from either side and fitted twice, less well last: they count
+    once, by the better fit."""
+    base, both = made_fit(0.0), made_fit(2.0, HOSE, VOLUME)
+    search = Search(base, [], both, [made_fit(1.5, VOLUME, HOSE)])
+    for accepted in (both, made_fit(1.0, HOSE, VOLUME)):
+        found = posterior_probabilities(replace(search, rivals=[*search.rivals, both]), accepted)
+        assert found["line_volume"] == pytest.approx(np.exp(2.0) / (1.0 + np.exp(2.0)))
+
+
 def test_probabilities_of_much_evidence_are_numbers():
     """exp(evidence) overflows from 710 on. Evidence of 1e4 beside 1e4 - 1 has the probability of 1
     beside 0, and a hypothesis that was fitted twice counts once."""
@@ -286,9 +304,9 @@ def test_the_scores_are_those_of_what_is_accepted(monkeypatch, alarms, wiring, v
     accepted and cross-validated. A suggestion that is accepted keeps its scores."""
     base, best = made_fit(0.0), made_fit(100.0, HOSE)
     search = Search(base, [best], best)
-    sheet = (SimpleNamespace(rivals=True),)
+    sheet, point = (SimpleNamespace(rivals=True),), SimpleNamespace(label="point 1")
     stand_ins = {
-        "prepare_stage": lambda *_: SimpleNamespace(base=None, observations=[None]),
+        "prepare_stage": lambda *_: SimpleNamespace(base=None, observations=[point]),
         "search_in_stages": lambda stage, *_: (stage, search),
         "open_workers": lambda *_: nullcontext(SimpleNamespace(fit=lambda jobs: [None])),
         "_judge_explanation": lambda *_: (
@@ -301,6 +319,7 @@ def test_the_scores_are_those_of_what_is_accepted(monkeypatch, alarms, wiring, v
         "refit_source_free": lambda *_: [],
         "cross_validate": lambda w, base, fit, *_: SimpleNamespace(of=fit, model_error=0.004),
         "compare_without_each_effect": lambda *_: sheet,
+        "withhold_what_is_in_doubt": lambda judged, *_: judged,
         "add_sensor_tolerance": lambda fit, _: fit,
         "locate_mismatch": lambda *_: None,
         "find_remainder": lambda *_: None,
@@ -308,7 +327,7 @@ def test_the_scores_are_those_of_what_is_accepted(monkeypatch, alarms, wiring, v
     }
     for name, stand_in in stand_ins.items():
         monkeypatch.setattr(explain, name, stand_in)
-    found = explain.explain_observations(SimpleNamespace(delay=0.01), [None])
+    found = explain.explain_observations(SimpleNamespace(delay=0.01), [point])
     assert found.decision.verdict == verdict
     assert found.validation.of is found.decision.accepted
     assert found.decision.accepted is (best if verdict == "unexplained" else base)
