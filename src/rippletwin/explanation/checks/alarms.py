@@ -179,9 +179,10 @@ def aligned_difference(a, b, delay: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def evidence_p_value(log_bayes_factor: float, tried: int) -> float:
-    """Upper bound on the probability of so much evidence from `tried` effects if none is present.
+    """Upper bound on the probability of so much evidence for one of `tried` hypotheses if no effect
+    is present.
 
     Markov's inequality on the Bayes factor, whose mean under the base is 1, with a union bound over
-    the effects.
+    the hypotheses.
     """
     return float(min(1.0, tried * np.exp(-min(log_bayes_factor, 700.0))))

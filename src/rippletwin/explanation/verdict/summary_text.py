@@ -301,5 +301,5 @@ def _place(e: Explanation, entry: dict, extent: bool = True) -> str:
 
 
 def _element(e: Explanation, entry: dict) -> str:
-    element, _ = element_and_extent(e.rig, entry["effect"], entry["place"], entry["parameters"])
+    element, _ = element_and_extent(e.rig, entry["place"], entry["parameters"])
     return element
