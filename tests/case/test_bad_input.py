@@ -103,6 +103,24 @@ def test_periodic_recording_without_speed(tmp_path):
     refused(tmp_path, "rig.yaml", "recordings[0].speed_rpm", "missing")
 
 
+def test_simulated_pump_without_load_pressure(tmp_path):
+    """A pump whose geometry is given is simulated against the load pressure, whatever the load is;
+    with its pistons alone, or with a flow ripple, the pressure may be absent."""
+
+    def unstated(content):
+        content["load"]["kind"] = "unknown"
+        del content["recordings"][0]["load_pressure"]
+
+    def simulated(content):
+        unstated(content)
+        content["pump"]["piston_diameter"] = 0.02
+
+    spoilt(tmp_path, unstated)
+    load_case(tmp_path)
+    spoilt(tmp_path, simulated)
+    refused(tmp_path, "rig.yaml", "recordings[0].load_pressure", "missing", "simulated against")
+
+
 def test_random_recording_of_one_sensor(tmp_path):
     def spoil(content):
         content["sensors"].pop()

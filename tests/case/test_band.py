@@ -58,6 +58,31 @@ def test_a_band_without_anything_is_bad_input(tmp_path):
         observe(case.recordings[0], case.rig)
 
 
+@pytest.mark.parametrize("keys", [{"max_frequency_hz": 100.0}, {"min_frequency_hz": 4990.0}])
+def test_a_band_without_a_fitted_frequency_is_bad_input(tmp_path, keys):
+    """Shaft orders are in the band, and no multiple of the pistons' 150 Hz: nothing is left to
+    fit, which is told with the recording's name."""
+    case = load_case(banded(tmp_path, **keys))
+    observed = observe(case.recordings[0], case.rig)
+    with pytest.raises(InputError) as caught:
+        select_fitted_frequencies([observed], case.rig)
+    told(caught.value, "healthy_0", "min_frequency_hz, max_frequency_hz", "piston frequency")
+
+
+def test_a_table_may_begin_at_0_hz(tmp_path):
+    """No wave has that frequency: its row is left out, and the others are as they are."""
+
+    def impedance(content):
+        content["recordings"][0] = {"file": "z.csv", "kind": "input_impedance", "state": "healthy"}
+
+    spoilt(tmp_path, impedance, pressure=None)
+    (tmp_path / "z.csv").write_text("frequency_hz,re,im\n0,1e9,0\n10,1e9,1e9\n20,1e9,2e9\n")
+    case = load_case(tmp_path)
+    observed = observe(case.recordings[0], case.rig)
+    assert observed.frequency_hz.tolist() == [10.0, 20.0]
+    assert observed.values.tolist() == [[1e9 + 1e9j, 1e9 + 2e9j]]
+
+
 @pytest.mark.parametrize(
     ("diameter", "top", "warned"), [(0.02, None, False), (0.14, None, True), (0.14, 4000.0, False)]
 )

@@ -9,6 +9,7 @@ from snakemake.utils import validate
 from config_errors import (
     check_config,
     check_datasets,
+    check_load_pressures,
     check_names,
     check_severity,
     read_rig,
@@ -157,6 +158,15 @@ def test_every_fault_of_a_sheet_has_a_line(case):
 def test_a_case_that_is_not_there_is_named(tmp_path):
     """A misspelt folder: the path that was looked for."""
     assert "nowhere" in message(read_rig, str(tmp_path / "nowhere"))
+
+
+def test_a_recording_that_faults_are_simulated_for_needs_its_load_pressure():
+    """A sheet may leave the pressure out where the load is unknown; a simulated fault cannot."""
+    entries = yaml.safe_load(RIG)["recordings"]
+    check_load_pressures(entries)
+    del entries[0]["load_pressure"]
+    text = message(check_load_pressures, entries)
+    assert f"{entries[0]['file']}: load_pressure: missing" in text and "\n" not in text
 
 
 def test_a_sheet_in_order_is_read(case):

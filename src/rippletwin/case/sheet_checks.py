@@ -83,11 +83,13 @@ def _sensor_errors(path: Path, sheet: dict) -> Iterator[InputError]:
 def _recording_errors(path: Path, sheet: dict) -> Iterator[InputError]:
     names = [sensor.get("name") for sensor in entries(sheet, "sensors")]
     load_kind = mapping(sheet, "load").get("kind")
+    geometry = bool(set(mapping(sheet, "pump")) - {"pistons"})
     reported: set[tuple[str, bool]] = set()
     for index, entry in enumerate(entries(sheet, "recordings")):
         field = f"recordings[{index}]"
         kind = entry.get("kind", "periodic")
-        for key, why in _needed(kind, load_kind):
+        simulated = geometry and "flow_ripple" not in entry
+        for key, why in _needed(kind, load_kind, simulated):
             whole = key in ("pump", "sensors")
             if (sheet.get(key) if whole else key in entry) or (key, whole) in reported:
                 continue
@@ -123,8 +125,9 @@ def _channel_errors(path: Path, field: str, channels: dict, names: list) -> Iter
             first[channel] = sensor
 
 
-def _needed(kind: object, load_kind: object) -> list[tuple[str, str]]:
-    """Keys that a kind of recording needs, and why."""
+def _needed(kind: object, load_kind: object, simulated: bool) -> list[tuple[str, str]]:
+    """Keys that a kind of recording needs, and why; `simulated` where the pump's geometry stands
+    for a flow ripple."""
     if kind == "periodic":
         needed = [
             ("pump", "The number of pistons of a periodic recording must be known"),
@@ -133,6 +136,9 @@ def _needed(kind: object, load_kind: object) -> list[tuple[str, str]]:
         ]
         if load_kind == "orifice":
             needed.append(("load_pressure", "The orifice's law needs the mean load pressure"))
+        elif simulated:
+            why = "The pump is simulated against the mean load pressure"
+            needed.append(("load_pressure", why))
         return needed
     known = kind in ("random", "spectrum")
     return [("sensors", f"A {kind} recording needs sensors")] if known else []
