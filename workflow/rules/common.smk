@@ -53,6 +53,7 @@ CASE = os.path.dirname(RIG)
 HAS_PERIODIC = RECORDED_HERE or case_parts.has_periodic(SHEET)
 DIAGNOSED_HERE = RECORDED_HERE or case_parts.is_diagnosed(SHEET)
 SCORED_HERE = RECORDED_HERE or case_parts.is_scored(SHEET)
+HAS_KNOWN = RECORDED_HERE or case_parts.has_known(SHEET)
 HAS_UNKNOWN = not RECORDED_HERE and bool(case_parts.recordings_for(SHEET, "unknown"))
 
 RIG_SECTIONS = ("fluid", "pump", "line", "sensors", "load", "uncertainty")

@@ -15,7 +15,8 @@ from rippletwin.case.readers.registry import FOLDERS
 from rippletwin.case.sheet_values import entries, line_length, mapping, number
 from rippletwin.errors import InputError, printable
 
-LONGEST_LABEL = 100
+LONGEST_LABEL = 200  # bytes; a file's name has 255, and a label is the middle of it
+LONGEST_FILE_NAME = 255  # bytes
 FORBIDDEN_IN_LABELS = "/\\"  # labels name files of results
 DATA_FOLDERS = "RIPPLETWIN_DATA"  # environment variable: folders besides a case's to read from
 SAME_PLACE = 1e-3  # m; closer together two sensors are one
@@ -159,13 +160,21 @@ def _label_errors(path: Path, sheet: dict) -> Iterator[InputError]:
             label = Path(file).stem
         field = f"recordings[{index}].label"
         bad = any(c in FORBIDDEN_IN_LABELS or not c.isprintable() for c in label)
-        if given and (bad or not label.strip(" .") or len(label) > LONGEST_LABEL):
+        size = len(label.encode(errors="replace"))
+        if given and (bad or not label.strip(" .") or size > LONGEST_LABEL):
             yield InputError(
                 path,
                 field,
                 f"{printable(label, 50)!r} cannot be part of a file's name",
-                f"Give up to {LONGEST_LABEL} characters without / and \\",
+                f"Give up to {LONGEST_LABEL} bytes (letters beyond a to z have two or more) "
+                "without / and \\",
             )
+        # a longer name is no file's, which is told where files are looked for
+        exists = not given and len(Path(file).name.encode(errors="replace")) <= LONGEST_FILE_NAME
+        if exists and size > LONGEST_LABEL:
+            problem = f"missing, and the file's name, {size} bytes, is too long to be one"
+            remedy = f"Give the recording a label of up to {LONGEST_LABEL} bytes"
+            yield InputError(path, field, problem, remedy)
         if label in first:
             source = "" if given else " (the file's name, as there is no label)"
             yield InputError(
