@@ -89,7 +89,7 @@ def test_missing_file(tmp_path, key):
 
 
 def test_missing_repeat(tmp_path):
-    spoilt(tmp_path, lambda c: c["recordings"][0].update(repeats=["nowhere.csv"]))
+    spectrum_case(tmp_path, "100 1 2 3 4\n", repeats=["nowhere.csv"])
     refused(tmp_path, "rig.yaml", "recordings[0].repeats[0]", "nowhere.csv")
 
 
@@ -128,6 +128,37 @@ def test_random_recording_of_one_sensor(tmp_path):
 
     spoilt(tmp_path, spoil, ripple()[:1])
     refused(tmp_path, "rig.yaml", "sensors", "two or more")
+
+
+@pytest.mark.parametrize(
+    ("kind", "key", "value"),
+    [
+        ("periodic", "repeats", ["again.h5"]),
+        ("random", "relative_error", 0.05),
+        ("spectrum", "channels", {"p1": 2, "p2": 1}),
+        ("input_impedance", "unit", "bar"),
+        ("input_impedance", "scale", 1000.0),
+    ],
+)
+def test_key_that_means_nothing_for_a_kind(tmp_path, kind, key, value):
+    """It would be ignored without a word; the unit of a table would be wrong by 1e5."""
+
+    def spoil(content):
+        content["recordings"][0] |= {"kind": kind, key: value}
+
+    spoilt(tmp_path, spoil)
+    (tmp_path / "again.h5").touch()
+    words = f"means nothing for a recording of kind {kind}"
+    refused(tmp_path, "rig.yaml", f"recordings[0].{key}", words)
+
+
+def test_file_name_that_is_too_long_to_be_a_label(tmp_path):
+    """Results of a recording without a label are called after its file, with more words around."""
+    name = 70 * "\u2248" + ".h5"
+    spoilt(tmp_path, lambda c: c["recordings"][0].update(file=name))
+    refused(tmp_path, "rig.yaml", "recordings[0].label", "210 bytes", "Give the recording a label")
+    spoilt(tmp_path, lambda c: c["recordings"][0].update(file=name, label="short"))
+    assert load_case(tmp_path).recordings[0].label == "short"
 
 
 def test_load_impedance_without_its_file(tmp_path):

@@ -40,6 +40,11 @@ ERRORS = {
     "sensor position in mm": ("sensors[1].position", 2590, ["2590 mm would be 2.59 m"]),
     "two sensors at one place": ("sensors[1].position", 0.4205, ["where p1 is too"]),
     "label that leaves the folder": ("recordings[0].label", "../../x", ["part of a file's name"]),
+    "label of 100 letters of three bytes": (
+        "recordings[0].label",
+        100 * "\u2248",
+        ["up to 200 bytes"],
+    ),
     "label without a letter": ("recordings[0].label", " ", ["part of a file's name"]),
 }
 
@@ -57,7 +62,13 @@ def put(content, field, value):
 def test_value_in_a_wrong_unit(tmp_path, name):
     """One value of a good sheet is spoilt; the error names it and says what it looks like."""
     field, value, words = ERRORS[name]
-    spoilt(tmp_path, lambda c: put(c, field, value))
+
+    def spoil(content):
+        put(content, field, value)
+        if "relative_error" in field:
+            put(content, "recordings[0].kind", "spectrum")
+
+    spoilt(tmp_path, spoil)
     refused(tmp_path, "rig.yaml", field, *words)
 
 

@@ -21,6 +21,28 @@ FORBIDDEN_IN_LABELS = "/\\"  # labels name files of results
 DATA_FOLDERS = "RIPPLETWIN_DATA"  # environment variable: folders besides a case's to read from
 SAME_PLACE = 1e-3  # m; closer together two sensors are one
 
+_OF_SIGNALS = (
+    "dataset", "orientation", "channels", "time", "sampling_rate_name", "sampling_rate_hz", "unit",
+    "scale",
+)  # fmt: skip
+_OF_TABLES = ("repeats", "relative_error", "normalised")
+UNUSED = {
+    "periodic": _OF_TABLES,
+    "random": _OF_TABLES,
+    "spectrum": _OF_SIGNALS,
+    "input_impedance": _OF_SIGNALS,
+}
+"""Keys that mean nothing for a kind of recording."""
+HARMLESS = {"unit": "Pa", "scale": 1}
+"""Values of such keys that say what is so in any case."""
+UNUSED_REMEDY = {
+    "periodic": "Take it out of rig.yaml; it belongs to spectrum and input_impedance",
+    "random": "Take it out of rig.yaml; it belongs to spectrum and input_impedance",
+    "spectrum": "Take it out of rig.yaml; the table has columns frequency_hz,p1_re,p1_im,... in Pa",
+    "input_impedance": "Take it out of rig.yaml; the table has columns frequency_hz,re,im in "
+    "Pa s/m3, or normalised: true",
+}
+
 
 def sheet_errors(path: Path, sheet: dict) -> list[InputError]:
     """Every fault of a sheet that concerns several of its values."""
@@ -97,6 +119,10 @@ def _recording_errors(path: Path, sheet: dict) -> Iterator[InputError]:
             if whole:  # once for all recordings
                 reported.add((key, whole))
             yield InputError(path, key if whole else f"{field}.{key}", "missing", f"{why}; give it")
+        for key in UNUSED.get(kind, ()) if isinstance(kind, str) else ():
+            if key in entry and entry[key] != HARMLESS.get(key):
+                problem = f"means nothing for a recording of kind {kind}"
+                yield InputError(path, f"{field}.{key}", problem, UNUSED_REMEDY[kind])
         yield from _channel_errors(path, field, mapping(entry, "channels"), names)
         low, high = number(entry, "min_frequency_hz"), number(entry, "max_frequency_hz")
         if low is not None and high is not None and low >= high:
@@ -111,18 +137,19 @@ def _recording_errors(path: Path, sheet: dict) -> Iterator[InputError]:
 
 def _channel_errors(path: Path, field: str, channels: dict, names: list) -> Iterator[InputError]:
     """Channels of what is no sensor, and channels that two sensors share."""
-    first: dict[object, object] = {}
+    # a sensor without a channel in the sheet has that of its own name
+    first: dict[object, object] = {s: s for s in names if isinstance(s, str) and s not in channels}
     for sensor, channel in channels.items():
         if sensor not in names:
             near = difflib.get_close_matches(str(sensor), [n for n in names if isinstance(n, str)])
             hint = f"Did you mean {near[0]}? " if near else ""
             remedy = f"{hint}Each key of channels is the name of a sensor of rig.yaml"
             yield InputError(path, f"{field}.channels.{sensor}", "no such sensor", remedy)
-        elif isinstance(channel, (int, str)) and channel in first:
+        elif isinstance(channel, (int, float, str)) and channel in first:
             problem = f"{channel} is the channel of {first[channel]} too"
             remedy = "Give each sensor its own channel"
             yield InputError(path, f"{field}.channels.{sensor}", problem, remedy)
-        elif isinstance(channel, (int, str)):
+        elif isinstance(channel, (int, float, str)):
             first[channel] = sensor
 
 
