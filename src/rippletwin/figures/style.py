@@ -49,6 +49,11 @@ def figure(rows: int = 1, columns: int = 1, height: float = 2.2, **kwargs):
     return fig, fig.subplots(rows, columns, squeeze=False, **kwargs)
 
 
+def plain(text: str) -> str:
+    """A name that a user gave, drawn as it is: between two $ matplotlib would read mathematics."""
+    return text.replace("$", r"\$")
+
+
 def legend_below(fig: Figure, ax) -> None:
     """One legend for the whole figure, of the labels of `ax`, below everything else."""
     handles, labels = ax.get_legend_handles_labels()
