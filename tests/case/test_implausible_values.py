@@ -5,6 +5,8 @@ import pytest
 
 from case_folders import refused, sheet, spoilt, write_case
 from rippletwin.case.load import load_case
+from rippletwin.case.plausibility import PORT_OVERLAP_DEG
+from rippletwin.pump.geometry import Geometry
 
 ERRORS = {
     "length in mm": ("line.segments[0].length", 5950, ["looks like mm (5.95 m)", "Give m, not mm"]),
@@ -33,6 +35,9 @@ ERRORS = {
     "relative error in per cent": ("recordings[0].relative_error", 2, ["per cent (0.02)"]),
     "piston in mm": ("pump.piston_diameter", 17, ["mm (0.017 m)"]),
     "pitch radius in mm": ("pump.pitch_radius", 33.5, ["mm (0.0335 m)"]),
+    "swash angle in rad": ("pump.swash_angle_deg", 0.26, ["rad (14.9 deg)", "Give deg, not rad"]),
+    "port opening in rad": ("pump.port_opening_deg", 0.5, ["rad (28.65 deg)"]),
+    "ports that never close": ("pump.port_opening_deg", 180, ["port_overlap_deg 5, its default"]),
     "dead volume in cm3": ("pump.dead_volume", 3.5, ["cm3 (3.5e-06 m3)"]),
     "bulk modulus in bar": ("pump.bulk_modulus", 14000, ["bar (1.4e+09 Pa)"]),
     "bulk modulus in GPa": ("pump.bulk_modulus", 1.4, ["GPa (1.4e+09 Pa)"]),
@@ -70,6 +75,11 @@ def test_value_in_a_wrong_unit(tmp_path, name):
 
     spoilt(tmp_path, spoil)
     refused(tmp_path, "rig.yaml", field, *words)
+
+
+def test_the_default_overlap_is_the_pump_s():
+    """The check of a sheet without port_overlap_deg uses what the simulated pump has."""
+    assert Geometry().port_overlap_deg == PORT_OVERLAP_DEG
 
 
 WARNINGS = {

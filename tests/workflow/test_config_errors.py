@@ -40,6 +40,11 @@ def message(call, *arguments) -> str:
         ({"colour": "blue"}, "unknown key colour. Known here: results, case"),
         ({"sst": DEFAULTS["sst"] | {"sise": 8}}, "unknown key sst.sise. Did you mean size?"),
         ({"seeds": 0}, "seeds: 0: below 1"),
+        ({"sst": DEFAULTS["sst"] | {"size": 10}}, "sst.size: 10: below 11"),
+        (
+            {"windows": DEFAULTS["windows"] | {"samples_per_revolution": 1535}},
+            "windows.samples_per_revolution: 1535: below 1536",
+        ),
         ({"noise": {"factor": "much"}}, "noise.factor: much: not of type number"),
         ({"noise": {}}, "missing noise.factor"),
         ({"scoring": {"pressure": "C3", "flow": "C2"}}, "C3: not one of C1, C2"),
