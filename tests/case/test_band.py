@@ -99,3 +99,23 @@ def test_a_warning_above_the_plane_wave_limit(tmp_path, diameter, top, warned):
     warnings = [w for w in load_case(tmp_path).warnings if "travel too" in w]
     assert bool(warned) == bool(warnings)
     assert not warned or ("healthy_0" in warnings[0] and "segment 2" in warnings[0])
+
+
+def test_a_band_wider_than_the_data_is_told_as_what_is_used(tmp_path):
+    """max_frequency_hz may lie above all that was recorded: at 51.2 kHz nothing above 20.48 kHz is
+    used, of a table nothing above its last row."""
+
+    def widen(content):
+        content["line"]["segments"][1]["diameter"] = 0.14
+        content["recordings"][0]["max_frequency_hz"] = 1e5
+
+    def table(content):
+        widen(content)
+        del content["recordings"][0]["load_pressure"], content["recordings"][0]["speed_rpm"]
+        content["recordings"][0] |= {"kind": "input_impedance", "file": "z.csv"}
+
+    spoilt(tmp_path, widen)
+    assert "used up to 2.048e+04 Hz" in " ".join(load_case(tmp_path).warnings)
+    spoilt(tmp_path, table, pressure=None)
+    (tmp_path / "z.csv").write_text("frequency_hz,re,im\n10,1e9,1e9\n6000,1e9,2e9\n")
+    assert "used up to 6000 Hz" in " ".join(load_case(tmp_path).warnings)

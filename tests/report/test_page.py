@@ -20,7 +20,7 @@ from rippletwin.report.page import render, write_report
 from rippletwin.report.results import read_results
 from rippletwin.report.tables import Cell, Table
 from rippletwin.report.verdict_words import remaining_sentences
-from rippletwin.report.workflow_tables import describe_dataset
+from rippletwin.report.workflow_tables import answer_table, describe_dataset
 from rippletwin.twin import twin_file
 from rippletwin.twin.twin import Twin
 
@@ -308,6 +308,14 @@ def test_a_dataset_is_named_in_words():
     assert describe_dataset("CFD-MOC-PR", datasets) == said
     assert describe_dataset("experimental", datasets) == "recordings of all states (experimental)"
     assert describe_dataset("mine", datasets) == "mine"
+
+
+def test_what_networks_say_is_told_in_words():
+    """Not in the identifiers of networks.json."""
+    said = {"share": 0.9, "unlike": 0.1}
+    answers = {"new": {"a": said | {"state": "slipper"}, "b": said | {"state": "unlike"}}}
+    states = [row[2].text for row in answer_table(answers).rows]
+    assert states == ["worn slipper", "unlike everything that was tried"]
 
 
 def test_workflow_parts_are_shown(folder):

@@ -15,7 +15,7 @@ from rippletwin.case.readers.file_checks import check_size
 from rippletwin.case.readers.signals import numbers
 from rippletwin.errors import InputError, raise_any
 
-SENSORS_BY_SAMPLES, SAMPLES_BY_SENSORS = "sensors_by_samples", "samples_by_sensors"
+SAMPLES_BY_SENSORS = "samples_by_sensors"
 
 KEYS = {"rate": "sampling_rate_name"}
 """Keys of rig.yaml that are called otherwise than the fields of a layout."""
