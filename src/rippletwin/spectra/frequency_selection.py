@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from rippletwin.errors import InputError
+
 FREQUENCIES_PER_RESONANCE = 12  # of the line, whose resonances are 1/(2 delay) apart
 
 
@@ -16,6 +18,8 @@ def select_fitted_frequencies(observations: Sequence, rig, highest_hz: float | N
     Of a periodic recording the piston orders of its band, the only ones of a healthy nominal pump.
     Of a dense spectrum FREQUENCIES_PER_RESONANCE: the error of a model has the bandwidth of the
     line's resonances, so that closer points are no further evidence.
+
+    Raises InputError where nothing of an observation is left.
     """
     spacing = 1.0 / (2.0 * FREQUENCIES_PER_RESONANCE * rig.delay)
     prepared = []
@@ -33,6 +37,14 @@ def select_fitted_frequencies(observations: Sequence, rig, highest_hz: float | N
                     )
                 )
             ] = True
+        if not np.any(keep):
+            raise InputError(
+                o.label,
+                "min_frequency_hz, max_frequency_hz",
+                "no frequency that is fitted is between them (of a pump: multiples of its piston "
+                "frequency)",
+                "Give a wider band",
+            )
         prepared.append(select_frequencies(o, keep))
     return prepared
 

@@ -91,7 +91,8 @@ def observe(
     else:
         observation = _observe_spectra(recording, rig, max_frequency_hz)
     low = recording.min_frequency_hz or 0.0
-    kept = observation.frequency_hz >= low
+    # a table may begin at 0 Hz, where no wave is
+    kept = (observation.frequency_hz >= low) & (observation.frequency_hz > 0.0)
     _check_any(recording, kept)
     observation = replace(observation, min_frequency_hz=low)
     together = observation.orders is not None and not piston_harmonics_only
