@@ -1,5 +1,7 @@
 """The band of a recording that is fitted, and the warning where plane waves are not alone."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -10,7 +12,7 @@ from rippletwin.case.band import FIRST_CROSS_MODE, plane_wave_limit
 from rippletwin.case.load import load_case
 from rippletwin.case.model import Fluid, Load, Rig, Segment
 from rippletwin.errors import InputError
-from rippletwin.spectra.frequency_selection import select_fitted_frequencies
+from rippletwin.spectra.frequency_selection import check_sources, select_fitted_frequencies
 from rippletwin.spectra.observation import observe
 
 
@@ -119,3 +121,18 @@ def test_a_band_wider_than_the_data_is_told_as_what_is_used(tmp_path):
     spoilt(tmp_path, table, pressure=None)
     (tmp_path / "z.csv").write_text("frequency_hz,re,im\n10,1e9,1e9\n6000,1e9,2e9\n")
     assert "used up to 6000 Hz" in " ".join(load_case(tmp_path).warnings)
+
+
+def test_one_sensor_beside_an_unknown_source_is_bad_input():
+    """Any line makes any reading of one sensor, if the source may be anything: calibration says so.
+    With a second sensor, or a source that is known, it does not."""
+    one, two = (
+        SimpleNamespace(label="noise", source="free", values=np.ones((count, 3), complex))
+        for count in (1, 2)
+    )
+    with pytest.raises(InputError) as caught:
+        check_sources([one])
+    told(caught.value, "noise", "sensors", "nothing tells the line")
+    check_sources([one, two])
+    one.source = "nominal"
+    check_sources([one])
