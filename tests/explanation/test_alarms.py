@@ -167,7 +167,7 @@ def test_the_misfit_alarm_is_what_the_best_correction_adds(monkeypatch):
     monkeypatch.setattr(rules, "SmoothCorrections", Corrections)
     monkeypatch.setattr(rules, "elements_of", lambda rig, observations: ["listed"])
     rig = SimpleNamespace(tolerance_scale=1.0)
-    base = SimpleNamespace(twin=SimpleNamespace(rig=rig, parameters=(), theta=()))
+    base = SimpleNamespace(twin=SimpleNamespace(rig=rig, parameters=(), theta=(), effects=()))
     assert read_alarms(base, [], [], [], [], 0.0).misfit == 30.0
 
 

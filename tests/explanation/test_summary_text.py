@@ -35,7 +35,8 @@ def summarise(
     **decision,
 ):
     """The sentence of a verdict without effects in the line; its misfits are 2 %."""
-    twin = SimpleNamespace(parameters=(), theta=(), rig=SimpleNamespace(tolerance_scale=1.0))
+    sheet = SimpleNamespace(tolerance_scale=1.0)
+    twin = SimpleNamespace(parameters=(), theta=(), effects=(), rig=sheet)
     e = SimpleNamespace(
         shaft_orders=shaft_orders,
         alarms=SimpleNamespace(raised=raised, pull=pull, drift=(1e-9, "recording 1")),
@@ -234,7 +235,8 @@ def explained(
         value=1.6, nominal=1.8, unit="m", pull=10.0, rivals=True,
     )  # fmt: skip
     load = {**vars(rival), "parameter": "load", "value": 0.395, "nominal": 1.0, "unit": ""}
-    twin = SimpleNamespace(parameters=(), theta=(), rig=SimpleNamespace(tolerance_scale=1.0))
+    sheet = SimpleNamespace(tolerance_scale=1.0)
+    twin = SimpleNamespace(parameters=(), theta=(), effects=(), rig=sheet)
     e = SimpleNamespace(
         rig=rig,
         shaft_orders=None,
