@@ -101,9 +101,7 @@ def is_place_right(rig, truth, e) -> bool | None:
             continue
         place, values = own[name]
         if "position" in values:
-            low, high = element_and_extent(
-                rig, entry["effect"], entry["place"], entry["parameters"]
-            )[1]
+            low, high = element_and_extent(rig, entry["place"], entry["parameters"])[1]
             results.append(low - 0.25 <= float(values["position"]) <= high + 0.25)
         else:
             results.append(place.element == entry["place"].element)

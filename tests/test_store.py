@@ -113,7 +113,6 @@ WRITERS = {"write_text", "write_bytes", "to_csv", "savefig", "savemat", "savez",
 WHOLE = ("store", "scratch")  # names through which a file is whole or absent
 NOT_RESULTS = {
     "job.py",  # a job's log
-    "new_sheet.py",  # a sheet to fill in, never written over one that is there
 }
 
 

@@ -63,6 +63,11 @@ def is_scored(sheet: dict) -> bool:
     return any(e["state"] != "healthy" for e in _known(recordings_for(sheet, "reference")))
 
 
+def has_known(sheet: dict) -> bool:
+    """Whether a recording of known state is at the diagnosed point, to compare simulations with."""
+    return bool(_known(recordings_for(sheet, "reference")))
+
+
 def _known(entries: list[dict]) -> list[dict]:
     return [entry for entry in entries if entry["state"] != "unknown"]
 

@@ -69,6 +69,19 @@ def check_severity(faults: dict) -> None:
         )
 
 
+def check_load_pressures(entries: Sequence[dict]) -> None:
+    """Raise WorkflowError with a line for each recording, an entry of rig.yaml, without a load
+    pressure: faults are simulated against it."""
+    lines = [
+        f"config: case: rig.yaml: {entry['file']}: load_pressure: missing. Faults are simulated "
+        "against the mean load pressure; give it"
+        for entry in entries
+        if "load_pressure" not in entry
+    ]
+    if lines:
+        raise WorkflowError("\n".join(lines))
+
+
 def read_rig(case: str) -> tuple[str, dict]:
     """Path and content of the rig.yaml of the configured case, a folder or that file.
 

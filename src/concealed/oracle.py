@@ -13,8 +13,9 @@ from rippletwin.calibration.shaft_angles import align_shaft_angles
 from rippletwin.case.load import load_case
 from rippletwin.explanation.fit_jobs import Continuation, FitJob, FromTheta, Workers
 from rippletwin.explanation.fit_starts import transfer_theta
-from rippletwin.explanation.search.stepwise_search import applicable_candidates
+from rippletwin.explanation.search.stepwise_search import SHAFT_ORDER_EFFECTS
 from rippletwin.explanation.stages.preparation import observe_whole_and_halves, prepare_base
+from rippletwin.twin.effects.library import candidates
 from rippletwin.twin.parameters import coordinates
 from rippletwin.twin.twin import Twin
 
@@ -48,7 +49,8 @@ def log_evidence_of_effects(
     search that finds nothing has failed. None where an effect is not in the library or acts at
     shaft orders alone.
     """
-    pool, library = Workers(base, observations), applicable_candidates(base.rig, observations)
+    pool = Workers(base, observations)
+    library = [c for c in candidates(base.rig) if c[0].name not in SHAFT_ORDER_EFFECTS]
     choices = [
         [c for c in library if (c[0].name, c[1].element) == (true["name"], true["element"])]
         for true in effects

@@ -37,10 +37,9 @@ def score_case(
         wrong            named effects that count for no true effect, nor for nuisance physics that
                          is there, as text
         places_right     for each found effect, whether its place is right
-        where_right      whether the verdict's `where` is the place of a true effect
         intervals_hold   for each interval of a right effect, whether it holds the true value
         probabilities    pairs (stated probability, right) of the named effects that state one
-        log_evidence     of each named effect, None where the verdict gives none
+        established      of each named effect, whether it is there
         misfit_nominal   relative, of the whole data, with nominal values
         misfit_calibrated, misfit_corrected   the same before and after, as the verdict states it
         absorbed         1 - misfit_calibrated/misfit_nominal, the share that calibration absorbs
@@ -62,7 +61,6 @@ def score_case(
     ]
     right = [any(claim is each for each in [*claims, *there]) for claim in named]
     wrong = [claim["name"] for claim, ok in zip(named, right) if not ok]
-    log_evidence = {each["effect"]: each["evidence"] for each in verdict["without"]}
     fit = verdict["fit"]
     nominal, calibrated = baselines["nominal"], fit["before"]["in_sample"]
     return {
@@ -84,14 +82,13 @@ def score_case(
         "right": bool(true) and len(found) == len(true),
         "wrong": " + ".join(wrong),
         "places_right": [is_place_right(*pair, truth["length"]) for pair in found],
-        "where_right": is_where_right(true, verdict, truth["length"]),
         "intervals_hold": [inside for pair in found for inside in intervals_hold(*pair)],
         "probabilities": [
             (claim["probability"], ok)
             for claim, ok in zip(named, right)
             if claim.get("probability") is not None
         ],
-        "log_evidence": [log_evidence.get(claim["name"]) for claim in named],
+        "established": right,
         "misfit_nominal": nominal,
         "misfit_calibrated": calibrated,
         "misfit_corrected": fit["after"]["in_sample"],
@@ -154,23 +151,6 @@ def is_place_right(effect: dict, claim: dict, length: float) -> bool:
     return claim["element"] == effect["element"]
 
 
-def is_where_right(true: list[dict], verdict: dict, length: float) -> bool:
-    """Whether the verdict's `where` is the place of any true effect."""
-    where = verdict["mismatch"]["where"]
-    if where is None:
-        return False
-    for effect in true:
-        if effect["position"] is None:
-            if where["element"] == effect["element"]:
-                return True
-        elif where["element"] == f"segment {effect['segment']}" or (
-            where["element"].startswith("between")
-            and _holds_position(effect, where["position_m"], length)
-        ):
-            return True
-    return False
-
-
 def _holds_position(effect: dict, interval: Sequence[float], length: float) -> bool:
     """Whether the widened interval holds the actual or the nominal position.
 
@@ -216,16 +196,13 @@ def line_errors(true: list[dict], rows: list[dict]) -> list[dict]:
 def score_baseline(true: list[dict], picked: dict | None, classes: list[list[str]]) -> dict:
     """Score of a method that picks one effect or none.
 
-    `alarm` whether it picks one, `right` whether that is a true one, `place` whether its element is
-    right too, `named` the pick as text.
+    `alarm` whether it picks one, `right` whether that is a true one, `named` the pick as text.
     """
     if picked is None:
-        return {"alarm": False, "right": False, "place": False, "named": ""}
+        return {"alarm": False, "right": False, "named": ""}
     sets = [set(names) for names in classes]
-    right = [effect for effect in true if same_or_equivalent(picked["name"], effect["name"], sets)]
     return {
         "alarm": True,
-        "right": bool(right),
-        "place": any(picked["element"] == effect["element"] for effect in right),
+        "right": any(same_or_equivalent(picked["name"], effect["name"], sets) for effect in true),
         "named": f"{picked['name']} ({picked['element']})",
     }

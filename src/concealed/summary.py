@@ -83,7 +83,7 @@ def score_table(rows: list[dict]) -> list[Score]:
     large = cases("single", where=lambda row: row["change"] >= LARGE_CHANGE)
     return [
         Score("Established effects: truly there", "at least 97 %",
-              rate_of(there for row in rows for there in _established(row))),
+              rate_of(there for row in rows for there in row["established"])),
         Score("No effect, nominal values within tolerance: established, not there", "at most 2 %",
               rate_of(bool(row["wrong"]) for row in cases("none"))),
         Score("No effect, nominal values 2 to 3 standard deviations off: established, not there",
@@ -121,12 +121,6 @@ def score_table(rows: list[dict]) -> list[Score]:
         Score("Delays and impedances, corrected: within two stated standard deviations",
               "at least 95 %", rate_of(abs(z) < 2 for z in deviations)),
     ]  # fmt: skip
-
-
-def _established(row: dict) -> list[bool]:
-    """For each effect that a verdict establishes, whether it is there; in no order."""
-    wrong = len(row["wrong"].split(" + ")) if row["wrong"] else 0
-    return [True] * (len(row["log_evidence"]) - wrong) + [False] * wrong
 
 
 def data_support_effects(row: dict) -> bool:

@@ -29,6 +29,7 @@ class DetectionCurve(NamedTuple):
     slope: float
 
     def probability(self, severity: np.ndarray) -> np.ndarray:
+        """Probability of detection (N,) at severities (N,)."""
         return expit(self.slope * (np.log10(severity) - self.middle))
 
     def severity(self, probability: float) -> float:
@@ -37,10 +38,20 @@ class DetectionCurve(NamedTuple):
 
 
 class Leaks(NamedTuple):
-    """Recordings of one fault: the ripple's relative change (N,), which raise the alarm (N,)."""
+    """Recordings of one fault: their rows, and which of them (N,) raise the alarm."""
 
-    change: np.ndarray
+    rows: list[dict]
     hit: np.ndarray
+
+    @property
+    def change(self) -> np.ndarray:
+        """The ripple's relative change (N,)."""
+        return np.array([row["change"] for row in self.rows])
+
+    @property
+    def shown(self) -> np.ndarray:
+        """The same (N,) as it is drawn: LEAST_CHANGE at least."""
+        return np.maximum(self.change, LEAST_CHANGE)
 
 
 def detect_leaks(rows: Sequence[dict], state: str) -> Leaks:
@@ -49,10 +60,7 @@ def detect_leaks(rows: Sequence[dict], state: str) -> Leaks:
     healthy = [row["suspicion"] for row in rows if row["state"] == "healthy"]
     threshold = alarm_threshold(healthy) if healthy else np.inf
     chosen = [row for row in rows if row["state"] == state]
-    return Leaks(
-        np.array([max(row["change"], LEAST_CHANGE) for row in chosen]),
-        np.array([row["suspicion"] > threshold for row in chosen], bool),
-    )
+    return Leaks(chosen, np.array([row["suspicion"] > threshold for row in chosen], bool))
 
 
 class BinShare(NamedTuple):
@@ -73,10 +81,10 @@ def shares_in_bins(severity: np.ndarray, hit: np.ndarray) -> list[BinShare]:
     ]
 
 
-def alarm_threshold(healthy: Sequence[float], share: float = FALSE_ALARMS) -> float:
-    """The least suspicion above which lies at most this share of the healthy recordings'."""
+def alarm_threshold(healthy: Sequence[float]) -> float:
+    """The least suspicion above which at most FALSE_ALARMS of the healthy recordings are."""
     ordered = np.sort(np.asarray(healthy, float))[::-1]
-    return float(ordered[int(share * len(ordered))])
+    return float(ordered[int(FALSE_ALARMS * len(ordered))])
 
 
 def fit_curve(
@@ -102,7 +110,7 @@ def fit_curve(
     if start is not None:
         starts = [(start.middle, np.log(start.slope))]
     best = min(
-        (minimize(minus_log_posterior, start, method="Nelder-Mead") for start in starts),
+        (minimize(minus_log_posterior, each, method="Nelder-Mead") for each in starts),
         key=lambda result: result.fun,
     )
     return DetectionCurve(float(best.x[0]), float(np.exp(best.x[1])))

@@ -22,7 +22,7 @@ from rippletwin.figures import style
 LOOK = {"slipper": (style.CALIBRATED, "o"), "cylinder": (style.ALARM, "s")}
 
 
-def draw_figures(rows: list[dict], folder: str | Path, suffix: str = ".png") -> list[Path]:
+def draw_figures(rows: list[dict], folder: str | Path) -> list[Path]:
     """Write every figure of the scored recordings into `folder`; returns their paths."""
     columns = columns_of(rows)
     figures = {"detection": draw_detection(columns)}
@@ -31,7 +31,7 @@ def draw_figures(rows: list[dict], folder: str | Path, suffix: str = ".png") -> 
         figures[file_name("severities", name)] = draw_severities(chosen)
     paths = []
     for name, figure in figures.items():
-        paths.append(Path(folder) / f"{name}{suffix}")
+        paths.append(Path(folder) / f"{name}.png")
         style.save(figure, paths[-1])
     return paths
 
@@ -47,7 +47,7 @@ def draw_detection(columns: dict[str, list[dict]]) -> Figure:
     fig, axes = style.figure(1, len(SINGLE), height=2.8, sharey=True)
     for ax, state in zip(axes[0], SINGLE, strict=True):
         for k, (column, rows) in enumerate(columns.items()):
-            _draw_curve(ax, *detection.detect_leaks(rows, state), column, k)
+            _draw_curve(ax, detection.detect_leaks(rows, state), column, k)
         ax.set_xlabel(f"relative change of the ripple by a {state}'s leak")
     axes[0, 0].set_ylabel("probability of detection")
     axes[0, 0].set_ylim(-0.12, 1.12)
@@ -56,17 +56,18 @@ def draw_detection(columns: dict[str, list[dict]]) -> Figure:
     return fig
 
 
-def _draw_curve(ax, severity, hit, label: str, rank: int) -> None:
+def _draw_curve(ax, leaks: detection.Leaks, label: str, rank: int) -> None:
     """The detection curve of a column, and shares in bins with exact intervals."""
     ax.set_xscale("log")
-    if not len(severity):
+    shown = leaks.shown
+    if not len(shown):
         return
     colour, marker, dash = f"C{rank}", "osD^vP*X"[rank % 8], ("-", "--", ":")[rank % 3]
-    curve = detection.fit_curve(severity, hit)
+    curve = detection.fit_curve(leaks.change, leaks.hit)
     if curve is not None:
-        grid = np.geomspace(severity.min(), severity.max(), 200)
+        grid = np.geomspace(shown.min(), shown.max(), 200)
         ax.plot(grid, curve.probability(grid), dash, color=colour)
-    for k, (middle, rate) in enumerate(detection.shares_in_bins(severity, hit)):
+    for k, (middle, rate) in enumerate(detection.shares_in_bins(shown, leaks.hit)):
         low, high = rate.interval
         x = middle * np.exp(0.03 * rank)  # intervals beside each other
         spread = [[rate.share - low], [high - rate.share]]
@@ -95,8 +96,13 @@ def draw_confusion(rows: list[dict]) -> Figure:
 def draw_severities(rows: list[dict]) -> Figure:
     """Stated against true leak areas with 95 % intervals; share right by stated probability."""
     fig, axes = style.figure(1, 2, height=2.9)
-    ax = axes[0, 0]
-    found = [s for row in rows if row["right"] for s in row["severities"]]
+    _draw_areas(axes[0, 0], [s for row in rows if row["right"] for s in row["severities"]])
+    _draw_reliability(axes[0, 1], rows)
+    return fig
+
+
+def _draw_areas(ax, found: list[dict]) -> None:
+    """Stated against true leak areas; intervals that miss are hollow."""
     for fault in SINGLE:
         colour, marker = LOOK[fault]
         for holds, face in ((True, colour), (False, "white")):
@@ -118,7 +124,10 @@ def draw_severities(rows: list[dict]) -> Figure:
         ax.legend(loc="upper left", fontsize=7)
     ax.set_xlabel("true leak (mm$^2$)")
     ax.set_ylabel("stated leak (mm$^2$)")
-    ax = axes[0, 1]
+
+
+def _draw_reliability(ax, rows: list[dict]) -> None:
+    """Share of the answers that is right by their stated probability."""
     ax.plot([0, 1], [0, 1], color=style.NEUTRAL, lw=0.8)
     for b in reliability_table(rows):
         low, high = b.right.interval
@@ -128,7 +137,6 @@ def draw_severities(rows: list[dict]) -> Figure:
     ax.set_ylabel("share that is right")
     ax.set_xlim(0.3, 1.02)
     ax.set_ylim(-0.03, 1.05)
-    return fig
 
 
 def _words(name: str) -> str:

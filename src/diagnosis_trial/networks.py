@@ -96,13 +96,13 @@ def ask_network(kept: KeptNetworks, recordings: list[Recording], rig: Rig) -> di
         probabilities = dict.fromkeys(dict.fromkeys(STATE_OF.values()), 0.0)
         for name, share in zip(kept.classes, kept.probabilities(windows), strict=True):
             probabilities[STATE_OF[name]] += float(share)
-        p_value = float(np.median(kept.answers(windows)[1]))
+        said, p_values = kept.answers(windows)
         entries.append(
             {
                 "label": recording.label,
-                "state": judge_windows(kept, windows)["state"],
+                "state": judge_windows(kept.classes, said, p_values)["state"],
                 "probabilities": probabilities,
-                "unlike": {"p_value": p_value},
+                "unlike": {"p_value": float(np.median(p_values))},
             }
         )
     return {"recordings": entries}

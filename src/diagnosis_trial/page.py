@@ -111,15 +111,14 @@ def _smallest_of_column(rows: list[dict], rng: np.random.Generator) -> list[tupl
     false_alarms = Rate(sum(s > threshold for s in healthy), len(healthy))
     lines = []
     for state in summary.SINGLE:
-        chosen = [row for row in rows if row["state"] == state]
-        hit = [row["suspicion"] > threshold for row in chosen]
-        rigs = [row["rig"] for row in chosen]
+        leaks = detection.detect_leaks(rows, state)
+        rigs = [row["rig"] for row in leaks.rows]
         for severity, unit, factor in (
-            ([row["change"] for row in chosen], "% of the ripple", 100.0),
-            ([row["areas"][state] for row in chosen], "mm2", 1e6),
+            (leaks.change, "% of the ripple", 100.0),
+            ([row["areas"][state] for row in leaks.rows], "mm2", 1e6),
         ):
             found = [
-                detection.smallest_found(severity, hit, rigs, probability, rng)
+                detection.smallest_found(severity, leaks.hit, rigs, probability, rng)
                 for probability in detection.FOUND
             ]
             cells = [

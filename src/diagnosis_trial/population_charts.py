@@ -46,12 +46,13 @@ def chart_population(rows: list[dict]) -> Population:
 def chart_detection(rows: list[dict], state: str, column: str) -> Chart | None:
     """Probability of detection of one leak against the ripple's change, of one column; None without
     such a leak."""
-    change, hit = detection.detect_leaks(rows, state)
-    if not len(change):
+    leaks = detection.detect_leaks(rows, state)
+    shown = leaks.shown
+    if not len(shown):
         return None
-    bins = detection.shares_in_bins(change, hit)
-    curve = detection.fit_curve(change, hit)
-    smooth = np.geomspace(change.min(), change.max(), POINTS)
+    bins = detection.shares_in_bins(shown, leaks.hit)
+    curve = detection.fit_curve(leaks.change, leaks.hit)
+    smooth = np.geomspace(shown.min(), shown.max(), POINTS)
     x = np.unique(np.concatenate([smooth, [each.severity for each in bins]]))
     share, ends = np.full(len(x), np.nan), np.full((2, len(x)), np.nan)
     for each in bins:
@@ -60,7 +61,7 @@ def chart_detection(rows: list[dict], state: str, column: str) -> Chart | None:
     series = [
         Series("recordings, with 95 % intervals", 100 * share, "measured", "dots", 100 * ends)
     ]
-    note = f"{len(change)} recordings; logarithmic"
+    note = f"{len(shown)} recordings; logarithmic"
     if curve is not None:
         series.insert(0, Series("fitted curve", 100 * curve.probability(x), "calibrated"))
         found = 100 * curve.severity(0.9)

@@ -19,7 +19,6 @@ def score_rig(rig: int, truth: dict, diagnosis: dict, run: dict) -> list[dict]:
     Keys of a row:
         column, rig, label
         state, change, weakest, areas   the truth (`virtualrig.population.record_rig`)
-        same_point            whether a healthy recording has the same operating point as most
         told                  the state that the tool names, "unlike" or "crashed"
         right                 see `is_right`
         suspicion             see `suspicion`
@@ -39,7 +38,6 @@ def score_rig(rig: int, truth: dict, diagnosis: dict, run: dict) -> list[dict]:
 def _score_column(rig: int, truth: dict, entries: list[dict], run: dict) -> list[dict]:
     """The rows of one column but for its name, of its entries of diagnosis.json."""
     told = {each["label"]: each for each in entries}
-    first = next(iter(truth["recordings"].values()))["point"]
     rows = []
     for label, true in sorted(truth["recordings"].items()):
         if label not in told:
@@ -53,7 +51,6 @@ def _score_column(rig: int, truth: dict, entries: list[dict], run: dict) -> list
                 "change": true["change"],
                 "weakest": true["weakest"],
                 "areas": true["areas"],
-                "same_point": true["point"] == first,
                 "told": said["state"],
                 "right": is_right(true["state"], said["state"]),
                 "suspicion": suspicion(said),

@@ -24,7 +24,7 @@ import yaml
 from diagnosis_trial.networks import ask_network, teach_network
 from diagnosis_trial.twins import TWINS, FittedTwin
 from rippletwin import store
-from rippletwin.case.load import load_case
+from rippletwin.case.load import label_of, load_case
 from rippletwin.case.model import Case
 from rippletwin.diagnosis.diagnose import diagnose, select_recordings
 from rippletwin.diagnosis.diagnosis_file import diagnosis_dict
@@ -79,7 +79,7 @@ def timed(work: Callable, *arguments) -> tuple:
 def unknown_labels(case_folder: str) -> list[str]:
     """Labels of the recordings of unknown state, without the checks of `load_case`."""
     sheet = yaml.safe_load((Path(case_folder) / "rig.yaml").read_text())
-    return [Path(r["file"]).stem for r in sheet["recordings"] if r["state"] == "unknown"]
+    return [label_of(r) for r in sheet["recordings"] if r["state"] == "unknown"]
 
 
 if __name__ == "__main__":

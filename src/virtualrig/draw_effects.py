@@ -11,6 +11,7 @@ import numpy as np
 from virtualrig.drawn_effect import DrawnEffect, RigContext, log_between
 from virtualrig.node_elements import ATMOSPHERE
 
+STATED_PRESSURE = 1e7  # Pa absolute, at which the truth states a volume of gas
 PASSIVE_SHARE = 0.9  # of the gain at which a valve begins to feed the line at some frequency
 
 
@@ -157,15 +158,27 @@ def sensor_delay(rig: RigContext, level: float) -> DrawnEffect:
     return _at_sensor(rig, "sensor_delay", level, {"delay": delay}, {"delay": delay})
 
 
-def accumulator(rig: RigContext, level: float) -> DrawnEffect:
+def gas_volume(rig: RigContext, level: float) -> DrawnEffect:
     """Gas of 0.02 to 5 cm3, scaled by the bore, at the mean pressure."""
-    position = rig.draw_position()
-    arguments = {
-        "position": position,
-        "gas_volume": log_between(2e-8, 5e-6, level) * rig.volume_scale(rig.segment_at(position)),
-        "gas_pressure": rig.pressure + ATMOSPHERE,
-    }
-    return DrawnEffect("accumulator", "position", arguments, level, position)
+    position, pressure = rig.draw_position(), rig.pressure + ATMOSPHERE
+    volume = log_between(2e-8, 5e-6, level) * rig.volume_scale(rig.segment_at(position))
+    exponent = rig.uniform(1.05, 1.35)
+    return DrawnEffect(
+        "gas_volume",
+        "position",
+        {
+            "position": position,
+            "gas_volume": volume,
+            "gas_pressure": pressure,
+            "exponent": exponent,
+        },
+        level,
+        position,
+        {
+            "gas_volume": volume * (pressure / STATED_PRESSURE) ** (1 / exponent),
+            "polytropic_exponent": exponent,
+        },
+    )
 
 
 def stiffening_liquid(rig: RigContext, level: float) -> DrawnEffect:
@@ -179,6 +192,17 @@ def turbulent_friction(rig: RigContext, level: float) -> DrawnEffect:
     return DrawnEffect(
         "turbulent_friction", "line", {"factor": log_between(0.01, 1.0, level)}, level
     )
+
+
+def soft_piece(rig: RigContext, level: float) -> DrawnEffect:
+    """A stretch of 0.15 to 0.3 m whose wave speed is 2 to 60 % lower."""
+    position = rig.draw_position()
+    arguments = {
+        "position": position,
+        "length": rig.log_uniform(0.15, 0.3),
+        "speed_ratio": 1.0 - log_between(0.02, 0.6, level),
+    }
+    return DrawnEffect("soft_piece", "position", arguments, level, position)
 
 
 def moving_bend(rig: RigContext, level: float) -> DrawnEffect:
@@ -221,9 +245,9 @@ def _named(*functions: Callable[[RigContext, float], DrawnEffect]) -> dict:
 LIBRARY = _named(
     unsteady_friction, viscoelastic_wall, entrained_air, side_branch, leak, line_volume,
     load_volume, load_dynamics, source_impedance, piston_spread, speed_fluctuation,
-    sensor_dynamics, sensor_gain, sensor_delay,
+    sensor_dynamics, sensor_gain, sensor_delay, gas_volume,
 )  # fmt: skip
-OUTSIDE = _named(accumulator, stiffening_liquid, turbulent_friction, moving_bend, resonator)
+OUTSIDE = _named(stiffening_liquid, turbulent_friction, soft_piece, moving_bend, resonator)
 
 
 def at_pump(rig: RigContext, level: float) -> tuple[DrawnEffect, list[str]]:

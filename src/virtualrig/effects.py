@@ -2,10 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
 from virtualrig.pump import Pump
+
+SHORTEST_PIPE = 0.05  # m; shorter ones need small time steps
 
 
 @dataclass
@@ -129,7 +132,7 @@ def sensor_delay(draft: Draft, sensor: int, delay: float) -> None:
     draft.sensing[sensor - 1]["delay"] = delay
 
 
-def accumulator(
+def gas_volume(
     draft: Draft, position: float, gas_volume: float, gas_pressure: float, exponent: float = 1.4
 ) -> None:
     """Gas of volume `gas_volume`, m3, at the absolute pressure `gas_pressure`, Pa; nonlinear."""
@@ -147,6 +150,31 @@ def turbulent_friction(draft: Draft, factor: float) -> None:
     for segment in draft.segments:
         area = np.pi / 4 * segment["diameter"] ** 2
         segment["drag"] = factor / (2 * segment["diameter"] * area)
+
+
+def soft_piece(draft: Draft, position: float, length: float, speed_ratio: float) -> None:
+    """A stretch of `length` m about `position` with `speed_ratio` times the wave speed: a hose, a
+    compensator.
+
+    An end that is closer than SHORTEST_PIPE to a joint is moved there. Raises ValueError where the
+    stretch is not longer than that on either side, or not on the line.
+    """
+    joints = np.cumsum([0.0, *(segment["length"] for segment in draft.segments)])
+    wanted = np.array([position - 0.5 * length, position + 0.5 * length])
+    if length <= 2 * SHORTEST_PIPE or wanted[0] < 0.0 or wanted[1] > draft.length:
+        raise ValueError(
+            f"a piece of {length} m at {position} m: give one longer than {2 * SHORTEST_PIPE} m "
+            f"within the line (0 to {draft.length:.3f} m)"
+        )
+    nearest = joints[np.argmin(np.abs(joints[:, None] - wanted), axis=0)]
+    ends = np.where(np.abs(nearest - wanted) < SHORTEST_PIPE, nearest, wanted)
+    pieces = []
+    for segment, (begin, stop) in zip(draft.segments, pairwise(joints), strict=True):
+        for a, b in pairwise([begin, *(x for x in ends if begin < x < stop), stop]):
+            ratio = speed_ratio if ends[0] < 0.5 * (a + b) < ends[1] else 1.0
+            speed = ratio * segment["wave_speed"]
+            pieces.append(segment | {"length": float(b - a), "wave_speed": speed})
+    draft.segments = pieces
 
 
 def moving_bend(
@@ -177,7 +205,7 @@ EFFECTS: dict[str, Callable[..., None]] = {
     for effect in (
         unsteady_friction, viscoelastic_wall, entrained_air, side_branch, leak, line_volume,
         load_volume, load_dynamics, source_impedance, piston_spread, speed_fluctuation,
-        sensor_dynamics, sensor_gain, sensor_delay, accumulator, stiffening_liquid,
-        turbulent_friction, moving_bend, resonator,
+        sensor_dynamics, sensor_gain, sensor_delay, gas_volume, stiffening_liquid,
+        turbulent_friction, soft_piece, moving_bend, resonator,
     )
 }  # fmt: skip

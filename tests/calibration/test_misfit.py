@@ -1,11 +1,14 @@
 """The measures of misfit."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from paper_rig import paper_rig
 from rippletwin.calibration.likelihood import Likelihood
 from rippletwin.calibration.misfit import misfit, theil
+from rippletwin.calibration.pareto import sensor_misfits
 from rippletwin.twin.twin import Twin
 from synthetic_recordings import point, recordings
 
@@ -24,3 +27,21 @@ def test_theil_from_harmonics_is_theil_from_the_time_signals():
     expected = np.sqrt(np.mean((x - y) ** 2)) / (np.sqrt(np.mean(x**2)) + np.sqrt(np.mean(y**2)))
     assert theil(measured, predicted) == pytest.approx(expected, rel=1e-9)
     assert misfit(Likelihood(twin, data), twin.theta).theil == pytest.approx(expected, rel=1e-9)
+
+
+def test_an_unknown_source_is_no_misfit():
+    """Readings that the line makes of any flow, different at each frequency, leave nothing at any
+    sensor: a free source has its most likely amplitude. A reading that one sensor has alone is
+    left."""
+    rig = paper_rig()
+    _, data = recordings(rig, [point(rig)], seed=4)
+    free = [replace(o, source="free") for o in data]
+    twin = Twin(rig, free)
+    flow = np.random.default_rng(0).normal(size=(2, len(data[0].orders)))
+    response = twin.predict(free)[0]
+    free = [replace(free[0], values=1e-3 * (flow[0] + 1j * flow[1]) * response)]
+    likelihood = Likelihood(twin, free)
+    assert np.max(sensor_misfits(likelihood, twin.theta)) < 1e-20
+    assert misfit(likelihood, twin.theta).relative < 1e-10
+    free[0].values[0] *= 1.5
+    assert sensor_misfits(Likelihood(twin, free), twin.theta)[0] > 1e-3

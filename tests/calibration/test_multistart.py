@@ -1,5 +1,7 @@
 """Starts of wave speeds, and the score test on starts along the line."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,9 @@ from rippletwin.calibration.multistart import (
 )
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.score_test import MAX_FOLLOWED, ScoreTest
+from rippletwin.calibration.shaft_angles import align_shaft_angles
 from rippletwin.explanation.fit_starts import transfer_theta, weak_effect_starts
+from rippletwin.twin.parameters import coordinates
 from rippletwin.twin.twin import Twin
 from synthetic_effects import VOLUME
 from synthetic_observations import make
@@ -55,6 +59,30 @@ def test_starts_are_all_pairs_of_scalings_and_random_wave_speeds(monkeypatch):
     assert not np.any(thetas[:, 3:])
     model = Posterior(base.with_(effects=VOLUME), observations)
     assert len(choose_starts(model, ({},), 1000)) == len(SCALINGS) ** 2
+
+
+def test_starts_behind_a_free_source_are_ranked_by_ratios_between_sensors():
+    """Of an unknown source only ratios between sensors count. The truth has next to no misfit, a
+    line with other wave speeds has; neither depends on how strong the source was."""
+    bench, observations, truth = make(np.random.default_rng(4), source=0.0)
+    misfits = []
+    for strength in (1.0, 1e3):
+        free = [
+            replace(
+                o,
+                source="free",
+                values=strength * o.values,
+                covariance=strength**2 * o.covariance,
+            )
+            for o in observations
+        ]
+        model = Posterior(Twin(bench, free), free)
+        theta = coordinates(model.twin.parameters, truth.values())
+        wrong = theta + 2.0 * (np.arange(len(theta)) < 3)
+        misfits.append([align_shaft_angles(model, t)[0] for t in (theta, wrong)])
+    (true, other), stronger = misfits
+    assert true < 0.01 * other
+    np.testing.assert_allclose(stronger, misfits[0], rtol=1e-6)
 
 
 def test_modes_near_a_better_one_are_dropped():

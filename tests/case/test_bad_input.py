@@ -89,7 +89,7 @@ def test_missing_file(tmp_path, key):
 
 
 def test_missing_repeat(tmp_path):
-    spoilt(tmp_path, lambda c: c["recordings"][0].update(repeats=["nowhere.csv"]))
+    spectrum_case(tmp_path, "100 1 2 3 4\n", repeats=["nowhere.csv"])
     refused(tmp_path, "rig.yaml", "recordings[0].repeats[0]", "nowhere.csv")
 
 
@@ -103,6 +103,24 @@ def test_periodic_recording_without_speed(tmp_path):
     refused(tmp_path, "rig.yaml", "recordings[0].speed_rpm", "missing")
 
 
+def test_simulated_pump_without_load_pressure(tmp_path):
+    """A pump whose geometry is given is simulated against the load pressure, whatever the load is;
+    with its pistons alone, or with a flow ripple, the pressure may be absent."""
+
+    def unstated(content):
+        content["load"]["kind"] = "unknown"
+        del content["recordings"][0]["load_pressure"]
+
+    def simulated(content):
+        unstated(content)
+        content["pump"]["piston_diameter"] = 0.02
+
+    spoilt(tmp_path, unstated)
+    load_case(tmp_path)
+    spoilt(tmp_path, simulated)
+    refused(tmp_path, "rig.yaml", "recordings[0].load_pressure", "missing", "simulated against")
+
+
 def test_random_recording_of_one_sensor(tmp_path):
     def spoil(content):
         content["sensors"].pop()
@@ -110,6 +128,34 @@ def test_random_recording_of_one_sensor(tmp_path):
 
     spoilt(tmp_path, spoil, ripple()[:1])
     refused(tmp_path, "rig.yaml", "sensors", "two or more")
+
+
+@pytest.mark.parametrize(
+    ("kind", "key", "value"),
+    [
+        ("spectrum", "channels", {"p1": 2, "p2": 1}),
+        ("input_impedance", "unit", "bar"),
+        ("input_impedance", "scale", 1000.0),
+    ],
+)
+def test_key_of_sampled_recordings_at_a_table(tmp_path, kind, key, value):
+    """It would be ignored without a word; the unit of a table would be wrong by 1e5."""
+
+    def spoil(content):
+        content["recordings"][0] |= {"kind": kind, key: value}
+
+    spoilt(tmp_path, spoil)
+    words = f"means nothing for a recording of kind {kind}"
+    refused(tmp_path, "rig.yaml", f"recordings[0].{key}", words)
+
+
+def test_file_name_that_is_too_long_to_be_a_label(tmp_path):
+    """Results of a recording without a label are called after its file, with more words around."""
+    name = 70 * "\u2248" + ".h5"
+    spoilt(tmp_path, lambda c: c["recordings"][0].update(file=name))
+    refused(tmp_path, "rig.yaml", "recordings[0].label", "210 bytes", "Give the recording a label")
+    spoilt(tmp_path, lambda c: c["recordings"][0].update(file=name, label="short"))
+    assert load_case(tmp_path).recordings[0].label == "short"
 
 
 def test_load_impedance_without_its_file(tmp_path):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from case_folders import refused, sheet, write_case
+from case_folders import RATE, refused, ripple, sheet, write_case
 from recorder_files import NUMBERED, duct_like, hdf5
 
 WRONG = {
@@ -34,6 +34,7 @@ SHEETS = {
     "counted from zero": ({"p1": 0, "p2": 1}, "channels.p1", ["from 1"]),
     "a list": ({"p1": [1], "p2": 2}, "channels.p1", ["a whole number or text"]),
     "no such sensor": ({"p3": 1, "p2": 2}, "channels.p3", ["no such sensor", "name of a sensor"]),
+    "another's own channel": ({"p2": "p1"}, "channels.p2", ["p1 is the channel of p1 too"]),
     "one channel for two": ({"p1": 1, "p2": 1}, "channels.p2", ["the channel of p1 too"]),
 }
 
@@ -46,6 +47,40 @@ def test_channels_that_make_no_sense(tmp_path, name):
     content["recordings"][0]["channels"] = channels
     write_case(tmp_path, content)
     refused(tmp_path, "rig.yaml", f"recordings[0].{field}", *words)
+
+
+def test_a_number_and_a_name_of_one_channel(tmp_path):
+    """The second column is called a: which sensor it belongs to is not said."""
+    content = sheet()
+    content["recordings"][0] |= {"file": "r.csv", "channels": {"p1": 2, "p2": "a"}}
+    write_case(tmp_path, content, pressure=None)
+    (tmp_path / "r.csv").write_text("time_s,a,b\n0,1,2\n1e-4,2,3\n")
+    refused(tmp_path, "r.csv", "p2", "number 2 of the file, is that of p1 too")
+
+
+def test_a_link_in_a_zarr_store_is_not_followed(tmp_path):
+    """It may lead to files outside of the case."""
+    zarr = pytest.importorskip("zarr")
+    content = sheet()
+    content["recordings"][0]["file"] = "r.zarr"
+    write_case(tmp_path, content, pressure=None)
+    store = zarr.open_group(tmp_path / "r.zarr", mode="w")
+    store.create_array("pressure", data=ripple()).attrs["sampling_rate_hz"] = RATE
+    (tmp_path / "r.zarr" / "pressure").rename(tmp_path / "elsewhere")
+    (tmp_path / "r.zarr" / "pressure").symlink_to(tmp_path / "elsewhere")
+    refused(tmp_path, "r.zarr", "pressure", "a link", "Copy what it leads to")
+
+
+def test_a_parquet_table_with_one_name_twice(tmp_path):
+    """The columns are chosen by number, and read by name."""
+    pa = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    content = sheet()
+    content["recordings"][0] |= {"file": "r.parquet", "channels": {"p1": 1, "p2": 2}}
+    write_case(tmp_path, content, pressure=None)
+    table = pa.Table.from_arrays([pa.array(row) for row in ripple()], names=["a", "a"])
+    parquet.write_table(table, tmp_path / "r.parquet")
+    refused(tmp_path, "r.parquet", "a", "two columns have this name", "Rename")
 
 
 USELESS = {

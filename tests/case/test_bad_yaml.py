@@ -39,6 +39,9 @@ TEXTS = {
     "a key twice": ("a: 1\na: 2\n", "line 2, column 1", ["'a' is given twice", "Keep one"]),
     "a list as key": ("? [1, 2]\n: 3\n", "line 1, column 3", ["stands as a key"]),
     "a Python object": ("a: !!python/object:os.system x", "line 1, column 4", ["not YAML"]),
+    "no truth": ("a: !!bool maybe", "the whole file", ["not YAML", "maybe", "Correct the tag"]),
+    "no character": ('a: "\\U00110000"', "the whole file", ["not YAML", "escaped character"]),
+    "no number": ('a: "\\UFFFFFFFF"', "the whole file", ["not YAML", "escaped character"]),
     "UTF-16": (GOOD.encode("utf-16"), "the whole file", ["UTF-16, not UTF-8", "Save it"]),
     "Latin-1": (
         GOOD.replace("healthy_0.h5", "öl.h5").encode("latin-1"),

@@ -1,5 +1,7 @@
 """The band of a recording that is fitted, and the warning where plane waves are not alone."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -10,7 +12,7 @@ from rippletwin.case.band import FIRST_CROSS_MODE, plane_wave_limit
 from rippletwin.case.load import load_case
 from rippletwin.case.model import Fluid, Load, Rig, Segment
 from rippletwin.errors import InputError
-from rippletwin.spectra.frequency_selection import select_fitted_frequencies
+from rippletwin.spectra.frequency_selection import check_sources, select_fitted_frequencies
 from rippletwin.spectra.observation import observe
 
 
@@ -58,6 +60,31 @@ def test_a_band_without_anything_is_bad_input(tmp_path):
         observe(case.recordings[0], case.rig)
 
 
+@pytest.mark.parametrize("keys", [{"max_frequency_hz": 100.0}, {"min_frequency_hz": 4990.0}])
+def test_a_band_without_a_fitted_frequency_is_bad_input(tmp_path, keys):
+    """Shaft orders are in the band, and no multiple of the pistons' 150 Hz: nothing is left to
+    fit, which is told with the recording's name."""
+    case = load_case(banded(tmp_path, **keys))
+    observed = observe(case.recordings[0], case.rig)
+    with pytest.raises(InputError) as caught:
+        select_fitted_frequencies([observed], case.rig)
+    told(caught.value, "healthy_0", "min_frequency_hz, max_frequency_hz", "piston frequency")
+
+
+def test_a_table_may_begin_at_0_hz(tmp_path):
+    """No wave has that frequency: its row is left out, and the others are as they are."""
+
+    def impedance(content):
+        content["recordings"][0] = {"file": "z.csv", "kind": "input_impedance", "state": "healthy"}
+
+    spoilt(tmp_path, impedance, pressure=None)
+    (tmp_path / "z.csv").write_text("frequency_hz,re,im\n0,1e9,0\n10,1e9,1e9\n20,1e9,2e9\n")
+    case = load_case(tmp_path)
+    observed = observe(case.recordings[0], case.rig)
+    assert observed.frequency_hz.tolist() == [10.0, 20.0]
+    assert observed.values.tolist() == [[1e9 + 1e9j, 1e9 + 2e9j]]
+
+
 @pytest.mark.parametrize(
     ("diameter", "top", "warned"), [(0.02, None, False), (0.14, None, True), (0.14, 4000.0, False)]
 )
@@ -74,3 +101,38 @@ def test_a_warning_above_the_plane_wave_limit(tmp_path, diameter, top, warned):
     warnings = [w for w in load_case(tmp_path).warnings if "travel too" in w]
     assert bool(warned) == bool(warnings)
     assert not warned or ("healthy_0" in warnings[0] and "segment 2" in warnings[0])
+
+
+def test_a_band_wider_than_the_data_is_told_as_what_is_used(tmp_path):
+    """max_frequency_hz may lie above all that was recorded: at 51.2 kHz nothing above 20.48 kHz is
+    used, of a table nothing above its last row."""
+
+    def widen(content):
+        content["line"]["segments"][1]["diameter"] = 0.14
+        content["recordings"][0]["max_frequency_hz"] = 1e5
+
+    def table(content):
+        widen(content)
+        del content["recordings"][0]["load_pressure"], content["recordings"][0]["speed_rpm"]
+        content["recordings"][0] |= {"kind": "input_impedance", "file": "z.csv"}
+
+    spoilt(tmp_path, widen)
+    assert "used up to 2.048e+04 Hz" in " ".join(load_case(tmp_path).warnings)
+    spoilt(tmp_path, table, pressure=None)
+    (tmp_path / "z.csv").write_text("frequency_hz,re,im\n10,1e9,1e9\n6000,1e9,2e9\n")
+    assert "used up to 6000 Hz" in " ".join(load_case(tmp_path).warnings)
+
+
+def test_one_sensor_beside_an_unknown_source_is_bad_input():
+    """Any line makes any reading of one sensor, if the source may be anything: calibration says so.
+    With a second sensor, or a source that is known, it does not."""
+    one, two = (
+        SimpleNamespace(label="noise", source="free", values=np.ones((count, 3), complex))
+        for count in (1, 2)
+    )
+    with pytest.raises(InputError) as caught:
+        check_sources([one])
+    told(caught.value, "noise", "sensors", "nothing tells the line")
+    check_sources([one, two])
+    one.source = "nominal"
+    check_sources([one])

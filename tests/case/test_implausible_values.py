@@ -5,6 +5,8 @@ import pytest
 
 from case_folders import refused, sheet, spoilt, write_case
 from rippletwin.case.load import load_case
+from rippletwin.case.plausibility import PORT_OVERLAP_DEG
+from rippletwin.pump.geometry import Geometry
 
 ERRORS = {
     "length in mm": ("line.segments[0].length", 5950, ["looks like mm (5.95 m)", "Give m, not mm"]),
@@ -33,6 +35,9 @@ ERRORS = {
     "relative error in per cent": ("recordings[0].relative_error", 2, ["per cent (0.02)"]),
     "piston in mm": ("pump.piston_diameter", 17, ["mm (0.017 m)"]),
     "pitch radius in mm": ("pump.pitch_radius", 33.5, ["mm (0.0335 m)"]),
+    "swash angle in rad": ("pump.swash_angle_deg", 0.26, ["rad (14.9 deg)", "Give deg, not rad"]),
+    "port opening in rad": ("pump.port_opening_deg", 0.5, ["rad (28.65 deg)"]),
+    "ports that never close": ("pump.port_opening_deg", 180, ["port_overlap_deg 5, its default"]),
     "dead volume in cm3": ("pump.dead_volume", 3.5, ["cm3 (3.5e-06 m3)"]),
     "bulk modulus in bar": ("pump.bulk_modulus", 14000, ["bar (1.4e+09 Pa)"]),
     "bulk modulus in GPa": ("pump.bulk_modulus", 1.4, ["GPa (1.4e+09 Pa)"]),
@@ -40,6 +45,11 @@ ERRORS = {
     "sensor position in mm": ("sensors[1].position", 2590, ["2590 mm would be 2.59 m"]),
     "two sensors at one place": ("sensors[1].position", 0.4205, ["where p1 is too"]),
     "label that leaves the folder": ("recordings[0].label", "../../x", ["part of a file's name"]),
+    "label of 100 letters of three bytes": (
+        "recordings[0].label",
+        100 * "\u2248",
+        ["up to 200 bytes"],
+    ),
     "label without a letter": ("recordings[0].label", " ", ["part of a file's name"]),
 }
 
@@ -57,8 +67,19 @@ def put(content, field, value):
 def test_value_in_a_wrong_unit(tmp_path, name):
     """One value of a good sheet is spoilt; the error names it and says what it looks like."""
     field, value, words = ERRORS[name]
-    spoilt(tmp_path, lambda c: put(c, field, value))
+
+    def spoil(content):
+        put(content, field, value)
+        if "relative_error" in field:
+            put(content, "recordings[0].kind", "spectrum")
+
+    spoilt(tmp_path, spoil)
     refused(tmp_path, "rig.yaml", field, *words)
+
+
+def test_the_default_overlap_is_the_pump_s():
+    """The check of a sheet without port_overlap_deg uses what the simulated pump has."""
+    assert Geometry().port_overlap_deg == PORT_OVERLAP_DEG
 
 
 WARNINGS = {

@@ -219,14 +219,14 @@ def test_universal_file(tmp_path, binary):
 
 
 def test_parquet(tmp_path):
-    """Columns as in CSV."""
+    """Columns as in CSV; a whole number with a decimal point is one."""
     import pandas as pd
 
     def write(path):
         table = {"t": TIME, "x": OTHERS[0], "in": PRESSURE[0], "out": PRESSURE[1]}
         pd.DataFrame(table).to_parquet(path)
 
-    same(read(tmp_path, "r.parquet", write, time="t", channels={"p1": "in", "p2": 4}))
+    same(read(tmp_path, "r.parquet", write, time="t", channels={"p1": "in", "p2": 4.0}))
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,19 @@ def test_an_oil_that_thickens_is_refused():
         viscosity_at(6.8, 46, 50)
 
 
+@pytest.mark.parametrize(
+    ("pair", "celsius", "words"),
+    [
+        ((0.25, 0.2), 50, "Walther's law holds above 0.3 cSt"),
+        ((10000, 0.31), -60, "no viscosity follows for -60 degrees"),
+    ],
+)
+def test_where_walthers_law_has_no_value(pair, celsius, words):
+    """log log (nu + 0.7) needs more than 0.3 cSt; a law that is much too steep overflows."""
+    with pytest.raises(ValueError, match=words):
+        viscosity_at(*pair, celsius)
+
+
 def test_density_falls_by_seven_parts_in_ten_thousand_a_degree():
     """Of 1000 litres at 15 degrees, 1035 at 65: the mass stays."""
     assert 1.035 * density_at(870, 65) == pytest.approx(870, rel=1e-6)

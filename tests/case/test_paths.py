@@ -25,6 +25,8 @@ def write(folder, name, key="file"):
         content["load"] = {"kind": "impedance", "impedance": name}
     else:
         content["recordings"][0][key] = [name] if key == "repeats" else name
+    if key == "repeats":
+        content["recordings"][0]["kind"] = "spectrum"
     write_case(folder, content, None)
     if key != "file":
         write_hdf5(folder / "healthy_0.h5", ripple())

@@ -44,6 +44,7 @@ def test_digits_are_those_that_the_interval_leaves(value, ends, text):
 def test_only_extreme_numbers_have_a_power_of_ten():
     """The power is written as in print."""
     assert q.write_number(-1.2e-7) == "−1.20 × 10⁻⁷"
+    assert q.write_number(9.9999e-5) == "1.00 × 10⁻⁴"  # the mantissa never has two digits
     assert q.write_number(12345.0) == "12300"
     assert q.write_number(0.0) == "0"
     assert q.write_number(math.nan) == "unknown"

@@ -40,3 +40,10 @@ def test_a_line_without_a_pump_is_not_told_of_pumps():
     assert advise(RIG, [noise]) == []
     (told,) = advise(replace(RIG, sensors=SENSORS[:2]), [noise])
     assert told.startswith("Two sensors")
+
+
+def test_noise_at_a_stated_speed_is_no_ripple():
+    """A recording of broadband noise may state a speed: it has no piston harmonics, and there may
+    be no pump at all."""
+    noise = PlannedRecording("healthy", 1000.0, 0.0, 2e3, 1.0, kind="random")
+    assert advise(replace(RIG, pump={}), [noise]) == []

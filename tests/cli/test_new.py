@@ -1,6 +1,8 @@
 """rippletwin new: what a test bench knows, in its units, becomes a sheet that check accepts."""
 
+import errno
 import json
+import os
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from click.testing import CliRunner
 
 from case_folders import ripple, write_hdf5
 from rippletwin.case.load import load_case
+from rippletwin.case.new_sheet import _write_whole
 from rippletwin.case.rig_yaml import read_sheet
 from rippletwin.cli import main
 from rippletwin.cli.new import command
@@ -107,6 +110,41 @@ def test_what_is_missing_is_told_at_once(tmp_path, capsys):
     told = capsys.readouterr().err
     assert all(name in told for name in ("--pistons", "--segment", "--sensor", "--viscosity"))
     assert not (tmp_path / "case" / "rig.yaml").exists()
+
+
+@pytest.mark.parametrize("given", ["40", "100"])
+def test_one_viscosity_of_two_names_the_other(tmp_path, capsys, given):
+    """The data sheet's pair is incomplete: it is not the viscosity at work that is missing."""
+    options = flags()
+    at = options.index("--viscosity")
+    options[at : at + 2] = [f"--viscosity-{given}", "46"]
+    assert main(["new", str(tmp_path / "case"), "--no-ask", *options]) == 2
+    absent = {"40": "100", "100": "40"}[given]
+    assert f"--viscosity-{absent}: not given" in capsys.readouterr().err
+
+
+def test_a_sheet_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
+    """A full disk leaves no half rig.yaml and no scratch file; a file system without links has the
+    whole sheet, and one that is there stays."""
+
+    def full(number):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        assert main(["new", str(tmp_path), *flags()]) == 2
+    assert [each.name for each in tmp_path.iterdir()] == ["recordings"]
+
+    def unsupported(*paths):
+        raise OSError(errno.EPERM, "Operation not permitted")
+
+    monkeypatch.setattr(os, "link", unsupported)
+    assert main(["new", str(tmp_path), *flags()]) == 0
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["recordings", "rig.yaml"]
+    before = (tmp_path / "rig.yaml").read_text()
+    with pytest.raises(FileExistsError):
+        _write_whole(tmp_path / "rig.yaml", "other")
+    assert (tmp_path / "rig.yaml").read_text() == before
 
 
 REFUSED = {

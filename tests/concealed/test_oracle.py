@@ -24,5 +24,5 @@ def test_the_oracle_finds_an_effect_only_in_data_that_hold_it():
         base, described = Twin(rig, observations), [true | {"parameters": strength}]
         log_evidence.append(log_evidence_of_effects(base, observations, described, twin.values()))
     assert log_evidence[0] > 5 * MIN_LOG_BAYES_FACTOR and log_evidence[1] < MIN_LOG_BAYES_FACTOR
-    unknown = {"name": "accumulator", "element": "position", "position": 1.0, "parameters": {}}
+    unknown = {"name": "resonator", "element": "position", "position": 1.0, "parameters": {}}
     assert log_evidence_of_effects(base, observations, [unknown], {}) is None

@@ -8,7 +8,7 @@ from concealed.score import (
     PLAIN_CHANGE,
     assign_claims,
     intervals_hold,
-    is_where_right,
+    is_place_right,
     score_baseline,
     score_case,
 )
@@ -22,8 +22,8 @@ def test_right_name_place_and_interval():
     row = score_example(truth(), verdict("named", claim("leak", conductance=(1.5, 2.5))))
     assert row["right"] and not row["wrong"] and row["places_right"] == [True]
     assert row["intervals_hold"] == [True] and row["probabilities"] == [(0.9, True)]
-    assert row["log_evidence"] == [20.0] and row["absorbed"] == pytest.approx(0.8)
-    assert row["where_right"] and failure(row) is None
+    assert row["established"] == [True] and row["absorbed"] == pytest.approx(0.8)
+    assert failure(row) is None
     elsewhere = claim("leak", position=(4.0, 4.5), conductance=(3, 4))
     row = score_example(truth(), verdict("named", elsewhere))
     assert row["right"] and row["places_right"] == [False] and row["intervals_hold"] == [False]
@@ -48,6 +48,7 @@ def test_a_wrong_name_and_a_name_beside_a_right_one_are_told_apart():
     row = score_example(truth(), both)
     assert row["right"] and row["wrong"] == "unsteady_friction"
     assert row["probabilities"] == [(0.9, True), (0.9, False)]
+    assert row["established"] == [True, False]
     assert failure(row) == "wrong name beside a right one"
 
 
@@ -129,7 +130,7 @@ def test_no_effect_and_effects_outside_the_library():
     only_supported = verdict("named", claim("leak") | {"support": "supported"})
     assert failure(score_example(none, only_supported)) is None
     outside = truth(kind="outside")
-    outside["effects"][0]["name"] = "accumulator"
+    outside["effects"][0]["name"] = "resonator"
     assert failure(score_example(outside, verdict("unexplained"))) is None
     assert failure(score_example(outside, verdict("named", claim("leak")))) == "misnamed"
     assert failure(score_example(outside, verdict("consistent"))) == "not noticed"
@@ -168,20 +169,17 @@ def test_an_own_name_comes_before_an_equivalent_one():
 
 
 def test_a_pick_of_a_simple_method():
-    """None raises no alarm; the true effect is right, and its place where its element is; a name of
-    one class is right too; another is an alarm that is wrong."""
+    """None raises no alarm; the true effect is right, and so is a name of one class; another is an
+    alarm that is wrong."""
     true, classes = [effect("leak")], [["leak", "side_hole"]]
-    nothing = {"alarm": False, "right": False, "place": False, "named": ""}
-    assert score_baseline(true, None, classes) == nothing
-    for name, element, right, place in (
-        ("leak", "position", True, True),
-        ("leak", "load", True, False),
-        ("side_hole", "position", True, True),
-        ("line_volume", "position", False, False),
+    assert score_baseline(true, None, classes) == {"alarm": False, "right": False, "named": ""}
+    for name, element, right in (
+        ("leak", "load", True),
+        ("side_hole", "position", True),
+        ("line_volume", "position", False),
     ):
         score = score_baseline(true, {"name": name, "element": element}, classes)
-        told = {"alarm": True, "right": right, "place": place, "named": f"{name} ({element})"}
-        assert score == told
+        assert score == {"alarm": True, "right": right, "named": f"{name} ({element})"}
 
 
 @pytest.mark.parametrize(
@@ -205,38 +203,22 @@ def test_what_a_row_takes_from_the_truth():
     said["fit"]["before"]["in_sample"] = 0.6  # nominal 0.5
     row = score_example(truth(), said, oracle_log_evidence=7.0)
     assert row["absorbed"] == 0.0 and row["oracle_log_evidence"] == 7.0
-    assert not row["alarm"] and not row["where_right"] and row["seconds"] == 1.0
+    assert not row["alarm"] and row["seconds"] == 1.0
     assert score_example(truth(), verdict("unexplained"))["alarm"]
 
 
 @pytest.mark.parametrize(
-    ("element", "position_m", "right"),
+    ("interval", "right"),
     [
-        ("segment 2", None, True),
-        ("segment 1", None, False),
-        ("between p1 and p2", [2.9, 3.2], True),
-        ("between p1 and p2", [3.04, 3.06], True),  # 1 % of 5 m from 3.0, and from 3.1
-        ("between p1 and p2", [3.2, 3.4], False),
-        ("between p1 and p2", [2.0, 2.9], False),
-        ("load", None, False),
+        ((2.9, 3.2), True),
+        ((3.04, 3.06), True),  # 1 % of 5 m from 3.0, and from 3.1
+        ((3.2, 3.4), False),
+        ((2.0, 2.9), False),
     ],
 )
-def test_where_is_right_in_the_segment_or_between_the_sensors(element, position_m, right):
-    """Of a leak at 3 m, 3.1 m on the drawing, in segment 2 of a line of 5 m."""
-    said = {"mismatch": {"where": {"element": element, "position_m": position_m}}}
-    assert is_where_right([effect("leak")], said, 5.0) is right
-
-
-def test_where_is_right_at_the_element_of_an_effect_without_a_position():
-    """Of any true effect; nowhere is wrong."""
-    true = [effect("leak") | {"position": None, "element": "load"}]
-    said = {"mismatch": {"where": {"element": "load"}}}
-    assert is_where_right(true, said, 5.0) and not is_where_right([], said, 5.0)
-    assert not is_where_right(true, {"mismatch": {"where": None}}, 5.0)
-    assert not is_where_right(true, {"mismatch": {"where": {"element": "source"}}}, 5.0)
-    assert is_where_right(
-        [effect("wall") | {"position": None, "element": "line"}, *true], said, 5.0
-    )
+def test_a_place_is_right_within_the_tolerance_of_lengths(interval, right):
+    """Of a leak at 3 m, 3.1 m on the drawing, in a line of 5 m."""
+    assert is_place_right(effect("leak"), claim("leak", position=interval), 5.0) is right
 
 
 def test_an_interval_of_an_equivalent_name_is_not_compared():

@@ -31,7 +31,7 @@ def rows():
     """Cases of every kind: right, wrong, missed with and without support of the data."""
     none = truth(kind="none", effects=[], change=0.0)
     outside = truth(kind="outside")
-    outside["effects"][0]["name"] = "accumulator"
+    outside["effects"][0]["name"] = "resonator"
     right = verdict("named", claim("leak", conductance=(1.5, 2.5)))
     scored = [
         score_example(none, verdict("consistent")),

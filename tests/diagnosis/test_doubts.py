@@ -10,6 +10,7 @@ import leaking_pump
 from rippletwin.diagnosis import pump_flow
 from rippletwin.diagnosis.doubts import doubts
 from rippletwin.diagnosis.faults.library import FAULTS
+from rippletwin.diagnosis.integration import Density
 
 
 def diagnosis(log_density, periodic=True):
@@ -17,7 +18,7 @@ def diagnosis(log_density, periodic=True):
     return SimpleNamespace(
         model=SimpleNamespace(flows={"slipper": SimpleNamespace(periodic=periodic)}),
         severities={"slipper": None},
-        best=SimpleNamespace(areas={"slipper": SimpleNamespace(log_density=log_density)}),
+        best=SimpleNamespace(cut_off={"slipper": Density(GRID, log_density).cut_off}),
     )
 
 

@@ -1,7 +1,6 @@
 """Networks that the workflow keeps, and what they say of a recording."""
 
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -39,18 +38,17 @@ def test_a_file_of_another_format_is_refused(tmp_path):
         load_networks(path)
 
 
-def test_either_severity_is_a_cylinder_and_shares_are_counted(monkeypatch):
+def test_either_severity_is_a_cylinder_and_shares_are_counted():
     """By hand: of eight answers five are C1 or C2, three S; one in eight is unlike."""
     said = np.array([[2, 3, 2, 1], [1, 1, 3, 2]])
     p_values = np.array([[0.5, 0.5, 0.04, 0.5], [0.9] * 4])
-    networks = SimpleNamespace(
-        classes=("H", "S", "C1", "C2"), answers=lambda windows: (said, p_values)
-    )
-    found = judge_windows(networks, None)
+    classes = "H", "S", "C1", "C2"
+    found = judge_windows(classes, said, p_values)
     assert found == {"state": "cylinder", "share": 5 / 8, "unlike": 1 / 8}
     p_values[:] = 0.01
     p_values[0, :2] = 0.9
-    assert judge_windows(networks, None) == {"state": "unlike", "share": 0.75, "unlike": 0.75}
+    found = judge_windows(classes, said, p_values)
+    assert found == {"state": "unlike", "share": 0.75, "unlike": 0.75}
 
 
 def recording(label, speed_rpm=1000.0, amplitude=1e4):

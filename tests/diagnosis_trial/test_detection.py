@@ -12,11 +12,11 @@ def test_at_most_the_stated_share_of_healthy_recordings_raises_the_alarm():
     rng = np.random.default_rng(0)
     for count in (10, 40, 101):
         healthy = rng.standard_normal(count)
-        threshold = alarm_threshold(healthy, 0.05)
+        threshold = alarm_threshold(healthy)
         assert np.mean(healthy > threshold) <= 0.05
         below = np.sort(healthy)[np.searchsorted(np.sort(healthy), threshold) - 1]
         assert np.mean(healthy > below) > 0.05
-    assert alarm_threshold([np.inf] * 3 + [0.0] * 17, 0.05) == np.inf
+    assert alarm_threshold([np.inf] * 3 + [0.0] * 17) == np.inf
 
 
 def test_the_curve_that_made_hits_and_misses_is_found():

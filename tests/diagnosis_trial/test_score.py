@@ -67,19 +67,15 @@ def test_a_crash_is_no_finding():
 
 
 def test_a_row_says_where_and_when():
-    """Whether the point is that of the first healthy recording; an answer that was not given has
-    no row; time and misfit are the run's, and rows are in the order of the labels."""
+    """An answer that was not given has no row; time and misfit are the run's, and rows are in the
+    order of the labels."""
     true = truth(
         unknown_01=("slipper", 0.08, {"slipper": 3e-8}), unknown_00=("healthy", 0.0, None),
         unknown_02=("healthy", 0.0, None),
     )  # fmt: skip
-    true["recordings"]["unknown_01"]["point"] = [1200.0, 9e6]
     told = [said("unknown_01", "cylinder", 0.2), said("unknown_00", "healthy", 0.9)]
     rows = scored(0, true, told)
-    assert [(r["label"], r["same_point"]) for r in rows] == [
-        ("unknown_00", True),
-        ("unknown_01", False),
-    ]
+    assert [r["label"] for r in rows] == ["unknown_00", "unknown_01"]
     assert {(r["twin_misfit"], r["fit_s"], r["diagnose_s"]) for r in rows} == {(0.2, 30.0, 12.0)}
     assert rows[1]["severities"] == [] and rows[1]["piston_right"] is None
     assert rows[0]["probability"] == 0.9 and rows[1]["weakest"] == 0.04

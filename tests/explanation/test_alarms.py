@@ -85,11 +85,19 @@ def test_each_alarm_is_raised_beyond_its_limit(changed, raised):
 
 def made_point(sd=0.1, **values):
     """A fit of one operating point: coordinates by name, all with one standard deviation; `flat`
-    has no prior, `x@y` is an effect's."""
+    has no prior, `leak__position` is that of the effect leak@line."""
     names = list(values)
-    parameters = tuple(SimpleNamespace(name=n.replace("__", "@"), flat=n == "flat") for n in names)
+    parameters = tuple(
+        SimpleNamespace(
+            name=n.replace("__", "@line."),
+            flat=n == "flat",
+            place=n.partition("__")[0] + "@line" if "__" in n else "line",
+        )
+        for n in names
+    )
     twin = SimpleNamespace(
         parameters=parameters,
+        effects=[(SimpleNamespace(name="leak"), "line")],
         index={p.name: k for k, p in enumerate(parameters)},
         theta=np.array(list(values.values())),
     )
@@ -107,6 +115,21 @@ def test_disagreement_is_in_standard_deviations_of_the_difference():
     assert found == (pytest.approx(expected), "length")
     assert largest_disagreement([made_point(length=1.0), b, a])[1] == "length"
     assert largest_disagreement([a]) == (0.0, "")
+
+
+def test_an_at_sign_in_a_name_is_no_effect():
+    """The drift of a recording with the legal label hot@95bar, and the place of a sensor p@2, are
+    parameters of the line."""
+    for name in ("state[hot@95bar]", "position[p@2]"):
+        found = largest_disagreement([made_point(**{name: 1.0}), made_point(**{name: 0.0})])
+        assert found[0] > 1.0 and found[1] == name
+    bench, seen, _ = make(np.random.default_rng(10))
+    sensors = tuple(replace(s, name=f"{s.name}@2") for s in bench.sensors)
+    twin = Twin(replace(bench, sensors=sensors), [replace(o, sensors=sensors) for o in seen])
+    theta = np.zeros_like(twin.theta)
+    name = f"position[{sensors[0].name}]"
+    theta[twin.index[name]] = -5.0
+    assert largest_pull(SimpleNamespace(twin=twin.with_(theta=theta))) == (5.0, name)
 
 
 def test_a_posterior_wider_than_its_prior_adds_no_variance():
@@ -144,7 +167,7 @@ def test_the_misfit_alarm_is_what_the_best_correction_adds(monkeypatch):
     monkeypatch.setattr(rules, "SmoothCorrections", Corrections)
     monkeypatch.setattr(rules, "elements_of", lambda rig, observations: ["listed"])
     rig = SimpleNamespace(tolerance_scale=1.0)
-    base = SimpleNamespace(twin=SimpleNamespace(rig=rig, parameters=(), theta=()))
+    base = SimpleNamespace(twin=SimpleNamespace(rig=rig, parameters=(), theta=(), effects=()))
     assert read_alarms(base, [], [], [], [], 0.0).misfit == 30.0
 
 

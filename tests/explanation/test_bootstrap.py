@@ -12,6 +12,7 @@ from rippletwin.explanation.checks.bootstrap import (
     bootstrap_null,
     draw_without_effects,
 )
+from rippletwin.explanation.explain import explain, explain_observations
 from rippletwin.explanation.search import stepwise_search
 from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
 from rippletwin.twin.twin import Twin
@@ -81,6 +82,16 @@ def test_no_draw_without_an_effect_reaches_the_threshold(fitted, monkeypatch):
     assert max(found.log_bayes_factors) < MIN_LOG_BAYES_FACTOR
     with pytest.raises(ValueError, match="10"):
         bootstrap_null(fit, observations, 9)
+
+
+def test_too_few_draws_are_refused_before_anything_is_fitted():
+    """Neither a case nor observations are looked at, which here are none."""
+    for explained in (
+        lambda: explain(None, draws=9),
+        lambda: explain_observations(None, (), draws=9),
+    ):
+        with pytest.raises(ValueError, match="9 draws are too few"):
+            explained()
 
 
 KEPT = ("unsteady_friction", "load_volume", "source_impedance")

@@ -8,7 +8,7 @@ import pytest
 
 from rippletwin.calibration.misfit import Score
 from rippletwin.explanation.checks import cross_validation
-from rippletwin.explanation.checks.cross_validation import Validation, find_disagreement
+from rippletwin.explanation.checks.cross_validation import Validation, find_disagreement, make_folds
 from rippletwin.explanation.fit_jobs import (
     FitJob,
     FromTheta,
@@ -103,3 +103,15 @@ def test_a_gas_is_no_volume_of_oil(gas):
     ]
     found = find_disagreement(whole, parts, "line_volume@")
     assert (found.deviations > MAX_DISAGREEMENT) == gas
+
+
+def test_a_fold_of_a_spectrum_says_which_eighths_it_leaves_out():
+    """Counted from 1: the first fold leaves out the second eighth, which holds none of the lowest
+    frequencies, and so on; the second fold leaves out the first."""
+    _, (observation, *_), _ = make(np.random.default_rng(2), points=POINTS[:1])
+    first, second = make_folds(Workers(None, [observation]))
+    lowest = observation.frequency_hz[0]
+    assert first.left_out == "even eighths of the band"
+    assert lowest not in first.held_out[0].frequency_hz
+    assert second.left_out == "odd eighths of the band"
+    assert lowest in second.held_out[0].frequency_hz

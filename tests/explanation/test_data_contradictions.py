@@ -10,7 +10,6 @@ from rippletwin.calibration.frequency_continuation import fit_hypothesis
 from rippletwin.explanation.checks import data_contradictions
 from rippletwin.explanation.checks.data_contradictions import find_contradictions
 from rippletwin.explanation.checks.sensor_wiring import find_swapped_sensors
-from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.twin import Twin
@@ -127,7 +126,7 @@ def test_wrong_wiring_is_reported(what):
         observations = [replace(o, values=o.values * [[1.0], [-1.0]]) for o in observations]
     base = Twin(bench, observations)
     fit = fit_hypothesis(base, (), observations)
-    words = find_swapped_sensors(base, observations, Search(fit, [], fit))
+    words = find_swapped_sensors(base, observations, fit)
     expected = {"sound": "", "exchanged": "p1 and p2 are exchanged", "sign": "is inverted"}[what]
     assert (words == "") if not expected else (expected in words)
 

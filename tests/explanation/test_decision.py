@@ -1,15 +1,18 @@
 """The decision: from the support of effects and the alarms to a verdict."""
 
+from contextlib import nullcontext
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from made_fits import made_fit
+from rippletwin.explanation import explain
 from rippletwin.explanation.checks.alarms import Alarms
 from rippletwin.explanation.checks.bootstrap import NullDistribution
 from rippletwin.explanation.checks.robustness import Robustness
-from rippletwin.explanation.checks.support import Support, support_level
+from rippletwin.explanation.checks.support import Judged, Support, support_level
 from rippletwin.explanation.localise.source_free_fits import compare_evidence
 from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.thresholds import (
@@ -261,6 +264,24 @@ def test_other_positions_are_those_of_the_best_hypothesis():
     assert rival_fits(search) == [same]
 
 
+def test_another_position_that_the_best_fit_has_left_behind_is_no_rival():
+    """The best fit has come to a better mode since the positions were searched."""
+    base, best = made_fit(0.0), made_fit(50.0, HOSE)
+    near = made_fit(50.1 - EQUIVALENT_LOG_BAYES_FACTOR, HOSE)
+    far = made_fit(49.9 - EQUIVALENT_LOG_BAYES_FACTOR, HOSE)
+    assert rival_fits(Search(base, [best], best, other_positions=[near, far])) == [near]
+
+
+def test_a_hypothesis_in_two_orders_has_one_probability():
+    """A hose and a volume were found from either side and fitted twice, less well last: they count
+    once, by the better fit."""
+    base, both = made_fit(0.0), made_fit(2.0, HOSE, VOLUME)
+    search = Search(base, [], both, [made_fit(1.5, VOLUME, HOSE)])
+    for accepted in (both, made_fit(1.0, HOSE, VOLUME)):
+        found = posterior_probabilities(replace(search, rivals=[*search.rivals, both]), accepted)
+        assert found["line_volume"] == pytest.approx(np.exp(2.0) / (1.0 + np.exp(2.0)))
+
+
 def test_probabilities_of_much_evidence_are_numbers():
     """exp(evidence) overflows from 710 on. Evidence of 1e4 beside 1e4 - 1 has the probability of 1
     beside 0, and a hypothesis that was fitted twice counts once."""
@@ -268,3 +289,45 @@ def test_probabilities_of_much_evidence_are_numbers():
     search = Search(base, [best, other], best, [best, best])
     probability = posterior_probabilities(search, best)["viscoelastic_wall"]
     assert probability == pytest.approx(1.0 / (1.0 + np.exp(-1.0)))
+
+
+@pytest.mark.parametrize(
+    ("alarms", "wiring", "verdict"),
+    [
+        (NO_ALARM, "", "calibration_only"),
+        (MISFIT_RAISED, "", "unexplained"),
+        (NO_ALARM, "p1 and p2 are exchanged", "bad_data"),
+    ],
+)
+def test_the_scores_are_those_of_what_is_accepted(monkeypatch, alarms, wiring, verdict):
+    """Where the explanation is rejected, as a suggestion or for wrong wiring, the line alone is
+    accepted and cross-validated. A suggestion that is accepted keeps its scores."""
+    base, best = made_fit(0.0), made_fit(100.0, HOSE)
+    search = Search(base, [best], best)
+    sheet, point = (SimpleNamespace(rivals=True),), SimpleNamespace(label="point 1")
+    stand_ins = {
+        "prepare_stage": lambda *_: SimpleNamespace(base=None, observations=[point]),
+        "search_in_stages": lambda stage, *_: (stage, search),
+        "open_workers": lambda *_: nullcontext(SimpleNamespace(fit=lambda jobs: [None])),
+        "_judge_explanation": lambda *_: (
+            search,
+            Judged(best, (support("suggested"),), ()),
+            wiring,
+        ),
+        "fit_each_observation": lambda *_: [],
+        "read_alarms": lambda *_: alarms,
+        "refit_source_free": lambda *_: [],
+        "cross_validate": lambda w, base, fit, *_: SimpleNamespace(of=fit, model_error=0.004),
+        "compare_without_each_effect": lambda *_: sheet,
+        "withhold_what_is_in_doubt": lambda judged, *_: judged,
+        "add_sensor_tolerance": lambda fit, _: fit,
+        "locate_mismatch": lambda *_: None,
+        "find_remainder": lambda *_: None,
+        "analyse_shaft_orders": lambda *_: None,
+    }
+    for name, stand_in in stand_ins.items():
+        monkeypatch.setattr(explain, name, stand_in)
+    found = explain.explain_observations(SimpleNamespace(delay=0.01), [point])
+    assert found.decision.verdict == verdict
+    assert found.validation.of is found.decision.accepted
+    assert found.decision.accepted is (best if verdict == "unexplained" else base)

@@ -15,8 +15,8 @@ from rippletwin.explanation.stages.preparation import HIGHEST_HZ
 from rippletwin.explanation.verdict.expected_confusion import (
     CHANGE,
     _Rival,
+    describe_discriminations,
     expect_discriminations,
-    in_words,
 )
 from rippletwin.explanation.verdict.next_experiment import FLAT_VARIANCE
 from rippletwin.spectra.observation import Observation
@@ -108,7 +108,7 @@ def test_an_impedance_is_compared_with_itself():
 
 def test_every_effect_is_told_once_in_words(nominal):
     """What is noticed and what is absorbed are all effects, each once."""
-    head, noticed, absorbed, *_ = in_words(list(nominal.values()))
+    head, noticed, absorbed, *_ = describe_discriminations(list(nominal.values()))
     names = ", ".join(line.split(": ")[1] for line in (noticed, absorbed))
     told = [name for name in names.split(", ") if name != "none"]
     assert sorted(told) == sorted(name.replace("_", " ") for name in nominal)

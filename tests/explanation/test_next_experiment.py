@@ -9,11 +9,16 @@ import pytest
 from made_fits import made_fit
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.frequency_continuation import refine
-from rippletwin.explanation.verdict.candidate_recordings import candidate_recordings
+from rippletwin.explanation.verdict import next_experiment
+from rippletwin.explanation.verdict.candidate_recordings import (
+    candidate_recordings,
+    further_sensors,
+)
 from rippletwin.explanation.verdict.decision import equivalent_places, rival_fits
 from rippletwin.explanation.verdict.next_experiment import (
     expected_loss,
     propose_recording,
+    propose_sensor_position,
     transfer_twin,
 )
 from rippletwin.twin.effects.base import Place
@@ -28,6 +33,7 @@ TRUTH = {
     "viscoelastic_wall@segment 2.retardation_time": 3e-4,
     "entrained_air@line.gas_fraction": 5e-3,
 }
+PLACE = Place("position")
 POINTS = ((1000, 9.5e6),)
 PUMP = {"pistons": 9, "port_opening_deg": 20.0, "port_overlap_deg": 2.0, "bulk_modulus": 1.3e9}
 
@@ -119,6 +125,38 @@ def test_the_scaled_ripple_keeps_everything_but_its_size(uncertain_pump):
             scale = o.speed_hz / observations[0].speed_hz
             np.testing.assert_allclose(o.flow_ripple.flow, scale * old.flow)
             assert o.flow_ripple.modulation == old.modulation
+
+
+@pytest.mark.parametrize(
+    "networks",
+    [
+        [("passive_network", Place("position", form="shunt", number=k)) for k in (1, 2)],
+        [("passive_network", Place("position", form="series")), ("passive_piece", PLACE)],
+    ],
+)
+def test_a_further_sensor_narrows_the_newest_network(monkeypatch, networks):
+    """Of two networks, whatever their kind, the newest is moved to either end of its interval, and
+    nothing else is; the sensor that tells the ends apart best is proposed."""
+    bench, observations, _ = make(np.random.default_rng(11), points=POINTS)
+    hypothesis = tuple((EFFECTS[name], place) for name, place in networks)
+    twin = Twin(bench, observations, effects=hypothesis)
+    fit = Fit(hypothesis, twin, 0.0, 0.0, 0.01 * np.eye(len(twin.theta)), 0.004, 0.01, 0.01)
+    moved = []
+
+    def loss(one, other, rig, observation):
+        moved.append((one.twin.values(), other.twin.values()))
+        return float(rig.sensors[-1].position)
+
+    monkeypatch.setattr(next_experiment, "expected_loss", loss)
+    proposal = propose_sensor_position(fit, observations, 2.0, 6.0)
+    (name, place), unmoved = networks[-1], twin.values()
+    newest = f"{name}@{place}.position"
+    for one, other in moved:
+        assert one[newest] == pytest.approx(2.0) and other[newest] == pytest.approx(6.0)
+        assert one == unmoved | {newest: one[newest]}
+        assert other == unmoved | {newest: other[newest]}
+    assert proposal.loss == max(rig.sensors[-1].position for _, rig, _ in
+                                further_sensors(twin, observations))  # fmt: skip
 
 
 def test_gains_of_two_sensors_are_one_class():

@@ -1,13 +1,18 @@
 """Passive networks find series elements that no library has, whatever the search named before."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from made_fits import made_fit
+from rippletwin.explanation import explain
 from rippletwin.explanation.checks.profile_intervals import effect_intervals
+from rippletwin.explanation.checks.support import Judged
 from rippletwin.explanation.fit_jobs import FitJob, open_workers
-from rippletwin.explanation.search.passive_networks import fit_passive_networks
+from rippletwin.explanation.search.passive_networks import accepted_network, fit_passive_networks
+from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.stages.preparation import prepare_base
 from rippletwin.explanation.verdict.verdict_file import _remainder
 from rippletwin.line.frequency_domain.line_network import Insert
@@ -86,6 +91,34 @@ def hose(network, state, values, place):
 
 
 HOSE = Effect("hose", "position", "any", "", "", lambda r, p: (), position_place, hose)
+
+
+def test_intervals_and_wiring_are_those_of_the_network_that_stands_in(monkeypatch):
+    """The network that is accepted beside the volume, and the one that was begun anew without it,
+    get interval ends, and the wiring of the sensors is tested against them; the search has each
+    hypothesis once and accepts the network with the intervals."""
+    volume, network = (
+        (EFFECTS[name], Place("position")) for name in ("line_volume", "passive_piece")
+    )
+    base, best = made_fit(0.0), made_fit(100.0, volume, model_error=0.05)
+    beside, anew = made_fit(120.0, volume, network), made_fit(130.0, network)
+    judged, told = Judged(best, (), ()), []
+    ends = {0: (-1.0, 1.0)}
+    monkeypatch.setattr(explain, "judge_effects", lambda *_: judged)
+    monkeypatch.setattr(explain, "judge_beside_network", lambda w, b, fit, j: (fit, j))
+    monkeypatch.setattr(
+        explain, "add_profile_intervals", lambda w, fit: replace(fit, interval_ends=ends)
+    )
+    monkeypatch.setattr(explain, "fit_gas_rivals", lambda *_: [])
+    monkeypatch.setattr(explain, "find_swapped_sensors", lambda b, o, fit: told.append(fit) or "")
+    workers = SimpleNamespace(base=None, observations=[])
+    for fits in ([beside, anew], [anew, beside]):
+        monkeypatch.setattr(explain, "fit_passive_networks", lambda *_: fits)  # noqa: B023
+        search, _, wrong = explain._judge_explanation(workers, Search(base, [best], best), None)
+        accepted = accepted_network(search)
+        assert accepted.hypothesis == fits[0].hypothesis and accepted.interval_ends == ends
+        assert search.passive_networks[1:] == fits[1:]
+        assert told[-1] is accepted and wrong == ""
 
 
 def test_a_piece_of_hose_is_found_with_its_delay_and_impedance():

@@ -8,6 +8,7 @@ import pytest
 from rippletwin.calibration.frequency_continuation import refine
 from rippletwin.calibration.levenberg_marquardt import descend
 from rippletwin.calibration.posterior import Posterior
+from rippletwin.explanation.checks import profile_intervals
 from rippletwin.explanation.checks.profile_intervals import (
     INTERVAL_RISE,
     MAX_RISE,
@@ -122,3 +123,23 @@ def test_a_better_mode_that_cannot_be_fitted_is_left(hose):
     found = add_profile_intervals(StubWorkers(), fit)
     assert found.objective == fit.objective
     assert set(found.interval_ends.values()) == {(-1.0, 1.0)}
+
+
+@pytest.mark.parametrize(
+    ("rises", "distance"),
+    [([], 1.96), ([0.1], 1.96), ([0.1, 0.2, 0.3], 4.0), ([2.0 * INTERVAL_RISE], 1.06)],
+)
+def test_an_interval_does_not_end_where_the_fits_fail(hose, monkeypatch, rises, distance):
+    """The line has no prediction beyond the last of the `rises`. The interval then ends at least
+    where the curvature puts it, unless the profile has ended it before."""
+    workers, fit = hose
+    k = fit.twin.index["viscoelastic_wall@segment 2.compliance_ratio"]
+
+    def descend_to(posterior, theta, steps, fixed, errors=True):
+        return theta, next(values) if errors else 0.0
+
+    monkeypatch.setattr(profile_intervals, "descend", descend_to)
+    for side in (-1, 1):
+        values = iter([fit.objective + rise for rise in rises] + [np.inf])
+        end = trace_profile(workers.base, workers.observations, ProfileJob(fit, k, side)).end
+        assert side * (end - fit.twin.theta[k]) / fit.sd[k] == pytest.approx(distance, rel=0.01)

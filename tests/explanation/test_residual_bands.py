@@ -1,5 +1,7 @@
 """Frequency bands and shaft angles of residuals that were made to lie there."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -43,6 +45,23 @@ def test_scattered_excess_gives_few_bands_with_most_of_it():
 def test_a_residual_of_the_expected_size_has_no_band():
     """A mean square below 1 everywhere gives no band."""
     assert residual_bands.find_frequency_bands(np.arange(1.0, 20.0), np.full(19, 0.5), 1.0) == []
+
+
+def test_one_frequency_is_a_band_of_no_width():
+    """Residuals at one frequency alone, at one operating point or at two."""
+    for count in (1, 2):
+        found = residual_bands.find_frequency_bands(np.full(count, 150.0), np.full(count, 9.0), 1.0)
+        assert found == [[150.0, 150.0]]
+
+
+def test_operating_points_of_one_frequency_each_have_bands(monkeypatch):
+    """In a narrow band each recording may have one harmonic, which has no neighbour: the band is at
+    the one that is in excess."""
+    points = [SimpleNamespace(frequency_hz=np.array([f])) for f in (150.0, 180.0, 225.0)]
+    whitened = SimpleNamespace(observations=points), np.array([[1.0, 9.0, 1.0]])
+    monkeypatch.setattr(residual_bands, "_whitened_residual", lambda *_: whitened)
+    ((low, high),) = residual_bands.residual_frequency_bands(None, points)
+    assert 160.0 < low < 180.0 < high < 205.0
 
 
 def burst(at_deg, width_deg, pitch_deg=40.0, harmonics=26, samples=360):

@@ -34,6 +34,33 @@ def test_an_exchange_that_simplifying_undoes_ends_the_search(monkeypatch):
     assert found.best.hypothesis == (VOLUME,) and len(rounds) == 1
 
 
+def test_where_an_exchange_is_undone_the_answers_own_positions_are_searched(monkeypatch):
+    """The branch of the exchange is simplified to the volume again. The other positions of the
+    answer are then those of the volume, and a better one of them becomes the answer."""
+    volume, elsewhere = made_fit(100.0, VOLUME), made_fit(105.0, VOLUME)
+    branch = made_fit(103.0, BRANCH)
+    others = {id(volume): made_fit(99.0, VOLUME), id(elsewhere): made_fit(104.0, VOLUME)}
+
+    def search(better):
+        def move(workers, fit):
+            if fit is branch:
+                return fit, [made_fit(102.0, BRANCH)]
+            fit = elsewhere if better else fit
+            return fit, [others[id(fit)]]
+
+        monkeypatch.setattr(stepwise_search, "exchange_effects", lambda *_: branch)
+        monkeypatch.setattr(stepwise_search, "_revise", lambda *_: volume)
+        monkeypatch.setattr(stepwise_search, "move_to_best_position", move)
+        monkeypatch.setattr(stepwise_search, "fit_extensions", lambda *_: [])
+        monkeypatch.setattr(stepwise_search, "fit_substitutes", lambda *_: [])
+        start = Search(made_fit(0.0), [], volume)
+        return _search_stepwise(SimpleNamespace(), start, [VOLUME, BRANCH], None)
+
+    for better, answer in ((False, volume), (True, elsewhere)):
+        found = search(better)
+        assert found.best is answer and found.other_positions == [others[id(answer)]]
+
+
 def test_an_exchange_back_to_an_earlier_explanation_ends_the_search(monkeypatch):
     """From a volume the search comes to a volume and a wall, from there an exchange leads back to
     the volume alone. The search ends with both after one exchange."""

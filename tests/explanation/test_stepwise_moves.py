@@ -11,6 +11,7 @@ from rippletwin.explanation.fit_jobs import FitJob, NearFit
 from rippletwin.explanation.search import single_effects, stepwise_moves
 from rippletwin.explanation.search.single_effects import fit_single_effects
 from rippletwin.explanation.search.stepwise_moves import (
+    PROMISING,
     drop_needless_effects,
     extension_job,
     fit_extensions,
@@ -249,21 +250,29 @@ def test_a_form_with_more_parameters_takes_the_place_of_the_one_with_fewer():
 
 
 def test_always_present_effects_are_fitted_whatever_they_promise(monkeypatch):
-    """A score test does not decide about them, and they leave room for others."""
+    """A score test does not decide about them, and they leave room for others: with them one more
+    may be fitted than are promising."""
     places = [(EFFECTS["sensor_delay"], Place(f"sensor p{k}", k)) for k in range(1, 12)]
     monkeypatch.setattr(stepwise_moves, "rank_at_exact_modes", lambda workers, best, fits: fits)
     asked = []
 
     def fit(jobs, report=None):
         asked.extend(job.hypothesis[-1] for job in jobs)
+        for _ in jobs if report else ():
+            report()
         return [made_fit(100.0, *job.hypothesis) for job in jobs]
 
     def score(function, jobs):
-        return [(0.0, job) for job in jobs]
+        return [(promise, job) for job in jobs]
 
     workers = SimpleNamespace(fit=fit, map=score, base=SimpleNamespace(rig=rig()))
-    fit_extensions(workers, made_fit(100.0, HOSE), [*places, ALWAYS_PRESENT], None)
+    candidates, told = [*places, ALWAYS_PRESENT], []
+    promise = 0.0
+    fit_extensions(workers, made_fit(100.0, HOSE), candidates, None)
     assert asked == [ALWAYS_PRESENT]
+    promise = 50.0
+    fit_extensions(workers, made_fit(100.0, HOSE), candidates, lambda *each: told.append(each))
+    assert told[-1] == ("2 effects", PROMISING + 1, PROMISING + 1)
 
 
 def test_usual_effects_take_no_room_from_what_is_searched_for(monkeypatch):

@@ -10,6 +10,7 @@ from rippletwin.explanation.checks.cross_validation import cross_validate
 from rippletwin.explanation.fit_jobs import Workers
 from rippletwin.explanation.search.stepwise_search import (
     Search,
+    _accepted_extension,
     _accepted_pair,
     _search_stepwise,
     resume_search,
@@ -24,6 +25,7 @@ from synthetic_observations import make
 VOLUME = (EFFECTS["line_volume"], Place("position"))
 HOSE = (EFFECTS["viscoelastic_wall"], Place("segment 2", 1))
 GAIN = (EFFECTS["sensor_gain"], Place("sensor p2", 1))
+RADIATION = (EFFECTS["end_radiation"], Place("load"))  # always present
 
 
 @pytest.fixture
@@ -131,3 +133,18 @@ def test_two_effects_that_help_only_together_are_accepted(monkeypatch):
     assert search(enough + 1.0)
     assert not search(enough - 1.0)
     assert not search(enough + 1.0, made_fit(100.0, VOLUME))
+
+
+def test_an_always_present_effect_needs_less_beside_another_effect_only():
+    """Alone it needs as much as any other. Beside a hose it is accepted unless the data are 20 to 1
+    against it, also where another effect adds more and not enough."""
+    alone, hose, gain = made_fit(0.0), made_fit(100.0, HOSE), made_fit(105.0, HOSE, GAIN)
+    for evidence, accepted in ((MIN_LOG_BAYES_FACTOR - 1.0, False), (MIN_LOG_BAYES_FACTOR, True)):
+        radiation = made_fit(evidence, RADIATION)
+        assert _accepted_extension(alone, [radiation]) is (radiation if accepted else None)
+    for evidence, accepted in ((98.0, True), (96.0, False)):
+        radiation = made_fit(evidence, HOSE, RADIATION)
+        assert _accepted_extension(hose, [gain, radiation]) is (radiation if accepted else None)
+    enough = made_fit(100.0 + MIN_LOG_BAYES_FACTOR, HOSE, GAIN)
+    assert _accepted_extension(hose, [enough, made_fit(99.0, HOSE, RADIATION)]) is enough
+    assert _accepted_extension(hose, []) is None

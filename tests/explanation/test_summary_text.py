@@ -35,7 +35,8 @@ def summarise(
     **decision,
 ):
     """The sentence of a verdict without effects in the line; its misfits are 2 %."""
-    twin = SimpleNamespace(parameters=(), theta=(), rig=SimpleNamespace(tolerance_scale=1.0))
+    sheet = SimpleNamespace(tolerance_scale=1.0)
+    twin = SimpleNamespace(parameters=(), theta=(), effects=(), rig=sheet)
     e = SimpleNamespace(
         shaft_orders=shaft_orders,
         alarms=SimpleNamespace(raised=raised, pull=pull, drift=(1e-9, "recording 1")),
@@ -152,14 +153,15 @@ def test_what_remains_is_told_with_place_and_law():
         (["entrained_air", "line_volume"], (9e6, 9.5e6), False, []),
         (["entrained_air", "line_volume"], (None,), False, []),
         (["load_volume"], (9e6,), False, ["a small volume of gas"]),
-        (["line_volume"], (9e6,), True, []),
+        (["load_volume"], (9e6,), True, []),
         (["unsteady_friction"], (9e6,), False, []),
     ],
 )
 def test_what_one_pressure_cannot_tell_apart(names, pressures, is_gas, told):
     """At pressures within 5 % a liquid that stiffens fits as well as entrained air, and gas as well
     as a volume of liquid. The sentences say so there, and nowhere else."""
-    said = pressure_sentences(names, pressures, is_gas)
+    observations = [SimpleNamespace(load_pressure=p) for p in pressures]
+    said = pressure_sentences(names, observations, is_gas)
     assert len(said) == len(told)
     assert all(words in sentence for words, sentence in zip(told, said))
 
@@ -233,7 +235,8 @@ def explained(
         value=1.6, nominal=1.8, unit="m", pull=10.0, rivals=True,
     )  # fmt: skip
     load = {**vars(rival), "parameter": "load", "value": 0.395, "nominal": 1.0, "unit": ""}
-    twin = SimpleNamespace(parameters=(), theta=(), rig=SimpleNamespace(tolerance_scale=1.0))
+    sheet = SimpleNamespace(tolerance_scale=1.0)
+    twin = SimpleNamespace(parameters=(), theta=(), effects=(), rig=sheet)
     e = SimpleNamespace(
         rig=rig,
         shaft_orders=None,

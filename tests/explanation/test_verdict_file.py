@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from made_fits import made_fit
 from rippletwin.calibration.frequency_continuation import refine
 from rippletwin.calibration.misfit import Score
 from rippletwin.explanation.checks.alarms import Alarms
+from rippletwin.explanation.checks.bootstrap import NullDistribution
 from rippletwin.explanation.checks.cross_validation import Disagreement, Validation
 from rippletwin.explanation.checks.support import Support
 from rippletwin.explanation.localise.shaft_orders import ShaftEffect, ShaftOrders
@@ -16,6 +18,8 @@ from rippletwin.explanation.verdict import verdict_file
 from rippletwin.explanation.verdict.decision import Decision
 from rippletwin.explanation.verdict.explanation import Explanation
 from rippletwin.explanation.verdict.verdict_file import verdict_dict
+from rippletwin.twin.effects.base import Place
+from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.twin import Twin
 from synthetic_observations import POINTS, make
 
@@ -36,7 +40,6 @@ def explanation():
         alarms=Alarms(0.004, (0.1, "load"), (0.1, "load"), (0.5, "point 1")),
         validation=Validation(scores, scores, scores, ("recording 1",), 0.0, 0.004),
         decision=Decision("consistent", base),
-        point_fits=(),
         shaft_orders=MODULATION,
     )
 
@@ -113,3 +116,42 @@ def test_before_is_the_best_that_calibration_without_effects_reaches(explanation
     assert fit["before"]["theil_held_out"] == 0.009
     assert fit["after"]["in_sample"] == 0.02
     assert fit["model_error"]["before"] == explanation.search.base.model_error
+
+
+HOSE = (EFFECTS["viscoelastic_wall"], Place("segment 1", 0))
+VOLUME = (EFFECTS["line_volume"], Place("position"))
+
+
+def test_places_of_a_rejected_effect_are_not_told_for_a_speed_fluctuation(explanation):
+    """The search took a hose in either segment, which the checks rejected: the verdict names the
+    speed fluctuation alone, and nothing is equivalent."""
+    base, elsewhere = explanation.search.base, (HOSE[0], Place("segment 2", 1))
+    hoses = [made_fit(base.evidence + 20.0, hose) for hose in (HOSE, elsewhere)]
+    search = replace(explanation.search, best=hoses[0], rivals=hoses)
+    result = verdict_dict(replace(decided(explanation, "calibration_only"), search=search))
+    assert result["verdict"] == "named" and result["equivalents"] == []
+    assert result["next_recording"] is None
+
+
+def test_the_p_value_bounds_all_hypotheses_that_were_fitted(explanation):
+    """Two single effects, a pair found in two orders and a network are four hypotheses, for one of
+    which there may be so much evidence. Draws are fitted with single effects, so with them the best
+    single effect counts, not the pair."""
+    base = explanation.search.base
+    single, other, pair, turned, network = (
+        made_fit(base.evidence + gain, *hypothesis)
+        for gain, hypothesis in (
+            (4.0, (HOSE,)),
+            (2.0, (VOLUME,)),
+            (10.0, (HOSE, VOLUME)),
+            (9.0, (VOLUME, HOSE)),
+            (3.0, ((EFFECTS["passive_piece"], Place("position")),)),
+        )
+    )
+    search = Search(base, [single, other], pair, [turned, pair], [network])
+    e = replace(explanation, search=search, decision=Decision("consistent", pair))
+    assert verdict_file._mismatch(e, "consistent", [])["p_value"] == pytest.approx(
+        4 * np.exp(-10.0)
+    )
+    drawn = replace(e, null_distribution=NullDistribution((*[1.0] * 8, 5.0, 6.0)))
+    assert verdict_file._mismatch(drawn, "consistent", [])["p_value"] == pytest.approx(3 / 11)

@@ -25,26 +25,30 @@ def attended(region):
     """A figure of attention in images, with marks where the fault is or without."""
     marks = np.tile(HZ < 200, (3, 1)) if region else None
     heat = np.stack([ALIKE, ALIKE])
-    return attention.images(NETWORKS, STATES, ALIKE, heat, SHARES, HZ, 16.7, 9, marks)
+    return attention.plot_images(NETWORKS, STATES, ALIKE, heat, SHARES, HZ, 16.7, 9, marks)
 
 
 DRAWN = {
-    "calibration": lambda: ripple.overlay(ANGLES, RIPPLES, ["p1", "p2"], "1000 r/min"),
-    "states": lambda: ripple.states(ANGLES, dict(zip(STATES, ALIKE[:, 0].repeat(3, 1))), "bar"),
-    "confusion": lambda: diagnosis.confusion(dict.fromkeys(NETWORKS, np.eye(3)), STATES, STATES),
-    "accuracy": lambda: diagnosis.accuracy(
+    "calibration": lambda: ripple.plot_overlay(ANGLES, RIPPLES, ["p1", "p2"], "1000 r/min"),
+    "states": lambda: ripple.plot_states(
+        ANGLES, dict(zip(STATES, ALIKE[:, 0].repeat(3, 1))), "bar"
+    ),
+    "confusion": lambda: diagnosis.plot_confusion(
+        dict.fromkeys(NETWORKS, np.eye(3)), STATES, STATES
+    ),
+    "accuracy": lambda: diagnosis.plot_accuracy(
         NETWORKS, {"CFD-P": np.array([[90.0, 3.0]] * 2)}, {"CFD-P": np.array([[80.0, 2.0]] * 2)}
     ),
-    "images": lambda: diagnosis.sst(dict(zip(STATES, ALIKE)), HZ, 16.7, 9),
-    "attention": lambda: attention.windows(
+    "images": lambda: diagnosis.plot_sst(dict(zip(STATES, ALIKE)), HZ, 16.7, 9),
+    "attention": lambda: attention.plot_windows(
         NETWORKS, STATES, ALIKE[:, 0], np.stack([ALIKE[:, 0]] * 2), SHARES, "ripple / bar"
     ),
     "attention in images": lambda: attended(region=False),
     "attention in images, marked": lambda: attended(region=True),
-    "ranks": lambda: attention.ranks(
+    "ranks": lambda: attention.plot_ranks(
         {"CFD-P": (NETWORKS, [False, True], np.full((2, 2), 0.9), np.full((2, 2), 80.0))}
     ),
-    "claims": lambda: attention.claims(
+    "claims": lambda: attention.plot_claims(
         {"Images are better": (["a network", "another"], np.array([[5.0, 2, 8], [-3, -9, 1]]))}
     ),
     "ripple": lambda: plot_ripple(made_numbers()),
@@ -108,6 +112,53 @@ def test_a_logarithmic_axis_says_so(name):
     words = " ".join(t.get_text() for t in texts(figure))
     scales = {axis.get_scale() for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)}
     assert ("logarithmic" in words) is bool(scales & {"log", "symlog"})
+
+
+def named(numbers, name):
+    """The numbers behind explain's figures, each sensor, recording and effect called `name`."""
+    points = [replace(p, sensors=(name,) * 2, label=name, speed_rpm=None) for p in numbers.points]
+    places = numbers.places
+    sensors = tuple((name, x) for _, x in places.sensors)
+    found = tuple(replace(place, words=name) for place in places.found)
+    return replace(
+        numbers,
+        points=tuple(points),
+        places=replace(places, sensors=sensors, found=found),
+        candidates=tuple(replace(c, effects=(name,)) for c in numbers.candidates),
+        missing=tuple(replace(m, effect=name) for m in numbers.missing),
+    )
+
+
+OF_NAMES = {
+    "ripple": lambda name: plot_ripple(named(made_numbers(), name)),
+    "residuals": lambda name: plot_residuals(named(made_numbers(), name)),
+    "evidence": lambda name: plot_evidence(named(made_numbers(), name)),
+    "immittance": lambda name: plot_immittance(named(made_numbers(), name)),
+    "place": lambda name: plot_place(named(made_numbers(), name)),
+    "change": lambda name: plot_change(replace(made_change(name), sensors=[name, name])),
+    "severity": lambda name: plot_severity(made_change(name)),
+    "calibration": lambda name: ripple.plot_overlay(ANGLES, RIPPLES, [name, name], name),
+}
+
+
+@pytest.mark.parametrize("figure", OF_NAMES)
+def test_a_dollar_in_a_name_is_a_dollar(figure):
+    """Between two of them matplotlib reads mathematics, and fails where it is none."""
+    drawn = texts(OF_NAMES[figure]("a$^$b"))
+    assert any("a\\$^\\$b" in text.get_text() for text in drawn)
+
+
+def test_the_residual_of_one_frequency_is_drawn():
+    """A band may leave one frequency: its cell has edges of its own."""
+    numbers = made_numbers()
+    first = numbers.points[0]
+    one = {
+        name: getattr(first, name)[..., :1]
+        for name in ("frequency_hz", "orders", "measured", "calibrated", "corrected")
+        + ("residual_calibrated", "residual_corrected")
+    }
+    figure = plot_residuals(replace(numbers, points=(replace(first, **one),)))
+    assert "which frequencies" in " ".join(t.get_text() for t in texts(figure))
 
 
 def test_a_ripple_panel_says_speed_pressure_and_error():

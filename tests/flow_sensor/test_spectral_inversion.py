@@ -173,5 +173,8 @@ def test_band_limit_keeps_the_orders_of_the_bandwidth():
 
 @pytest.mark.parametrize("bandwidth", [10.0, 30000.0])
 def test_bandwidth_without_orders_is_refused(bandwidth):
-    with pytest.raises(ValueError, match="bandwidth"):
+    """The message has the key of the configuration and both ends of what it may be, in Hz."""
+    with pytest.raises(ValueError, match=r"flow_sensor\.bandwidth_hz") as caught:
         orders_within(bandwidth, SPEED, SAMPLES)
+    for end in (SPEED, SAMPLES * SPEED / 2):
+        assert f"{end:.4g} Hz" in str(caught.value)

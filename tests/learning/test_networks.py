@@ -6,8 +6,10 @@ import sys
 
 import pytest
 import torch
+import yaml
 from torch import nn
 
+from paths import ROOT
 from rippletwin.learning.architectures import ARCHITECTURES
 from rippletwin.learning.networks import build
 
@@ -88,6 +90,17 @@ def test_all_take_one_or_two_channels_and_small_images(name, channels):
     """Flow (one channel) and pressure (two) pass through every network and give four logits."""
     shape = (3, channels, 3072) if name in TIME else (3, channels, 32, 32)
     assert build(name, channels).eval()(torch.zeros(shape)).shape == (3, 4)
+
+
+def test_every_network_takes_the_smallest_inputs_of_a_configuration():
+    """An image leaves something behind every layer, and no cyclic padding is cut, which would move
+    what a feature sees."""
+    keys = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())["properties"]
+    samples = keys["windows"]["properties"]["samples_per_revolution"]["minimum"]
+    size = keys["sst"]["properties"]["size"]["minimum"]
+    assert samples >= max(ARCHITECTURES[name].padding for name in TIME)
+    for name in set(ARCHITECTURES) - TIME:
+        build(name, 1).eval()(torch.zeros(1, 1, size, size))
 
 
 @pytest.mark.parametrize(

@@ -84,6 +84,29 @@ def test_incompressible_leak_free_mean_flow_is_displacement(speed, load, opening
     assert ripple.flow.mean() == pytest.approx(expected, rel=1e-3)
 
 
+def test_ports_that_are_open_together_leak_as_two_orifices_in_series():
+    """A negative overlap: what delivery loses to suction follows from the areas alone.
+
+    Where the pistons hardly move, both orifices of a chamber pass the same flow: A = A1 A2 /
+    sqrt(A1^2 + A2^2) in one (Merritt 1967, Hydraulic Control Systems), twice a revolution in each
+    chamber. Areas by their own formula, a smooth step from half the overlap before a dead centre.
+    """
+    pump = {
+        "bulk_modulus": 1.4e13, "air_fraction": 0.0, "case_leakage": 0.0,
+        "port_overlap_deg": -8.0, "port_opening_deg": 30.0,
+    }  # fmt: skip
+    g = Geometry.from_dict(pump)
+    angle = np.linspace(-4.0, 4.0, 4001)  # deg about a dead centre
+    one, other = ((4.0 + a) / 30.0 for a in (angle, -angle))
+    one, other = (g.port_area * (3 * u**2 - 2 * u**3) for u in (one, other))
+    both = one * other / np.hypot(one, other).clip(1e-300)
+    share = 2 * g.pistons * np.trapezoid(both, angle) / 360.0
+    lost = g.discharge_coefficient * share * np.sqrt(2 * LOAD / OIL.density)
+    slowly = 100.0  # r/min: a piston displaces little while both are open
+    delivered = simulate(pump, OIL, slowly, ConstantPressure(LOAD)).flow.mean()
+    assert g.displacement * slowly / 60 - delivered == pytest.approx(lost, rel=0.01)
+
+
 def test_stiff_fluid_and_ideal_ports_give_the_kinematic_flow():
     """The limit of a stiff fluid: the sum of the pistons' speeds (closed form).
 

@@ -4,12 +4,15 @@ import base64
 import hashlib
 import json
 import re
+import shlex
 from html.parser import HTMLParser
 
+import h5py
 import numpy as np
 import pytest
 
 from made_results import AMPLITUDES, GEOMETRY, HOSTILE, ORDERS, write_results
+from rippletwin.case.load import load_case
 from rippletwin.cli import main
 from rippletwin.errors import InputError
 from rippletwin.report.content import WorkflowPart, make_page
@@ -17,7 +20,9 @@ from rippletwin.report.page import render, write_report
 from rippletwin.report.results import read_results
 from rippletwin.report.tables import Cell, Table
 from rippletwin.report.verdict_words import remaining_sentences
-from rippletwin.report.workflow_tables import describe_dataset
+from rippletwin.report.workflow_tables import answer_table, describe_dataset
+from rippletwin.twin import twin_file
+from rippletwin.twin.twin import Twin
 
 VOID = {"meta", "br", "img", "link", "input", "hr"}
 
@@ -240,6 +245,40 @@ def test_what_is_missing_is_said_with_the_command_that_makes_it(tmp_path):
     assert not elsewhere.missing and elsewhere.verdict and elsewhere.diagnosis
 
 
+def test_the_commands_that_are_advised_work(tmp_path):
+    """A folder with a brace and a space in its name, named by its rig.yaml: the command is quoted
+    and writes beside the sheet. Of known faults alone diagnose takes those that are named."""
+    folder = tmp_path / "rig {2} a"
+    folder.mkdir()
+    write_results(folder)
+    for name in ("explained", "diagnosed"):
+        (folder / name).rename(tmp_path / f"{name}_elsewhere")
+    explain, diagnose = read_results(folder / "rig.yaml").missing
+    command = ["rippletwin", "explain", str(folder), "--out", str(folder / "explained")]
+    assert shlex.split(explain.partition(": ")[2]) == command
+    assert "--recording" not in diagnose
+    sheet = folder / "rig.yaml"
+    sheet.write_text(sheet.read_text().replace("state: unknown", "state: slipper"))
+    words = shlex.split(read_results(folder).missing[1].partition(": ")[2])
+    assert words[words.index("--recording") + 1] == HOSTILE
+
+
+def test_an_at_sign_in_a_name_is_no_effect(tmp_path):
+    """The label hot@95bar is legal and part of the parameters' names: they are read and shown."""
+    folder = write_results(tmp_path)
+    path = folder / "explained" / "twin.json"
+    sheet = folder / "rig.yaml"
+    sheet.write_text(sheet.read_text().replace("name: p1", "name: p1@in"))
+    for name in ("healthy_0.h5", "unknown.h5"):
+        with h5py.File(folder / name, "a") as file:
+            file["pressure"].attrs["sensors"] = ["p1@in", "p2"]
+    path.write_text(json.dumps(twin_file.to_dict(Twin(load_case(folder).rig))))
+    results = read_results(folder)
+    assert len(results.twin.theta) == len(json.loads(path.read_text())["theta"])
+    rows = make_page(results).parameters.rows
+    assert any("p1@in" in row[0].text for row in rows)
+
+
 def test_results_without_figures_have_a_page(tmp_path):
     """explain --no-figures writes no numbers behind figures: the page says so."""
     folder = write_results(tmp_path)
@@ -269,6 +308,14 @@ def test_a_dataset_is_named_in_words():
     assert describe_dataset("CFD-MOC-PR", datasets) == said
     assert describe_dataset("experimental", datasets) == "recordings of all states (experimental)"
     assert describe_dataset("mine", datasets) == "mine"
+
+
+def test_what_networks_say_is_told_in_words():
+    """Not in the identifiers of networks.json."""
+    said = {"share": 0.9, "unlike": 0.1}
+    answers = {"new": {"a": said | {"state": "slipper"}, "b": said | {"state": "unlike"}}}
+    states = [row[2].text for row in answer_table(answers).rows]
+    assert states == ["worn slipper", "unlike everything that was tried"]
 
 
 def test_workflow_parts_are_shown(folder):

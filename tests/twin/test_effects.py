@@ -23,6 +23,7 @@ FIXED = {
     "side_branch": "position",
     "leak": "position",
     "line_volume": "position",
+    "gas_volume": "position",
     "load_volume": "load",
     "load_dynamics": "load",
     "source_impedance": "source",
@@ -275,6 +276,23 @@ def test_air_slows_the_wave_as_wood_does():
     area = state.area(0)
     speed = np.sqrt((S * area / 870.0) / net.shunt[0])
     np.testing.assert_allclose(speed.real, wood, rtol=1e-12)
+
+
+def test_gas_yields_as_a_polytrope_of_its_mean_pressure():
+    """Its admittance is s dV/dp of p V^n = const, by differences of volumes at each pressure; a
+    volume of liquid yields alike at both."""
+    n, gas = 1.3, 2e-7  # m3 at 10 MPa
+    given = {"position": 1.0, "gas_volume": gas, "polytropic_exponent": n}
+    for pressure in (4e6, 1.6e7):
+        net, state = network(rig())
+        state.mean_pressure = pressure
+        EFFECTS["gas_volume"].apply(net, state, given, Place("position"))
+
+        def volume(p):
+            return gas * (1e7 / (p + 101325.0)) ** (1 / n)
+
+        slope = (volume(pressure - 1e3) - volume(pressure + 1e3)) / 2e3
+        np.testing.assert_allclose(net.inserts[-1].immittance, S * slope, rtol=1e-6)
 
 
 def test_thermal_layer_goes_from_isothermal_to_adiabatic():

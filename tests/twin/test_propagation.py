@@ -10,13 +10,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rippletwin.errors import InputError
 from rippletwin.line.time_domain.weighting_functions import conduction_terms
 from rippletwin.twin import twin_file
 from rippletwin.twin.corrected_ripple import CorrectedRipple
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS, candidates
 from rippletwin.twin.effects.thermal_boundary_layer import thermal_factor
+from rippletwin.twin.operating_point import OperatingCondition, guessed_flow
 from rippletwin.twin.propagation import line_in_time, propagate, pump_change
+from rippletwin.twin.twin import Twin
 from two_domains import ORDERS, PRESSURE, SPEED_HZ, STEPS, both, corrected, misfit, rig, ripple
 
 
@@ -67,6 +70,57 @@ def test_effects_together_are_the_same_in_both_domains():
     moc, chain = both(corrected(*effects))
     print(f"together: {misfit(moc, chain):.1e}")
     assert misfit(moc, chain) < 0.005
+
+
+def test_walls_creep_under_the_liquid_alone_wherever_air_was_found():
+    """Air before the wall or after it: one prediction, and that of the time domain, where the wall
+    creeps under the liquid."""
+    air = EFFECTS["entrained_air"], Place("line")
+    wall = EFFECTS["viscoelastic_wall"], Place("segment 2", 1)
+    orders = [corrected(*pair) for pair in ((air, wall), (wall, air))]
+    theta = dict(orders[0].values())
+    assert orders[1].values() == theta
+    chains = [twin.respond(ripple(), SPEED_HZ, PRESSURE, ORDERS) for twin in orders]
+    np.testing.assert_allclose(chains[0], chains[1], rtol=1e-9)
+    moc, chain = both(orders[0])
+    assert misfit(moc, chain) < 0.005
+
+
+def test_effects_see_the_line_s_friction_in_both_domains():
+    """The state that an effect is given in time has the friction law of the line with its effects,
+    as in the frequency domain."""
+    seen = []
+
+    def look(line, state, values, place):
+        seen.append(state.friction)
+
+    watcher = replace(EFFECTS["line_volume"], apply=look, apply_in_time=look)
+    twin = corrected((EFFECTS["unsteady_friction"], Place("line")), (watcher, Place("position")))
+    line_in_time(twin, ripple().flow, ripple().flow, SPEED_HZ, PRESSURE)
+    twin.respond(ripple(), SPEED_HZ, PRESSURE, ORDERS)
+    assert set(seen) == {"unsteady"} and len(seen) >= 2
+
+
+def test_a_guessed_load_stays_with_another_flow():
+    """The fitted factor belongs to the guessed mean flow: both domains keep that orifice, whatever
+    flow is simulated."""
+    twin = Twin(rig(), guessed_load=True)
+    twin = twin.with_(theta=np.where(np.equal(list(twin.index), "load"), 0.5, 0.0))
+    factor = twin.values()["load"]
+    for mean in (1e-3, 4e-4):
+        condition = OperatingCondition.at_orders(ORDERS, SPEED_HZ, PRESSURE, ripple(mean))
+        coefficient = factor * twin.operating_point(condition).coefficient
+        flow = ripple(mean).flow
+        line = line_in_time(twin, flow, flow, SPEED_HZ, PRESSURE)
+        assert line.end.coefficient == pytest.approx(coefficient)
+        assert coefficient == pytest.approx(factor * guessed_flow(rig()) / np.sqrt(PRESSURE))
+
+
+def test_a_pump_cannot_deliver_into_a_closed_end():
+    """A mean flow into a closed end is refused in words."""
+    flow = ripple().flow
+    with pytest.raises(InputError, match="no way out of a closed end"):
+        line_in_time(Twin(rig("closed")), flow, flow, SPEED_HZ, PRESSURE)
 
 
 def test_air_stiffens_in_the_crests():

@@ -2,6 +2,7 @@
 
 import json
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from rippletwin.explanation.search.stepwise_search import applicable_candidates
 from rippletwin.twin import twin_file
 from rippletwin.twin.effects import library
 from rippletwin.twin.effects.base import Place
+from rippletwin.twin.effects.own_effects import check_on_rig
 from rippletwin.twin.twin import Twin
 from synthetic_observations import make
 from two_domains import corrected, rig
@@ -117,6 +119,20 @@ def test_a_bad_file_is_bad_input(own, old, new, field, words):
         library.add_effects([own], rig())
     assert (error.value.file, error.value.field) == (str(own), field)
     assert error.value.remedy
+
+
+def test_an_effect_of_the_source_is_tried_too():
+    """Effects at shaft orders are given a shaft: those of the library pass as a user's would. One
+    whose flow is not finite is refused."""
+    for name in ("piston_spread", "speed_fluctuation"):
+        check_on_rig(replace(library.EFFECTS[name], file="own.py"), rig())
+
+    def lose(network, state, values, place):
+        network.source_flow = np.nan * state.mean_flow
+
+    broken = replace(library.EFFECTS["piston_spread"], apply=lose, file="own.py")
+    with pytest.raises(InputError, match="is not finite"):
+        check_on_rig(broken, rig())
 
 
 def test_no_file_is_bad_input(tmp_path):

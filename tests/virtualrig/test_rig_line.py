@@ -67,10 +67,11 @@ def shunt_matrix(admittance):
 
 def chain(start, stop, fittings=(), **pipe):
     """Matrices from `start` to `stop`; `fittings` are (position, admittance); pipe keywords as
-    above, `wall` and `softness` by segment index."""
-    wall, softness = pipe.pop("wall", {}), pipe.pop("softness", (1.0, 1.0, 1.0))
+    above, `wall` and `softness` by segment index of `segments`."""
+    segments = pipe.pop("segments", SEGMENTS)
+    wall, softness = pipe.pop("wall", {}), pipe.pop("softness", np.ones(len(segments)))
     total = np.tile(np.eye(2, dtype=complex), (len(S), 1, 1))
-    edges = np.concatenate([[0.0], np.cumsum([segment["length"] for segment in SEGMENTS])])
+    edges = np.concatenate([[0.0], np.cumsum([segment["length"] for segment in segments])])
     cuts = sorted({start, stop, *edges, *(at for at, _ in fittings)})
     for at, admittance in fittings:
         if at == start:
@@ -80,7 +81,7 @@ def chain(start, stop, fittings=(), **pipe):
             continue
         k = int(np.searchsorted(edges, 0.5 * (a + b))) - 1
         total = total @ pipe_matrix(
-            SEGMENTS[k], b - a, wall=wall.get(k), softness=softness[k], **pipe
+            segments[k], b - a, wall=wall.get(k), softness=softness[k], **pipe
         )
         for at, admittance in fittings:
             if abs(at - b) < 1e-12:
@@ -218,12 +219,12 @@ def test_air_is_its_tangent_for_small_ripple():
     assert misfit(rig, truth).max() < 4e-3
 
 
-def test_accumulator_and_stiffening_are_their_tangents_for_small_ripple():
-    """A gas accumulator and a modulus that grows with pressure, linearised at the mean."""
+def test_gas_and_stiffening_are_their_tangents_for_small_ripple():
+    """A volume of gas and a modulus that grows with pressure, linearised at the mean."""
     flow, harmonics = source(1e-3)
     gas = {"position": 1.2, "gas_volume": 2e-7, "gas_pressure": 6e6, "exponent": 1.3}
     growth = {"per_pascal": 5e-9, "reference": 0.0}
-    rig, orbit = bench(flow, ("accumulator", gas), ("stiffening_liquid", growth))
+    rig, orbit = bench(flow, ("gas_volume", gas), ("stiffening_liquid", growth))
     local = np.interp(1.2, SENSORS, orbit.pressure.mean(axis=1)) + 1.01325e5  # absolute
     volume = 2e-7 * (6e6 / local) ** (1 / 1.3)
     fittings = [(1.2, S * volume / (1.3 * local))]
@@ -233,6 +234,25 @@ def test_accumulator_and_stiffening_are_their_tangents_for_small_ripple():
     assert misfit(exact(harmonics, admittance, fittings), truth).min() > 0.02
     assert misfit(exact(harmonics, admittance, softness=softness), truth).min() > 0.02
     assert misfit(rig, truth).max() < 5e-3
+
+
+def test_a_soft_piece_is_a_pipe_of_another_wave_speed():
+    """A stretch of a third of the wave speed is, by transfer matrices, a pipe as soft as that
+    between its ends; one end is moved to the joint that is 3 cm away."""
+    flow, harmonics = source(1e-3)
+    joint = SEGMENTS[0]["length"]
+    piece = {"position": joint + 0.13, "length": 0.2, "speed_ratio": 1 / 3}
+    draft = Draft(Pump(bulk_modulus=MODULUS), [dict(s) for s in SEGMENTS], [{}, {}])
+    EFFECTS["soft_piece"](draft, **piece)
+    assert [s["length"] for s in draft.segments[:3]] == pytest.approx(
+        [joint, 0.23, SEGMENTS[1]["length"] - 0.23]
+    )
+    assert sum(s["length"] for s in draft.segments) == pytest.approx(LENGTH)
+    rig, orbit = bench(flow, ("soft_piece", piece))
+    admittance = orifice_admittance(orbit)
+    truth = exact(harmonics, admittance, segments=draft.segments)
+    assert misfit(exact(harmonics, admittance), truth).min() > 0.02
+    assert misfit(rig, truth).max() < 3e-3
 
 
 def test_full_amplitude_orifice_is_harmonic_balance():

@@ -125,6 +125,15 @@ def test_a_case_without_known_faults_scores_nothing(fresh):
     assert set(re.findall(r"out/models/([^/]+)/", text)) == {"CFD-MOC-PR"}
 
 
+def test_without_a_known_recording_at_the_point_no_image_is_compared(fresh):
+    """All healthy recordings are at another load pressure: simulated images have no recorded one
+    beside them. With a healthy one at the point they are compared."""
+    write(fresh, RIG.replace(SLIPPER, LATER.replace("9500000", "7000000")))
+    assert "compare_sst" not in planned(fresh)[0]
+    write(fresh, RIG.replace(SLIPPER, LATER))
+    assert "compare_sst" in planned(fresh)[0]
+
+
 def test_a_case_without_a_ripple_is_explained_only(fresh):
     """A measured spectrum has no pump: nothing is simulated."""
     spectrum = "- {file: healthy.csv, kind: spectrum, state: healthy}\n"

@@ -9,6 +9,7 @@ from snakemake.utils import validate
 from config_errors import (
     check_config,
     check_datasets,
+    check_load_pressures,
     check_names,
     check_severity,
     read_rig,
@@ -39,6 +40,11 @@ def message(call, *arguments) -> str:
         ({"colour": "blue"}, "unknown key colour. Known here: results, case"),
         ({"sst": DEFAULTS["sst"] | {"sise": 8}}, "unknown key sst.sise. Did you mean size?"),
         ({"seeds": 0}, "seeds: 0: below 1"),
+        ({"sst": DEFAULTS["sst"] | {"size": 10}}, "sst.size: 10: below 11"),
+        (
+            {"windows": DEFAULTS["windows"] | {"samples_per_revolution": 1535}},
+            "windows.samples_per_revolution: 1535: below 1536",
+        ),
         ({"noise": {"factor": "much"}}, "noise.factor: much: not of type number"),
         ({"noise": {}}, "missing noise.factor"),
         ({"scoring": {"pressure": "C3", "flow": "C2"}}, "C3: not one of C1, C2"),
@@ -157,6 +163,15 @@ def test_every_fault_of_a_sheet_has_a_line(case):
 def test_a_case_that_is_not_there_is_named(tmp_path):
     """A misspelt folder: the path that was looked for."""
     assert "nowhere" in message(read_rig, str(tmp_path / "nowhere"))
+
+
+def test_a_recording_that_faults_are_simulated_for_needs_its_load_pressure():
+    """A sheet may leave the pressure out where the load is unknown; a simulated fault cannot."""
+    entries = yaml.safe_load(RIG)["recordings"]
+    check_load_pressures(entries)
+    del entries[0]["load_pressure"]
+    text = message(check_load_pressures, entries)
+    assert f"{entries[0]['file']}: load_pressure: missing" in text and "\n" not in text
 
 
 def test_a_sheet_in_order_is_read(case):

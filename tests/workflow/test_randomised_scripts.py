@@ -45,6 +45,7 @@ def record(folder):
                 "speed_hz": leaking_pump.SPEED / 60,
                 "load_pressure": leaking_pump.LOAD,
                 "source": "healthy.h5, slipper.h5, changed.h5",
+                "labels": ["healthy", "slipper, worn", "changed"],
             },
         ),
         folder / "recorded.zarr",
@@ -118,10 +119,10 @@ def test_networks_of_a_range_of_severities_are_kept_and_used(tmp_path):
         recorded=tmp_path / "recorded.zarr",
     )
     torch.set_num_threads(before)
-    assert "| healthy | slipper | changed |" in (tmp_path / "unlike.md").read_text()
+    assert "| healthy | slipper, worn | changed |" in (tmp_path / "unlike.md").read_text()
     (kept,) = find_networks(tmp_path, leaking_pump.rig()).values()
     signal = store.load(tmp_path / "recorded.zarr").signal.values
-    answers = [judge_windows(kept, signal[k : k + 10]) for k in (0, 10, 20)]
+    answers = [judge_windows(kept.classes, *kept.answers(signal[k : k + 10])) for k in (0, 10, 20)]
     print(answers)
     assert answers[1]["state"] == "slipper" and answers[1]["share"] == 1.0
     rates = pd.read_csv(outputs["rates"]).set_index("truth").unlike
@@ -129,12 +130,12 @@ def test_networks_of_a_range_of_severities_are_kept_and_used(tmp_path):
 
 
 def test_all_recordings_are_in_the_table_and_unknown_ones_are_not(tmp_path):
-    """Two slippers of one state are two recordings, called after their files; an unknown recording
-    is not scored."""
+    """Two slippers of one state are two recordings, called by their labels, in which a comma
+    separates nothing; an unknown recording is not scored."""
     said = {"seed": 0, "window": range(6), "recording": [0, 0, 1, 1, 2, 2]}
     said |= {"truth": list("SSSS??"), "predicted": ["S", "S", "H", "H", "S", "S"]}
     pd.DataFrame(said).to_csv(tmp_path / "said.csv", index=False)
-    names = {"source": "slipper_1.h5, slipper_2.h5, found.h5"}
+    names = {"labels": ["run 1, hot", "run 2", "found"]}
     store.save(xr.Dataset({"signal": ("window", [0.0])}, attrs=names), tmp_path / "w.zarr")
     table, page = tmp_path / "recordings.csv", tmp_path / "recordings.md"
     run_script(
@@ -147,7 +148,7 @@ def test_all_recordings_are_in_the_table_and_unknown_ones_are_not(tmp_path):
         recorded=tmp_path / "w.zarr",
     )
     rows = pd.read_csv(table)
-    assert rows.recording.tolist() == ["slipper_1", "slipper_2"]
+    assert rows.recording.tolist() == ["run 1, hot", "run 2"]
     assert rows.right.tolist() == [True, False]
     text = page.read_text()
     assert "All 2 recordings" in text and "| 50 ± 0 (1 of 2, 1 to 99) |" in text

@@ -1,7 +1,7 @@
 """Scripts of the workflow on tiny inputs: what rules and library alone do not show."""
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import pandas as pd
@@ -16,6 +16,7 @@ from rippletwin.case.model import Fluid
 from rippletwin.errors import InputError
 from rippletwin.flow_sensor.estimate import band_limit
 from rippletwin.flow_sensor.line_response import line_factory
+from rippletwin.learning.synchrosqueezing import SstSettings, amplitude_scale, sst_images
 from rippletwin.learning.training import History
 from rippletwin.pump.faults import Cylinder, Slipper
 from rippletwin.pump.outlets import ConstantPressure
@@ -27,6 +28,7 @@ from run_script import run_script
 from synthetic_recordings import flow_ripple
 from workflow_copy import RIG
 
+SST = dict(size=32, min_frequency_hz=12, max_frequency_hz=1500, voices=32, k=1.0)
 SPEED, PRESSURE, SAMPLES = 1000 / 60, 9.5e6, 1024
 TITLES = [f"<!-- {state} -->" for state in ("H", "S", "C1", "C2", "S+C1")]  # in an SVG
 
@@ -178,6 +180,35 @@ def test_flow_sensor_by_either_method_finds_the_flow(tmp_path):
         )
         wrong = found.signal.values[:, 0] - truth
         assert np.sqrt(np.mean(wrong**2) / np.mean(truth**2)) < 0.03
+
+
+@pytest.mark.parametrize("states", ["SH", "SS"])
+def test_images_are_scaled_by_the_healthy_window_or_the_first(tmp_path, states):
+    """A case whose healthy recordings are all at another operating point has no healthy window:
+    the first one scales the images, as a healthy one does elsewhere."""
+    noise = np.random.default_rng(0).standard_normal((2, 1, SAMPLES)) * [[[1.0]], [[3.0]]]
+    windows = xr.Dataset(
+        {"signal": (("window", "channel", "time"), noise)},
+        coords={"state": ("window", list(states))},
+        attrs={"speed_hz": SPEED},
+    )
+    store.save(windows, tmp_path / "reference.zarr")
+    double = windows.assign(signal=(("window", "channel", "time"), np.tile(noise, 2)))
+    store.save(double, tmp_path / "samples.zarr")
+    run_script(
+        "synchrosqueeze",
+        tmp_path,
+        {"images": tmp_path / "images.zarr"},
+        {},
+        {"sst": SST},
+        samples=[tmp_path / "samples.zarr"],
+        reference=tmp_path / "reference.zarr",
+    )
+    settings, scaling = SstSettings(**SST), np.tile(noise[max(states.find("H"), 0)][None], 2)
+    rate = SAMPLES * SPEED
+    settings = replace(settings, scale=amplitude_scale(scaling, rate, settings))
+    expected = sst_images(np.tile(noise, 2), rate, settings)
+    np.testing.assert_allclose(store.load(tmp_path / "images.zarr").signal, expected, rtol=1e-5)
 
 
 def simulate_fault(folder, state, leak_area, pipe_length):

@@ -40,7 +40,7 @@ def test_windows_are_cut_from_recordings_of_known_state(case):
         rig=str(case / "rig.yaml"),
     )
     windows = store.load(case / "pressure.zarr")
-    assert windows.source == "good.h5, leak.h5"
+    assert windows.source == "good.h5, leak.h5" and windows.labels == ["good", "leak"]
     assert sorted(set(windows.state.values)) == ["H", "S"]
 
 

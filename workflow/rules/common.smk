@@ -15,6 +15,7 @@ import case_parts
 from config_errors import (
     check_config,
     check_datasets,
+    check_load_pressures,
     check_names,
     check_severity,
     read_rig,
@@ -52,6 +53,7 @@ CASE = os.path.dirname(RIG)
 HAS_PERIODIC = RECORDED_HERE or case_parts.has_periodic(SHEET)
 DIAGNOSED_HERE = RECORDED_HERE or case_parts.is_diagnosed(SHEET)
 SCORED_HERE = RECORDED_HERE or case_parts.is_scored(SHEET)
+HAS_KNOWN = RECORDED_HERE or case_parts.has_known(SHEET)
 HAS_UNKNOWN = not RECORDED_HERE and bool(case_parts.recordings_for(SHEET, "unknown"))
 
 RIG_SECTIONS = ("fluid", "pump", "line", "sensors", "load", "uncertainty")
@@ -91,6 +93,8 @@ DATASETS = {row.name: row for row in table.itertuples(index=False)}
 CHOSEN = [name for name in DATASETS if name in config["datasets"]]
 SIMULATED = [name for name in CHOSEN if DATASETS[name].line != "rig"]
 PRESSURES = [name for name in SIMULATED if DATASETS[name].signal == "pressure"]
+if SIMULATED and not RECORDED_HERE:
+    check_load_pressures(case_parts.recordings_for(SHEET, "reference"))
 RANDOMISED = [name for name in CHOSEN if DATASETS[name].randomised == "yes"]
 # networks that can be asked about recordings of unknown state
 ASKED = [name for name in RANDOMISED if DATASETS[name].signal == "pressure"]

@@ -16,7 +16,7 @@ def get_final_output():
     if HAS_PERIODIC:
         wanted.append(rules.plot_calibration.output)
         wanted += expand_outputs(rules.plot_seeds.output, dataset=SIMULATED)
-        if PRESSURES:
+        if PRESSURES and HAS_KNOWN:
             wanted.append(rules.compare_sst.output)
         if SIMULATED and STATES["compound"]:
             wanted += expand_outputs(

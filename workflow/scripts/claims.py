@@ -37,5 +37,5 @@ groups = {
     )
     for claim, rows in compared[compared.score == paper_claims.EITHER].groupby("claim", sort=False)
 }
-save(attention.claims(groups), paths.png, paths.svg)
+save(attention.plot_claims(groups), paths.png, paths.svg)
 report_progress(f"{len(compared)} comparisons")

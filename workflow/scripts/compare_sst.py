@@ -53,6 +53,6 @@ for state, (name, pair) in pairs.items():
 images = {title: np.log(sst_images(x, rate, large)[0, 0]) / large.k for title, x in signals.items()}
 axis = image_axes(large, 2 / recorded.speed_hz)[0], recorded.speed_hz, pistons
 label = "amplitude over the largest of the healthy recording"
-figure = diagnosis.sst(images, *axis, columns=1 + len(simulated), label=label, top=1.0)
+figure = diagnosis.plot_sst(images, *axis, columns=1 + len(simulated), label=label, top=1.0)
 save(figure, snakemake.output.png, snakemake.output.svg)
 report_progress(f"similarity {table.groupby('source').similarity.mean().round(2).to_dict()}")

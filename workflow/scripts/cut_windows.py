@@ -50,6 +50,7 @@ store.save(
             "load_pressure": chosen[0].load_pressure,
             "sampling_rate_hz": float(np.mean([r.sampling_rate_hz for r in cut])),
             "source": ", ".join(r.file.name for r in chosen),
+            "labels": [r.label for r in chosen],
         },
     ),
     snakemake.output[0],

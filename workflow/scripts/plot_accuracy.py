@@ -23,5 +23,5 @@ def cells(table):
 
 
 titles = [ARCHITECTURES[name].title for name in names]
-save(diagnosis.accuracy(titles, cells(ours), cells(paper)), *snakemake.output)
+save(diagnosis.plot_accuracy(titles, cells(ours), cells(paper)), *snakemake.output)
 report_progress(f"{len(names)} networks")

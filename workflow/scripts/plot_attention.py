@@ -42,11 +42,11 @@ def draw(states, variable, titles, region=None):
         settings = SstSettings(**params.sst)
         frequency_hz, _ = image_axes(settings, 2 / first.speed_hz)
         axis = (frequency_hz, first.speed_hz, pistons)
-        return attention.images(networks, states, signal, heat, titles, *axis, region)
+        return attention.plot_images(networks, states, signal, heat, titles, *axis, region)
     pressure = first.simulated.attrs["units"] == "Pa"
     label = "pressure ripple / bar" if pressure else "flow ripple / L/min"
     scale = 1e5 if pressure else 1e-3 / 60
-    return attention.windows(networks, states, signal / scale, heat, titles, label, region)
+    return attention.plot_windows(networks, states, signal / scale, heat, titles, label, region)
 
 
 simulated = draw(first.state.values.tolist(), "simulated", shares, first.fault_region.values)

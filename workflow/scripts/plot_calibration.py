@@ -13,6 +13,6 @@ folder = Path(snakemake.output[0])
 for label in ripples.point.values:
     point = ripples.sel(point=label)
     curves = {name: values.values for name, values in point.data_vars.items()}
-    figure = ripple.overlay(point.angle_deg.values, curves, point.channel.values, str(label))
+    figure = ripple.plot_overlay(point.angle_deg.values, curves, point.channel.values, str(label))
     save(figure, folder / f"{label}.png", folder / f"{label}.svg")
 report_progress(f"{ripples.sizes['point']} operating points")

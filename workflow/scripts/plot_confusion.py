@@ -15,5 +15,5 @@ matrices = {}
 for architecture, trainings in rows.groupby("architecture", sort=False):
     counts = confusion_of(trainings)
     matrices[ARCHITECTURES[architecture].title] = counts / counts.sum(1, keepdims=True).clip(1)
-save(diagnosis.confusion(matrices, TRUE_STATES, CLASSES), *snakemake.output)
+save(diagnosis.plot_confusion(matrices, TRUE_STATES, CLASSES), *snakemake.output)
 report_progress(f"{len(matrices)} matrices")

@@ -18,5 +18,5 @@ groups = {
     )
     for dataset, rows in table.groupby("dataset", sort=False)
 }
-save(attention.ranks(groups), snakemake.output.png, snakemake.output.svg)
+save(attention.plot_ranks(groups), snakemake.output.png, snakemake.output.svg)
 report_progress(f"{len(groups)} datasets")

@@ -34,7 +34,7 @@ signals = signals - signals.mean(axis=-1, keepdims=True)
 pressure = seeds.signal.attrs["units"] == "Pa"
 scale, label = (1e5, "pressure ripple / bar") if pressure else (1e-3 / 60, "flow ripple / L/min")
 angle = np.arange(signals.shape[-1]) * 360 / signals.shape[-1]
-figure = ripple.states(
+figure = ripple.plot_states(
     angle, dict(zip(states, signals)), f"{snakemake.wildcards.dataset}: {label}", scale
 )
 save(figure, snakemake.output.ripple, snakemake.output.ripple_svg)
@@ -47,6 +47,6 @@ healthy = healthy - healthy.mean(axis=-1, keepdims=True)
 settings = replace(settings, scale=amplitude_scale(np.tile(healthy, 2), rate, settings))
 images = sst_images(windows, rate, settings)[:, 0]
 frequency_hz, _ = image_axes(settings, 2 / seeds.speed_hz)
-figure = diagnosis.sst(dict(zip(states, images)), frequency_hz, seeds.speed_hz, pistons)
+figure = diagnosis.plot_sst(dict(zip(states, images)), frequency_hz, seeds.speed_hz, pistons)
 save(figure, snakemake.output.sst, snakemake.output.sst_svg)
 report_progress(f"{len(states)} states")

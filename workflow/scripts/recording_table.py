@@ -1,7 +1,5 @@
 """Accuracy over all recordings at the diagnosed operating point, the recording being the unit."""
 
-from pathlib import Path
-
 import pandas as pd
 
 from job import open_log
@@ -10,7 +8,7 @@ from rippletwin.learning.recording_accuracy import recording_rows, recording_tab
 
 report_progress = open_log(snakemake)
 params, paths = snakemake.params, snakemake.input
-names = [Path(name).stem for name in store.load(paths.recorded).source.split(", ")]
+names = store.load(paths.recorded).labels
 rows = pd.concat(
     recording_rows(pd.read_csv(path)).assign(architecture=architecture, dataset=dataset)
     for (dataset, architecture), path in zip(params.cells, paths.predictions, strict=True)

@@ -5,7 +5,7 @@ import xarray as xr
 
 from job import open_log
 from rippletwin import store
-from rippletwin.flow_sensor.spectral_inversion import band_limit
+from rippletwin.flow_sensor.estimate import band_limit
 
 report_progress = open_log(snakemake)
 params = snakemake.params

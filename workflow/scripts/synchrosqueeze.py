@@ -1,4 +1,7 @@
-"""Synchrosqueezed images of windows of two revolutions, scaled as the reference's healthy state."""
+"""Synchrosqueezed images of windows of two revolutions, scaled as the reference's healthy state.
+
+A reference without a healthy window scales them by its first one.
+"""
 
 from dataclasses import replace
 
@@ -12,8 +15,9 @@ report_progress = open_log(snakemake)
 reference = store.load(snakemake.input.reference)
 rate = reference.sizes["time"] * reference.speed_hz
 settings = SstSettings(**snakemake.params.sst)
-healthy = reference.signal.values[reference.state.values == "H"][:1]
-settings = replace(settings, scale=amplitude_scale(np.tile(healthy, 2), rate, settings))
+first = int(np.argmax(reference.state.values == "H"))  # 0 where none is
+scaling = np.tile(reference.signal.values[first : first + 1], 2)
+settings = replace(settings, scale=amplitude_scale(scaling, rate, settings))
 for source, target in zip(snakemake.input.samples, snakemake.output, strict=True):
     samples = store.load(source)
     images = sst_images(samples.signal.values, rate, settings)

@@ -1,7 +1,5 @@
 """How many recorded windows each network calls unlike everything simulated."""
 
-from pathlib import Path
-
 import pandas as pd
 
 from job import open_log
@@ -10,7 +8,7 @@ from rippletwin.learning.architectures import ARCHITECTURES
 from rippletwin.learning.conformal import PROMISED_RATE
 
 report_progress = open_log(snakemake)
-names = [Path(name).stem for name in store.load(snakemake.input.recorded).source.split(", ")]
+names = store.load(snakemake.input.recorded).labels
 cells = pd.concat(
     pd.read_csv(path).assign(network=f"{dataset}, {ARCHITECTURES[architecture].title}")
     for (dataset, architecture), path in zip(

@@ -21,6 +21,7 @@ from rippletwin.calibration.laplace import UNCONVERGED_GAIN, Mode, laplace
 from rippletwin.calibration.likelihood import EVENNESS, Likelihood
 from rippletwin.calibration.misfit import Misfit, misfit
 from rippletwin.calibration.shaft_angles import fit_shaft_angles
+from rippletwin.spectra.frequency_selection import check_sources
 from rippletwin.twin.twin import Twin
 from rippletwin.twin.unknown_load import LoadCurve, load_curve
 
@@ -93,10 +94,11 @@ def calibrate(
 
     progress   is called with a sentence after each frequency limit
 
-    Raises ValueError without observations.
+    Raises ValueError without observations, InputError as `check_sources`.
     """
     if not observations:
         raise ValueError("calibration needs at least one observation")
+    check_sources(observations)
     model = Likelihood(twin, observations, settings.max_frequency_hz, evenness=EVENNESS)
 
     def report(limit: float, fits: int, part: ErrorModel, theta: np.ndarray) -> None:
@@ -151,7 +153,7 @@ def _warnings(twin: Twin, mode: Mode, after: Misfit) -> tuple[str, ...]:
     for p, u, s in zip(twin.parameters, twin.theta, sd):
         value, value_sd = float(p.value(u)), p.value_sd(u, s)
         if p.flat:
-            if p.unit == "rad" and value_sd > ANGLE_SD:
+            if value_sd > ANGLE_SD:
                 out.append(f"{p.name} is not determined by the data")
             continue
         if p.prior.scale == 0.0 or not p.stated:

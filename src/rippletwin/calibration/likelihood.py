@@ -22,7 +22,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -44,6 +43,7 @@ EVENNESS = 0.5
 wholly wrong. With an error relative to each harmonic they would weigh as much as the strong lower
 ones."""
 
+FIRST_MODEL_ERROR = 0.1  # relative, before it is estimated
 MODEL_ERRORS = np.geomspace(1e-4, 2.0, 13)  # of the first search, which two finer ones follow
 FINER_MODEL_ERRORS = 9
 SOURCE_SHARES = np.array([0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0])
@@ -57,10 +57,10 @@ class Likelihood:
     ----------
     twin, observations : see rippletwin.twin.twin and rippletwin.spectra.observation.
     max_frequency_hz : use nothing above it; None for all.
-    model_error : relative model error delta to begin with.
-    piston_orders : use only multiples of the number of pistons of periodic recordings. A healthy
-        nominal pump makes no other shaft orders.
     evenness : g above.
+
+    Of periodic recordings the multiples of the number of pistons are used: a healthy nominal pump
+    makes no other shaft orders.
 
     Attributes: `model_error` and `source_sd` (delta and sigma of nominal sources) are set by
     `estimate_errors`; `count` is the number of real data; `observations` are those used.
@@ -76,16 +76,13 @@ class Likelihood:
         twin,
         observations: Sequence,
         max_frequency_hz: float | None = None,
-        model_error: float = 0.1,
-        piston_orders: bool = True,
         evenness: float = 0.0,
     ):
-        self.twin = twin
-        self._settings: dict[str, Any] = {"piston_orders": piston_orders, "evenness": evenness}
-        pistons = twin.rig.pump.get("pistons", 1) if piston_orders else 1
+        self.twin, self._evenness = twin, evenness
+        pistons = twin.rig.pump.get("pistons", 1)
         self.observations = [select_below(o, max_frequency_hz, pistons) for o in observations]
         self.forward = DifferentiableForward(twin, self.observations)
-        self.model_error, self.source_sd = model_error, 0.0
+        self.model_error, self.source_sd = FIRST_MODEL_ERROR, 0.0
         self.max_model_error = np.inf
         self.prior = np.array([not p.flat for p in twin.parameters])
         data = [to_predicted_quantity(o, twin.rig) for o in self.observations]
@@ -99,7 +96,7 @@ class Likelihood:
 
     def below(self, max_frequency_hz: float) -> Likelihood:
         """The same error model of the data at and below a frequency."""
-        return Likelihood(self.twin, self.observations, max_frequency_hz, **self._settings)
+        return Likelihood(self.twin, self.observations, max_frequency_hz, self._evenness)
 
     def predict(self, theta: np.ndarray) -> list[np.ndarray]:
         """Predictions (S, F): pressures of all observations side by side, then reflections."""

@@ -54,8 +54,7 @@ def misfit(model: ErrorModel, theta: np.ndarray) -> Misfit:
     """
     pairs: dict[str, list] = {}
     for o, (measured, h, _) in zip(model.observations, model.by_observation(model.predict(theta))):
-        if o.source == "free":
-            h = h * (np.sum(np.conj(h) * measured, 0) / np.sum(np.abs(h) ** 2, 0))
+        h = with_likely_amplitude(o, h, measured)
         for name, v, x in zip(_names(o), measured, h):
             pairs.setdefault(name, []).append((v, x))
     joined = {name: [np.concatenate(x) for x in zip(*p)] for name, p in pairs.items()}
@@ -66,6 +65,15 @@ def misfit(model: ErrorModel, theta: np.ndarray) -> Misfit:
         {name: relative_misfit(*p) for name, p in joined.items()},
         {name: theil(*p) for name, p in joined.items()},
     )
+
+
+def with_likely_amplitude(observation, predicted: np.ndarray, measured: np.ndarray) -> np.ndarray:
+    """The prediction (S, F) of an observation; that of a free source has the amplitude at each
+    frequency that comes nearest to what was measured (S, F)."""
+    if observation.source != "free":
+        return predicted
+    match = np.sum(np.conj(predicted) * measured, axis=0)
+    return predicted * (match / np.sum(np.abs(predicted) ** 2, axis=0))
 
 
 def _names(observation) -> list[str]:

@@ -23,6 +23,7 @@ together: pairs of scalings would be too many."""
 MAX_MODEL_ERROR_BELOW_LIMIT = 0.1
 """Largest model error before the last frequency limit. With a larger one the priors decide, and
 the fit never leaves a wrong local mode."""
+SAME_MODE = 0.05  # largest difference of a coordinate, in prior standard deviations
 
 State = tuple[float, np.ndarray]
 """Misfit, or minus the log posterior, and theta (P,)."""
@@ -86,13 +87,10 @@ def draw_around_modes(
     return sorted(states, key=lambda g: g[0])[:count]
 
 
-def distinct_modes(modes: Sequence[State], distance: float = 0.05) -> list[State]:
-    """Modes in order, the best first, without those that ended near a better one.
-
-    distance   largest difference of a coordinate, in prior standard deviations
-    """
+def distinct_modes(modes: Sequence[State]) -> list[State]:
+    """Modes in order, the best first, without those that ended near a better one."""
     kept: list = []
     for mode in sorted(modes, key=lambda m: m[0]):
-        if all(np.max(np.abs(mode[1] - k[1])) > distance for k in kept):
+        if all(np.max(np.abs(mode[1] - k[1])) > SAME_MODE for k in kept):
             kept.append(mode)
     return kept

@@ -24,7 +24,9 @@ from rippletwin.calibration.calibrate import (
 )
 from rippletwin.calibration.frequency_continuation import continuation_limits
 from rippletwin.calibration.likelihood import EVENNESS, Likelihood
+from rippletwin.calibration.misfit import with_likely_amplitude
 from rippletwin.calibration.shaft_angles import align_shaft_angles
+from rippletwin.spectra.frequency_selection import check_sources
 from rippletwin.twin.twin import Twin
 
 BOX = 3.0  # half the width of the box, prior standard deviations
@@ -59,7 +61,7 @@ def calibrate_pareto(
     generations   for each frequency limit
     progress      is called with a sentence after each limit
 
-    Raises ValueError without observations.
+    Raises ValueError without observations, InputError as `check_sources`.
     """
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.problem import ElementwiseProblem
@@ -67,6 +69,7 @@ def calibrate_pareto(
 
     if not observations:
         raise ValueError("calibration needs at least one observation")
+    check_sources(observations)
     whole = Likelihood(twin, observations, settings.max_frequency_hz, evenness=EVENNESS)
     limits = continuation_limits(whole.observations, settings.limits_hz)
     searched = np.array([not p.flat for p in twin.parameters])
@@ -105,9 +108,12 @@ def calibrate_pareto(
 
 
 def sensor_misfits(likelihood: Likelihood, theta: np.ndarray) -> np.ndarray:
-    """Squared relative misfit (S,) of each sensor at theta (P,), all observations together."""
+    """Squared relative misfit (S,) of each sensor at theta (P,), all observations together; a free
+    source has its most likely amplitude."""
     left = total = np.zeros(1)
-    for measured, h, _ in likelihood.by_observation(likelihood.predict(theta)):
+    parts = likelihood.by_observation(likelihood.predict(theta))
+    for o, (measured, h, _) in zip(likelihood.observations, parts):
+        h = with_likely_amplitude(o, h, measured)
         left = left + np.sum(np.abs(measured - h) ** 2, axis=1)
         total = total + np.sum(np.abs(measured) ** 2, axis=1)
     return left / total

@@ -10,7 +10,7 @@ import numpy as np
 
 from rippletwin import store
 from rippletwin.calibration.calibrate import Calibration
-from rippletwin.calibration.misfit import Misfit
+from rippletwin.calibration.misfit import Misfit, with_likely_amplitude
 from rippletwin.case.quantities import unit_of, write_number, write_stated, write_value
 from rippletwin.case.words import name_parameter
 from rippletwin.twin import twin_file
@@ -181,7 +181,8 @@ def compute_ripples(
     label       of the observation
     sensors     (S,) names
     angle_deg   (samples,) over one revolution
-    measured, nominal, calibrated   (S, samples) Pa without mean, from the same harmonics
+    measured, nominal, calibrated   (S, samples) Pa without mean, from the same harmonics; a free
+                source has its most likely amplitude
     """
     out = []
     angle = 2 * np.pi * np.arange(samples) / samples
@@ -191,8 +192,8 @@ def compute_ripples(
         turn = np.exp(1j * np.outer(o.orders, angle))
         spectra = {
             "measured": o.values,
-            "nominal": calibration.nominal.predict([o])[0],
-            "calibrated": calibration.twin.predict([o])[0],
+            "nominal": with_likely_amplitude(o, calibration.nominal.predict([o])[0], o.values),
+            "calibrated": with_likely_amplitude(o, calibration.twin.predict([o])[0], o.values),
         }
         out.append(
             {

@@ -28,8 +28,13 @@ def align_shaft_angles(
         return np.inf, theta
     misfit, count = 0.0, 0
     for o, (measured, predicted, power) in zip(model.observations, parts):
-        square = np.sum(np.abs(predicted) ** 2 + np.abs(measured) ** 2, axis=0)
+        count += measured.size
+        left, whole = (np.sum(np.abs(x) ** 2, axis=0) / power for x in (measured, predicted))
         weighted = np.sum(np.conj(predicted) * measured, axis=0) / power
+        if o.source == "free":  # at its most likely amplitude
+            left = left - np.abs(weighted) ** 2 / np.maximum(whole, 1e-300)
+            misfit += float(np.sum(left))
+            continue
         match = np.sum(np.abs(weighted))  # of a source whose phase is free
         index = twin.index.get(f"angle[{o.label}]")
         if index is not None and not model.source_free:
@@ -40,8 +45,7 @@ def align_shaft_angles(
             angle = parameter.value(theta[index]) + turn
             angle = (angle + np.pi / order) % (2 * np.pi / order) - np.pi / order
             theta[index] = parameter.prior.coordinate(angle)
-        misfit += float(np.sum(square / power) - 2 * match)
-        count += measured.size
+        misfit += float(np.sum(left + whole) - 2 * match)
     return misfit / count, theta
 
 

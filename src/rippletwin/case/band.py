@@ -46,7 +46,7 @@ def band_warnings(rig: Rig, recordings: Sequence[Recording]) -> Iterator[str]:
     """A line for every recording that is used above the plane-wave limit of the rig."""
     limit, segment = plane_wave_limit(rig)
     for recording in recordings:
-        highest = recording.max_frequency_hz or _highest(recording)
+        highest = _highest(recording)
         if highest > limit:
             yield (
                 f"{recording.label}: used up to {highest:.4g} Hz, but above {limit:.4g} Hz waves "
@@ -56,6 +56,9 @@ def band_warnings(rig: Rig, recordings: Sequence[Recording]) -> Iterator[str]:
 
 
 def _highest(recording: Recording) -> float:
+    """The highest frequency, Hz, that is used: of the stated band, as far as the data go."""
+    stated = recording.max_frequency_hz
     if recording.frequency_hz is not None:
-        return float(recording.frequency_hz[-1])
-    return min(DEFAULT_MAX_HZ, 0.4 * recording.sampling_rate_hz)
+        last = float(recording.frequency_hz[-1])
+        return last if stated is None else min(stated, last)
+    return min(stated or DEFAULT_MAX_HZ, 0.4 * recording.sampling_rate_hz)

@@ -138,10 +138,7 @@ def write_new_sheet(sheet: NewSheet, folder: str | Path) -> Path:
     path = Path(folder) / "rig.yaml"
     try:
         (path.parent / "recordings").mkdir(parents=True, exist_ok=True)
-        with open(path, "x", encoding="utf-8") as file:
-            file.write(sheet.text())
-            file.flush()
-            os.fsync(file.fileno())
+        _write_whole(path, sheet.text())
     except FileExistsError as error:
         there = path.is_file()
         problem = "is there already" if there else f"{folder} is no folder"
@@ -152,6 +149,26 @@ def write_new_sheet(sheet: NewSheet, folder: str | Path) -> Path:
             path, "case", f"cannot be written ({error.strerror})", "Name a folder of your own"
         ) from error
     return path
+
+
+def _write_whole(path: Path, text: str) -> None:
+    """Write a file whole or not at all; raises FileExistsError where there is one."""
+    scratch = path.with_name(f".{os.getpid()}.{path.name}")
+    try:
+        with open(scratch, "w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        try:
+            os.link(scratch, path)
+        except FileExistsError:
+            raise
+        except OSError:  # a file system without links
+            if path.exists():
+                raise FileExistsError(path) from None
+            os.replace(scratch, path)
+    finally:
+        scratch.unlink(missing_ok=True)
 
 
 def _segment_text(segment: NewSegment) -> str:

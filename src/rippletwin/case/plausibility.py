@@ -51,6 +51,7 @@ class Range:
 MILLIMETRES = (("mm", 1e-3), ("inches", 0.0254), ("cm", 1e-2))
 PRESSURES = (("bar", 1e5), ("MPa", 1e6), ("kPa", 1e3), ("psi", 6894.76))
 PER_CENT = (("per cent", 1e-2),)
+RADIANS = (("rad", 180 / math.pi),)
 
 BOTH = {
     "fluid.prandtl": Range("", (0.05, 50.0), (0.5, 2.0)),
@@ -74,6 +75,8 @@ BOTH = {
     "uncertainty.sensor_gain": Range("", (1e-8, 0.99), (1e-5, 0.5), PER_CENT, zero=True),
     "pump.piston_diameter": Range("m", (1e-3, 0.3), (4e-3, 0.08), MILLIMETRES),
     "pump.pitch_radius": Range("m", (2e-3, 1.0), (8e-3, 0.2), MILLIMETRES),
+    "pump.swash_angle_deg": Range("deg", (0.5, 45.0), (2.0, 30.0), RADIANS),
+    "pump.port_opening_deg": Range("deg", (1.0, 180.0), (4.0, 90.0), RADIANS),
     "pump.dead_volume": Range("m3", (1e-10, 1e-2), (5e-8, 1e-4), (("cm3", 1e-6), ("mm3", 1e-9))),
     "pump.bulk_modulus": Range(
         "Pa", (1e7, 1e11), (3e8, 5e9), (("GPa", 1e9), ("MPa", 1e6), ("bar", 1e5))
@@ -109,6 +112,7 @@ GAS = BOTH | {
 LONGEST_IN_DIAMETERS = 2e4  # 400 m of 20 mm pipe; ripple does not come back from there
 SMALLEST_PRESSURE = 1000.0  # Pa; a pressure below it other than 0 is most likely in bar or MPa
 KELVIN = 273.15
+PORT_OVERLAP_DEG = 5.0  # that a pump has where port_overlap_deg is not given
 
 
 def implausible_values(path: Path, sheet: dict) -> list[InputError]:
@@ -231,7 +235,10 @@ def _pump_contradictions(path: Path, pump: dict) -> Iterator[Contradiction]:
             remedy = "pitch_radius is that of the circle of the pistons' axes, both in metres"
             yield (field, "pump.pitch_radius"), InputError(path, field, problem, remedy)
     opening, overlap = number(pump, "port_opening_deg"), number(pump, "port_overlap_deg")
-    if opening and overlap is not None and overlap + 2 * opening > 180:
+    shown = f"port_overlap_deg {PORT_OVERLAP_DEG if overlap is None else overlap:g}"
+    if overlap is None:
+        overlap, shown = PORT_OVERLAP_DEG, f"{shown}, its default,"
+    if opening and overlap + 2 * opening > 180:
         field = "pump.port_opening_deg"
-        problem = f"twice {opening:g} and port_overlap_deg {overlap:g} exceed half a revolution"
+        problem = f"twice {opening:g} and {shown} exceed half a revolution"
         yield (field,), InputError(path, field, problem, "Correct one of them")

@@ -84,9 +84,12 @@ def write_number(value: float, step: float | None = None, significant: int = SIG
         digits = (1 if abs(step) < 3 * 10.0**place else 0) - place
         digits = min(digits, MOST_DIGITS - 1 - size)
     if not MIN_PLAIN <= abs(value) < MAX_PLAIN:
-        mantissa = f"{value / 10.0**size:.{max(0, min(digits + size, 3))}f}"
+        decimals = max(0, min(digits + size, 3))
+        mantissa = round(value / 10.0**size, decimals)
+        if abs(mantissa) >= 10.0:  # rounding has carried it over
+            mantissa, size = mantissa / 10.0, size + 1
         power = str(size).translate(SUPERSCRIPTS)
-        return f"{mantissa} × 10{power}".replace("-", MINUS)
+        return f"{mantissa:.{decimals}f} × 10{power}".replace("-", MINUS)
     text = f"{round(value, digits):.{max(digits, 0)}f}"
     if float(text) == 0.0:
         text = text.lstrip("-")

@@ -17,14 +17,15 @@ SAME_PRESSURE = 0.1  # relative; closer together, two points determine no more t
 
 @dataclass(frozen=True)
 class PlannedRecording:
-    """What is known of a recording before it is read: state, speed (r/min), pressure (Pa), and
-    sampling rate (Hz) and length (s) where they are known."""
+    """What is known of a recording before it is read: state, speed (r/min), pressure (Pa), kind,
+    and sampling rate (Hz) and length (s) where they are known."""
 
     state: str
     speed_rpm: float | None
     load_pressure: float | None
     sampling_rate_hz: float | None = None
     seconds: float | None = None
+    kind: str = "periodic"
 
     @classmethod
     def of(cls, recording: Recording) -> PlannedRecording:
@@ -32,7 +33,8 @@ class PlannedRecording:
         rate, seconds = recording.sampling_rate_hz, None
         if recording.pressure is not None:
             seconds = recording.pressure.shape[1] / rate
-        return cls(recording.state, recording.speed_rpm, recording.load_pressure, rate, seconds)
+        point = recording.speed_rpm, recording.load_pressure
+        return cls(recording.state, *point, rate, seconds, recording.kind)
 
 
 def advise(rig: Rig, recordings: Sequence[PlannedRecording]) -> list[str]:
@@ -40,7 +42,8 @@ def advise(rig: Rig, recordings: Sequence[PlannedRecording]) -> list[str]:
 
     Of a line that is excited without a pump, only sensors are told.
     """
-    periodic = [r for r in recordings if r.speed_rpm is not None]
+    # a speed may be stated of a recording of noise too
+    periodic = [r for r in recordings if r.kind == "periodic" and r.speed_rpm is not None]
     if recordings and not periodic:
         return list(_of_sensors(rig))
     return [

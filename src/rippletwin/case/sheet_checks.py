@@ -15,10 +15,21 @@ from rippletwin.case.readers.registry import FOLDERS
 from rippletwin.case.sheet_values import entries, line_length, mapping, number
 from rippletwin.errors import InputError, printable
 
-LONGEST_LABEL = 100
+LONGEST_LABEL = 200  # bytes; a file's name has 255, and a label is the middle of it
+LONGEST_FILE_NAME = 255  # bytes
 FORBIDDEN_IN_LABELS = "/\\"  # labels name files of results
 DATA_FOLDERS = "RIPPLETWIN_DATA"  # environment variable: folders besides a case's to read from
 SAME_PLACE = 1e-3  # m; closer together two sensors are one
+
+OF_SAMPLES = ("dataset", "orientation", "channels", "unit", "scale")
+"""Keys that say how the samples of a file are read. A table has columns of its own."""
+HARMLESS = {"unit": "Pa", "scale": 1}
+"""Values of such keys that say what is so in any case."""
+COLUMNS = {
+    "spectrum": "frequency_hz,p1_re,p1_im,... in Pa",
+    "input_impedance": "frequency_hz,re,im in Pa s/m3, or normalised: true",
+}
+"""Of the kinds of recording that are tables."""
 
 
 def sheet_errors(path: Path, sheet: dict) -> list[InputError]:
@@ -83,17 +94,25 @@ def _sensor_errors(path: Path, sheet: dict) -> Iterator[InputError]:
 def _recording_errors(path: Path, sheet: dict) -> Iterator[InputError]:
     names = [sensor.get("name") for sensor in entries(sheet, "sensors")]
     load_kind = mapping(sheet, "load").get("kind")
+    geometry = bool(set(mapping(sheet, "pump")) - {"pistons"})
     reported: set[tuple[str, bool]] = set()
     for index, entry in enumerate(entries(sheet, "recordings")):
         field = f"recordings[{index}]"
         kind = entry.get("kind", "periodic")
-        for key, why in _needed(kind, load_kind):
+        healthy = entry.get("state") == "healthy"
+        simulated = geometry and healthy and "flow_ripple" not in entry
+        for key, why in _needed(kind, load_kind, simulated):
             whole = key in ("pump", "sensors")
             if (sheet.get(key) if whole else key in entry) or (key, whole) in reported:
                 continue
             if whole:  # once for all recordings
                 reported.add((key, whole))
             yield InputError(path, key if whole else f"{field}.{key}", "missing", f"{why}; give it")
+        for key in OF_SAMPLES if isinstance(kind, str) and kind in COLUMNS else ():
+            if key in entry and entry[key] != HARMLESS.get(key):
+                problem = f"means nothing for a recording of kind {kind}"
+                remedy = f"Take it out of rig.yaml; the table has columns {COLUMNS[kind]}"
+                yield InputError(path, f"{field}.{key}", problem, remedy)
         yield from _channel_errors(path, field, mapping(entry, "channels"), names)
         low, high = number(entry, "min_frequency_hz"), number(entry, "max_frequency_hz")
         if low is not None and high is not None and low >= high:
@@ -108,23 +127,25 @@ def _recording_errors(path: Path, sheet: dict) -> Iterator[InputError]:
 
 def _channel_errors(path: Path, field: str, channels: dict, names: list) -> Iterator[InputError]:
     """Channels of what is no sensor, and channels that two sensors share."""
-    first: dict[object, object] = {}
+    # a sensor without a channel in the sheet has that of its own name
+    first: dict[object, object] = {s: s for s in names if isinstance(s, str) and s not in channels}
     for sensor, channel in channels.items():
         if sensor not in names:
             near = difflib.get_close_matches(str(sensor), [n for n in names if isinstance(n, str)])
             hint = f"Did you mean {near[0]}? " if near else ""
             remedy = f"{hint}Each key of channels is the name of a sensor of rig.yaml"
             yield InputError(path, f"{field}.channels.{sensor}", "no such sensor", remedy)
-        elif isinstance(channel, (int, str)) and channel in first:
+        elif isinstance(channel, (int, float, str)) and channel in first:
             problem = f"{channel} is the channel of {first[channel]} too"
             remedy = "Give each sensor its own channel"
             yield InputError(path, f"{field}.channels.{sensor}", problem, remedy)
-        elif isinstance(channel, (int, str)):
+        elif isinstance(channel, (int, float, str)):
             first[channel] = sensor
 
 
-def _needed(kind: object, load_kind: object) -> list[tuple[str, str]]:
-    """Keys that a kind of recording needs, and why."""
+def _needed(kind: object, load_kind: object, simulated: bool) -> list[tuple[str, str]]:
+    """Keys that a kind of recording needs, and why; `simulated` where the pump's geometry stands
+    for a flow ripple."""
     if kind == "periodic":
         needed = [
             ("pump", "The number of pistons of a periodic recording must be known"),
@@ -133,6 +154,9 @@ def _needed(kind: object, load_kind: object) -> list[tuple[str, str]]:
         ]
         if load_kind == "orifice":
             needed.append(("load_pressure", "The orifice's law needs the mean load pressure"))
+        elif simulated:
+            why = "The pump is simulated against the mean load pressure"
+            needed.append(("load_pressure", why))
         return needed
     known = kind in ("random", "spectrum")
     return [("sensors", f"A {kind} recording needs sensors")] if known else []
@@ -153,13 +177,21 @@ def _label_errors(path: Path, sheet: dict) -> Iterator[InputError]:
             label = Path(file).stem
         field = f"recordings[{index}].label"
         bad = any(c in FORBIDDEN_IN_LABELS or not c.isprintable() for c in label)
-        if given and (bad or not label.strip(" .") or len(label) > LONGEST_LABEL):
+        size = len(label.encode(errors="replace"))
+        if given and (bad or not label.strip(" .") or size > LONGEST_LABEL):
             yield InputError(
                 path,
                 field,
                 f"{printable(label, 50)!r} cannot be part of a file's name",
-                f"Give up to {LONGEST_LABEL} characters without / and \\",
+                f"Give up to {LONGEST_LABEL} bytes (letters beyond a to z have two or more) "
+                "without / and \\",
             )
+        # a longer name is no file's, which is told where files are looked for
+        exists = not given and len(Path(file).name.encode(errors="replace")) <= LONGEST_FILE_NAME
+        if exists and size > LONGEST_LABEL:
+            problem = f"missing, and the file's name, {size} bytes, is too long to be one"
+            remedy = f"Give the recording a label of up to {LONGEST_LABEL} bytes"
+            yield InputError(path, field, problem, remedy)
         if label in first:
             source = "" if given else " (the file's name, as there is no label)"
             yield InputError(

@@ -37,6 +37,10 @@ class Refused(yaml.MarkedYAMLError):
         self.remedy = remedy
 
 
+class BadValue(yaml.YAMLError):
+    """A tag that its value contradicts, or an escape of no character."""
+
+
 class Loader(yaml.SafeLoader):
     """YAML as people write it: decimal numbers, text, lists and mappings, each key once."""
 
@@ -102,7 +106,10 @@ for _tag, _pattern in (("int", _INTEGER), ("float", _FLOAT)):
 
 def parse_yaml(text: str) -> object:
     """The value of YAML text; raises yaml.YAMLError where it is malformed or beyond a limit."""
-    return yaml.load(text, Loader=Loader)
+    try:
+        return yaml.load(text, Loader=Loader)
+    except (KeyError, ValueError, OverflowError) as error:  # which PyYAML leaves uncaught
+        raise BadValue(f"not YAML: a tag or an escaped character is wrong ({error})") from error
 
 
 def read_yaml(path: Path) -> object:
@@ -114,6 +121,9 @@ def read_yaml(path: Path) -> object:
         line = text.count("\n", 0, error.position) + 1
         problem = f"the character {chr(error.character)!r} cannot stand in a text file"
         raise InputError(path, f"line {line}", problem, "Remove it") from error
+    except BadValue as error:
+        remedy = "Correct the tag or the escaped character"
+        raise InputError(path, "the whole file", str(error), remedy) from error
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         place = f"line {mark.line + 1}, column {mark.column + 1}" if mark else "the whole file"

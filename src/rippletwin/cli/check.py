@@ -60,9 +60,9 @@ def _effects(rig, healthy: list, progress) -> list:
 
 
 def _print_outlook(effects: list, advice: list[str]) -> None:
-    from rippletwin.explanation.verdict.expected_confusion import in_words
+    from rippletwin.explanation.verdict.expected_confusion import describe_discriminations
 
     if effects:
-        print("\n".join(in_words(effects)))
+        print("\n".join(describe_discriminations(effects)))
     for line in advice:
         print(f"advice: {line}")

@@ -206,7 +206,10 @@ def _sheet(given: dict) -> NewSheet:
         except ValueError as error:
             text = "Give the two of the data sheet"
             raise InputError("command line", "--viscosity-100", str(error), text) from None
-    missing += ["viscosity"] * (viscosity is None)
+    if viscosity is None:
+        one = given["viscosity_40"] or given["viscosity_100"]
+        absent = "viscosity_100" if given["viscosity_40"] else "viscosity_40"
+        missing.append(absent.replace("_", "-") if one else "viscosity")
     if missing:
         names = ", ".join(f"--{key.rstrip('s') if key != 'pistons' else key}" for key in missing)
         remedy = "Give them, or run in a terminal to be asked; see rippletwin new --help"

@@ -16,7 +16,6 @@ from rippletwin.case.model import FlowRipple
 from rippletwin.diagnosis.drifting_line import DriftingLine
 from rippletwin.diagnosis.pump_flow import healthy_flow
 from rippletwin.harmonics import flow_harmonics
-from rippletwin.spectra.frequency_selection import select_frequencies
 from rippletwin.twin.twin import Twin
 
 SAME_SPEED, SAME_PRESSURE = 0.01, 0.03  # relative: the same operating point, set twice
@@ -66,9 +65,8 @@ def make_anchor(
     twin: Twin, healthy, observation, line: DriftingLine, speed_rpm: float, pressure: float
 ) -> Anchor:
     """The anchor that `healthy` is for `observation`, whose line is `line` and whose pump runs at
-    `speed_rpm` into `pressure`, Pa. The twin's pump is as fitted (`with_fitted_pump`)."""
-    count = min(len(healthy.orders), len(observation.orders))
-    healthy = select_frequencies(healthy, slice(count))
+    `speed_rpm` into `pressure`, Pa. Both are at the same shaft orders; the twin's pump is as fitted
+    (`with_fitted_pump`)."""
     orders = np.asarray(healthy.orders)
     apart = distance(
         healthy.speed_hz, observation.speed_hz, healthy.load_pressure, observation.load_pressure
@@ -91,13 +89,13 @@ def make_anchor(
     if len(rest) > 1:
         whole = np.sqrt(scale_of_rest(len(rest))) * rest
         line_misfit = relative_misfit(whole, healthy.values, orders, pump["pistons"])
-    unsure = np.zeros((2, count))
+    unsure = np.zeros((2, len(orders)))
     if apart:
         now = even_flow(here, orders, pump["pistons"])
         flow = flow + (now - simulated) * np.exp(1j * orders * angle)
         share = min(apart / FAR, 1.0)
         rest = (1.0 - share) * rest
-        power = np.mean(np.abs(line.response()[:, :count] * flow) ** 2, axis=0)
+        power = np.mean(np.abs(line.response() * flow) ** 2, axis=0)
         unsure = (share * np.array([misfit, line_misfit])) ** 2 * power
     return Anchor(
         label=healthy.label,
@@ -118,7 +116,9 @@ def scale_of_rest(sensors: int) -> float:
     return sensors / max(sensors - 1, 1)  # a flow takes one in `sensors`
 
 
-def without_recording(anchor: Anchor, simulated: np.ndarray, response: np.ndarray, pistons: int):
+def without_recording(
+    anchor: Anchor, simulated: np.ndarray, response: np.ndarray, pistons: int
+) -> Anchor:
     """The anchor that the twin alone is: its own flow, simulated (F,), through its line, a response
     (S, F), as wrong about each order as the recording of `anchor` shows it to be."""
     turned = simulated * np.exp(1j * anchor.orders * anchor.angle)

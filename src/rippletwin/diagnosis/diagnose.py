@@ -18,7 +18,7 @@ from rippletwin.diagnosis.faults.base import Fault
 from rippletwin.diagnosis.faults.library import select_faults
 from rippletwin.diagnosis.line_calibration import calibrate_line
 from rippletwin.diagnosis.pump_calibration import calibrate_pump, one_each_point
-from rippletwin.diagnosis.pump_flow import with_fitted_pump
+from rippletwin.diagnosis.pump_flow import rebuild, with_fitted_pump
 from rippletwin.errors import InputError
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
 from rippletwin.spectra.observation import Observation, observe, revolutions_of
@@ -48,7 +48,8 @@ def diagnose(
                   twin's own ripple
 
     `progress` is told what is done, how much of it, and of how much. Raises InputError where the
-    twin is that of another rig, and where there is no healthy recording to anchor one to.
+    twin is that of another rig, where there is no healthy recording to anchor one to, and where the
+    pump cannot be simulated at an operating point.
     """
     recordings = select_recordings(case) if recordings is None else recordings
     faults = select_faults() if faults is None else faults
@@ -87,17 +88,26 @@ class ReadOnce:
 
 def healthy_beside(case: Case, recordings: Sequence[Recording]) -> list[Recording]:
     """Healthy periodic recordings that are not among `recordings`."""
-    return [r for r in case.healthy if r.kind == "periodic" and r not in recordings]
+    taken = {r.label for r in recordings}
+    return [r for r in case.healthy if r.kind == "periodic" and r.label not in taken]
 
 
 def recalibrate_twin(twin: Twin, healthy: Sequence[Recording], read: ReadOnce) -> Twin:
     """The twin as it is, with its pump fitted to healthy recordings (`calibrate_pump`), or with its
-    line fitted to them first (`calibrate_line`): whichever leaves least of the healthy ripples."""
+    line fitted to them first (`calibrate_line`): whichever leaves least of the healthy ripples.
+
+    As it is without healthy recordings, and where they have one sensor: it tells no line from a
+    pump.
+    """
     observations = [read(each)[0] for each in healthy]
+    if not observations or len(observations[0].values) < 2:
+        return twin
     points = one_each_point(observations)
     # A line that is right already would lose what it owes to the ripple: ratios between sensors say
     # nothing of the way from the pump to the first sensor.
-    lines = twin, calibrate_line(twin, observations)
+    own = with_fitted_pump(twin)
+    again = calibrate_line(twin, observations)
+    lines = [own] if np.array_equal(own.theta, again.theta) else [own, again]
     tried = [twin, *(calibrate_pump(line, points) for line in lines)]
     return min(tried, key=lambda each: healthy_misfit(each, observations))
 
@@ -105,25 +115,29 @@ def recalibrate_twin(twin: Twin, healthy: Sequence[Recording], read: ReadOnce) -
 def diagnose_one(
     diagnoser: Diagnoser, recording: Recording, anchors: Sequence[Recording], read: ReadOnce
 ) -> Diagnosis:
-    """The diagnosis of a recording, anchored to the first of `anchors`."""
+    """The diagnosis of a recording, anchored to the first of `anchors`.
+
+    Raises InputError where the pump cannot be simulated at its operating point.
+    """
     observation, start = read(recording)
-    return diagnoser(observation, [read(each)[0] for each in anchors], start)
+    try:
+        return diagnoser(observation, [read(each)[0] for each in anchors], start)
+    except ArithmeticError as error:
+        raise InputError(
+            f"recording {recording.label}",
+            "speed_rpm, load_pressure",
+            f"the pump cannot be simulated there: {error}",
+            "Correct them, or the pump's numbers in rig.yaml",
+        ) from error
 
 
 def healthy_misfit(twin: Twin, observations: Sequence) -> float:
     """Relative misfit of a twin's healthy ripples at the pistons' orders, shaft angles free."""
     fitted = with_fitted_pump(twin)
     data = select_fitted_frequencies(observations, fitted.rig, HIGHEST_HZ)
-    turned = Twin(
-        fitted.rig,
-        data,
-        friction=fitted.friction,
-        effects=fitted.effects,
-        guessed_load=fitted.guessed_load,
-    )
+    turned = rebuild(fitted, fitted.rig, data)
     theta = np.zeros(len(turned.theta))
-    for name, k in fitted.index.items():
-        theta[turned.index[name]] = fitted.theta[k]
+    theta[[turned.index[name] for name in fitted.index]] = fitted.theta
     model = Likelihood(turned, data, evenness=1.0)
     return misfit(model, fit_shaft_angles(model, theta)).relative
 
@@ -184,12 +198,14 @@ def find_anchors(case: Case, recording: Recording) -> list[Recording]:
 
 
 def check_twin(case: Case, twin: Twin) -> None:
-    """Raise InputError where the twin is that of another rig."""
+    """Raise InputError where the twin is that of another rig: a sensor of the case is not in it, or
+    its pump has another number of pistons."""
     ours, its = ([s.name for s in rig.sensors] for rig in (case.rig, twin.rig))
-    if set(ours) - set(its) or "pistons" not in twin.rig.pump:
-        raise InputError(
-            case.folder / "rig.yaml",
-            "sensors",
-            f"{', '.join(ours)}, but the twin has {', '.join(its)}",
-            "Give the twin of this rig, or none to have the healthy recordings explained",
-        )
+    remedy = "Give the twin of this rig, or none to have the healthy recordings explained"
+    if set(ours) - set(its):
+        found = f"{', '.join(ours)}, but the twin has {', '.join(its)}"
+        raise InputError(case.folder / "rig.yaml", "sensors", found, remedy)
+    pistons = [rig.pump.get("pistons") for rig in (case.rig, twin.rig)]
+    if pistons[1] is None or pistons[0] not in (None, pistons[1]):
+        found = f"{pistons[0]}, but the twin has {pistons[1] or 'none'}"
+        raise InputError(case.folder / "rig.yaml", "pump.pistons", found, remedy)

@@ -68,7 +68,7 @@ def gather(d: Diagnosis) -> DiagnosedNumbers:
         label=d.label,
         state=d.state,
         probable=state_name(best.state),
-        sensors=[s.name for s in model.line.twin.rig.sensors],
+        sensors=[s.name for s in model.observation.sensors],
         probabilities=dict(d.probabilities),
         orders=[int(k) for k in model.orders],
         measured=_rounded(np.abs(at_sensors(model.values - parts.healthy))),

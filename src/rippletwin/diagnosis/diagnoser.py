@@ -16,12 +16,14 @@ from rippletwin.diagnosis.faults.base import Fault
 from rippletwin.diagnosis.faults.library import state_name, states_of
 from rippletwin.diagnosis.observation_model import ObservationModel
 from rippletwin.diagnosis.pump_flow import (
+    ORDERS,
     healthy_flow,
     leak_flow,
     load_pressure_of,
     with_fitted_pump,
 )
 from rippletwin.diagnosis.unlike import judge_residual
+from rippletwin.spectra.frequency_selection import select_frequencies
 from rippletwin.twin.twin import Twin
 
 MOST_REPEATS = 2  # healthy recordings beside the anchor whose scatter is looked at
@@ -64,8 +66,10 @@ class Diagnoser:
     def model(
         self, observation, healthy, start: float = 0.0, repeats: Sequence[np.ndarray] = ()
     ) -> ObservationModel:
-        """The observation model of an observation, anchored to a healthy one. `repeats` as in
-        `ObservationModel`."""
+        """The observation model of an observation, anchored to a healthy one, at the orders that
+        both have, `ORDERS` at most. `repeats` as in `ObservationModel`."""
+        count = min(len(healthy.orders), len(observation.orders), ORDERS)
+        healthy, observation = (select_frequencies(o, slice(count)) for o in (healthy, observation))
         pressure = _rounded(load_pressure_of(self.twin, observation))
         speed_rpm = _rounded(60.0 * observation.speed_hz)
         given = healthy.flow_ripple
@@ -77,8 +81,7 @@ class Diagnoser:
         anchor = make_anchor(twin, healthy, observation, line, speed_rpm, pressure)
         if not self.anchored:
             simulated = even_flow(ripple, anchor.orders, pump["pistons"])
-            response = line.response()[:, : len(anchor.orders)]
-            anchor = without_recording(anchor, simulated, response, pump["pistons"])
+            anchor = without_recording(anchor, simulated, line.response(), pump["pistons"])
         flows = {
             fault.name: leak_flow(pump, fluid, speed_rpm, pressure, fault) for fault in self.faults
         }

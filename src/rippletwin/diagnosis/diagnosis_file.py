@@ -1,4 +1,4 @@
-"""diagnosis.json: diagnoses in the words of the contract, written whole or not at all."""
+"""diagnosis.json (docs/reference/diagnosis_json.md), written whole or not at all."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rippletwin.diagnosis.sentence import sentence
 
 
 def diagnosis_dict(diagnoses: Sequence[Diagnosis]) -> dict:
-    """The diagnoses as plain data, with the keys of diagnosis.json; no networks were asked."""
+    """Plain data with the key `recordings` of diagnosis.json; no networks were asked."""
     return {"recordings": [entry_of(d) for d in diagnoses]}
 
 

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from rippletwin.diagnosis.diagnosis import Diagnosis
-
-NEGLIGIBLE = -2.0  # log density at an end, below the greatest, from which the end does not matter
 
 
 def doubts(d: Diagnosis) -> list[str]:
@@ -15,8 +11,7 @@ def doubts(d: Diagnosis) -> list[str]:
     if not all(flow.periodic for flow in d.model.flows.values()):
         found.append("the simulated pump did not settle into a periodic ripple")
     for name in d.severities:
-        density = d.best.areas[name].log_density
-        low, high = (density[end] - np.max(density) > NEGLIGIBLE for end in (0, -1))
+        low, high = d.best.cut_off[name]
         if low:
             found.append(f"the {name} leak may be smaller than any that was tried")
         if high:

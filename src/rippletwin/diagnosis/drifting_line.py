@@ -28,10 +28,9 @@ class DriftingLine:
     """
 
     def __init__(self, twin: Twin, observation, ripple: FlowRipple):
-        self.twin, self.orders = twin, np.asarray(observation.orders)
+        self.twin = twin
         point = replace(observation, flow_ripple=ripple, source="nominal")
         self._forward = ForwardModel(twin, [point])
-        self.load_pressure = float(self._forward.load_pressure[0])
         self._moved = {
             name: [twin.index[p.name] for p in twin.parameters if p.name.split("[")[0] == name]
             for name in DRIFTS
@@ -42,12 +41,12 @@ class DriftingLine:
         """What can drift on this line; `response` takes them in this order."""
         return tuple(name for name, indices in self._moved.items() if indices)
 
-    def reset_orifice(self, drift: np.ndarray, lost: float) -> np.ndarray:
+    def reset_orifice(self, drift: np.ndarray, gained: float) -> np.ndarray:
         """`drift` (D,) with an orifice set anew, which holds the load pressure where the mean flow
-        changes by the share `lost`."""
+        changes by the share `gained`, below zero for a leak."""
         if "load" not in self.drifts or not self.twin.rig.load.passes_flow:
             return drift
-        share = np.log1p(max(lost, -0.9)) / DRIFTS["load"]
+        share = np.log1p(max(gained, -0.9)) / DRIFTS["load"]
         return drift + share * np.equal(self.drifts, "load")
 
     def response(

@@ -49,20 +49,23 @@ class ErrorPrior:
 @dataclass(frozen=True)
 class StateEvidence:
     """A state's log evidence, the hypothesis at its mode with its errors, the density over the
-    logarithm of each fault's area, and the probability (pistons,) of each of its pistons."""
+    logarithm of each fault's area, whether the smallest and the largest area that were tried cut it
+    off, and the probability (pistons,) of each of its pistons."""
 
     state: tuple[Fault, ...]
     log_evidence: float
     mode: Hypothesis
     errors: Errors
     areas: Mapping[str, Density] = field(repr=False)
+    cut_off: Mapping[str, tuple[bool, bool]]
     pistons: Mapping[str, np.ndarray] = field(repr=False)
 
 
 def weigh_states(
     model: ObservationModel, states: Sequence[tuple[Fault, ...]], prior: ErrorPrior
 ) -> list[StateEvidence]:
-    """The evidence of each state."""
+    """The evidence of each state; two faults that cannot be together, for the priors of their areas
+    are too far apart, have none."""
     screen = Screen(model)
     ranked = {}
     for state in states:
@@ -72,7 +75,7 @@ def weigh_states(
             ranked[state] = screen.one(state[0])
         else:
             ranked[state] = screen.two(ranked[state[:1]], ranked[state[1:]])
-    return [_weigh(model, candidates, prior) for candidates in ranked.values()]
+    return [_weigh(model, candidates, prior) for candidates in ranked.values() if candidates]
 
 
 def compare_healthy(model: ObservationModel, prior: ErrorPrior) -> tuple[float, np.ndarray]:
@@ -95,20 +98,20 @@ def _weigh(
         errors, _ = _best_errors(model, mode, prior)
     mode = model.followed(mode, errors, LIMITS_HZ[-1:])
     errors, over_errors = _best_errors(model, mode, prior)
-    integral, areas = _over_areas(model, mode, errors, prior)
-    at_mode = model.evaluate(mode, errors).log_likelihood
+    over_areas, areas = _over_areas(model, mode, errors, prior)
     scores = np.array([c.score for c in candidates])
     places = logsumexp(scores - best.score) - _log_places(model, best.state)
-    log_evidence = over_errors + integral - at_mode + places
+    log_evidence = over_errors + over_areas + places
     chances = np.exp(scores - logsumexp(scores))
     pistons = {
         fault.name: _piston_chances(model, candidates, chances, k)
         for k, fault in enumerate(best.state)
         if fault.one_piston
     }
+    cut_off = {name: density.cut_off for name, density in areas.items()}
     # A twin that errs by so much about a change errs by as much about its size.
     areas = {name: density.widened(model.usual_error) for name, density in areas.items()}
-    return StateEvidence(best.state, float(log_evidence), mode, errors, areas, pistons)
+    return StateEvidence(best.state, float(log_evidence), mode, errors, areas, cut_off, pistons)
 
 
 def _at_best_pitch(
@@ -166,8 +169,8 @@ def _best_errors(model, mode: Hypothesis, prior: ErrorPrior) -> tuple[Errors, fl
 def _over_areas(
     model: ObservationModel, mode: Hypothesis, errors: Errors, prior: ErrorPrior
 ) -> tuple[float, dict[str, Density]]:
-    """Log of the likelihood's mean over the prior of areas and errors of a change, and each area's
-    own density: how wrong the twin may be decides how well an area is known.
+    """Log of the likelihood's mean over the prior of the areas, over the likelihood at the mode,
+    and each area's own density: how wrong the twin may be decides how well an area is known.
 
     Two areas are taken as independent about the mode. What ties them is mostly that either change
     may be relatively wrong, which each density has in it.
@@ -178,9 +181,8 @@ def _over_areas(
         fault.name: explore(_along(mode, k, likelihood), *model.area_ends(fault, mode.beside(k)))
         for k, fault in enumerate(mode.state)
     }
-    volume = sum(float(d.nodes[-1] - d.nodes[0]) for d in densities.values())
-    integral = at_mode - volume + sum(d.log_integral - at_mode for d in densities.values())
-    return integral, densities
+    mean = sum(d.log_integral - at_mode - np.log(d.width) for d in densities.values())
+    return float(mean), densities
 
 
 def _over_changes(model, hypothesis: Hypothesis, errors: Errors, prior: ErrorPrior) -> float:
@@ -215,4 +217,4 @@ def piston_index(model: ObservationModel, piston: int, turn: float) -> int:
     first sample; it comes there again after the rest of the revolution.
     """
     ahead = (model.anchor.angle + turn) / (2.0 * np.pi) - model.start
-    return int(np.floor((-ahead * model.pistons - piston) % model.pistons))
+    return int(np.floor(-ahead * model.pistons - piston)) % model.pistons

@@ -15,6 +15,7 @@ COARSE, FINE = 15, 8  # nodes over the whole prior, and about the best one in ea
 DENSE = 40  # points between two nodes at which the density is interpolated
 PER_SD = 12.0  # grid points in a standard deviation that a density is widened by
 STEPS = 3  # of refinement, each a quarter of the interval before
+NEGLIGIBLE = -2.0  # log density at an end, below the greatest, from which the end does not matter
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,17 @@ class Density:
         nodes = np.append(nodes, self.nodes[-1])
         smooth = Akima1DInterpolator(self.nodes, self.log_density, method="makima")
         return nodes, smooth(nodes)
+
+    @property
+    def width(self) -> float:
+        """Distance of the outer nodes."""
+        return float(self.nodes[-1] - self.nodes[0])
+
+    @property
+    def cut_off(self) -> tuple[bool, bool]:
+        """Whether the density ends at the first and at the last node where it still matters."""
+        low, high = self.log_density[[0, -1]] - np.max(self.log_density)
+        return bool(low > NEGLIGIBLE), bool(high > NEGLIGIBLE)
 
     @property
     def log_integral(self) -> float:

@@ -42,7 +42,7 @@ from rippletwin.twin.twin_file import from_dict, to_dict
 FOLDER = "kept"
 TWIN = "twin.json"
 ANSWERS = "recordings"  # folder in FOLDER with a file for each label
-LIBRARIES = ("numpy", "scipy")
+LIBRARIES = ("numpy", "scipy", "numba")
 WITHOUT_EFFECT = ("file", "state")  # fields of a recording that no answer depends on
 
 

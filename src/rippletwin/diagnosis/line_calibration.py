@@ -15,7 +15,12 @@ from dataclasses import replace
 from rippletwin.calibration.calibrate import calibrate
 from rippletwin.calibration.likelihood import EVENNESS, Likelihood
 from rippletwin.calibration.misfit import misfit
-from rippletwin.diagnosis.pump_flow import healthy_flow, load_pressure_of, with_fitted_pump
+from rippletwin.diagnosis.pump_flow import (
+    healthy_flow,
+    load_pressure_of,
+    rebuild,
+    with_fitted_pump,
+)
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
 from rippletwin.twin.twin import Twin
 
@@ -24,23 +29,14 @@ def calibrate_line(twin: Twin, healthy: Sequence) -> Twin:
     """The twin with its line fitted to healthy periodic observations whose source is free.
 
     The pump keeps its numbers, and friction and effects are the twin's. It is returned as it is
-    (`with_fitted_pump`) where its own line leaves no more of the ratios between sensors, and where
-    there is one sensor, which has none.
+    (`with_fitted_pump`) where its own line leaves no more of the ratios between sensors.
     """
     fitted = with_fitted_pump(twin)
-    if len(fitted.rig.sensors) < 2 or not healthy:
-        return fitted
     free = [
         replace(o, source="free", flow_ripple=o.flow_ripple or _ripple(fitted, o))
         for o in select_fitted_frequencies(healthy, fitted.rig)
     ]
-    line = Twin(
-        fitted.rig,
-        free,
-        friction=fitted.friction,
-        effects=fitted.effects,
-        guessed_load=fitted.guessed_load,
-    )
+    line = rebuild(fitted, fitted.rig, free)
     found = calibrate(line, free)
     before = misfit(Likelihood(line, free, evenness=EVENNESS), fitted.theta)
     if not found.after.relative < before.relative:

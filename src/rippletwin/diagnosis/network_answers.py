@@ -69,7 +69,10 @@ def ask_networks(
     """
     return {
         recording.label: {
-            name: judge_windows(kept, windows_of(recording, rig, kept.samples_per_revolution))
+            name: judge_windows(
+                kept.classes,
+                *kept.answers(windows_of(recording, rig, kept.samples_per_revolution)),
+            )
             for name, kept in networks.items()
             if is_at_their_point(recording, kept)
         }
@@ -77,12 +80,12 @@ def ask_networks(
     }
 
 
-def judge_windows(kept: KeptNetworks, windows: np.ndarray) -> dict:
+def judge_windows(classes: Sequence[str], said: np.ndarray, p_values: np.ndarray) -> dict:
     """`state`, the `share` of windows and seeds that say it, and the share that is `unlike` all
-    that has been simulated; the state is "unlike" where most are."""
-    said, p_values = kept.answers(windows)
+    that has been simulated; the state is "unlike" where most are. `said`, indices of `classes`, and
+    `p_values` are those of `KeptNetworks.answers`, of one shape."""
     unlike = float(np.mean(p_values <= PROMISED_RATE))
-    states = np.array([STATE_OF[name] for name in kept.classes])[said]
+    states = np.array([STATE_OF[name] for name in classes])[said]
     names, counts = np.unique(states, return_counts=True)
     state, share = str(names[np.argmax(counts)]), float(counts.max() / states.size)
     if unlike > 0.5:

@@ -25,7 +25,6 @@ from rippletwin.diagnosis.faults.base import Fault
 from rippletwin.diagnosis.hypothesis import Errors, Hypothesis, Parts, coherence
 from rippletwin.diagnosis.likelihood import Marginal, complex_columns, marginal
 from rippletwin.diagnosis.pump_flow import LeakFlow
-from rippletwin.spectra.frequency_selection import select_frequencies
 
 TURN_SD = 0.02  # rad, of a shaft angle that has been found already
 SOURCE_DRIFT, SOURCE_WAVES = 0.01, 4
@@ -61,7 +60,7 @@ class ObservationModel:
         start: float = 0.0,
     ):
         self.start = start
-        self.observation = select_frequencies(observation, slice(len(anchor.orders)))
+        self.observation = observation
         self.sensors = len(observation.values)
         self.anchor, self.line, self.flows = anchor, line, flows
         self.orders = anchor.orders
@@ -73,7 +72,7 @@ class ObservationModel:
         self._waves = _cosines(self.observation.frequency_hz, CHANGE_WAVES)
         self._expected = np.hypot(MIN_CHANGE_ERROR, [anchor.misfit, anchor.line_misfit])
         self.usual_error = min(float(np.median(self._expected[0])), MAX_USUAL_ERROR)
-        self._undrifted = line.response()[:, : len(self.orders)]
+        self._undrifted = line.response()
         self._divide(np.zeros(len(line.drifts)))
 
     # predictions
@@ -116,12 +115,12 @@ class ObservationModel:
         return float(np.log(low)), float(np.log(high))
 
     def state_of_line(self, hypothesis: Hypothesis) -> np.ndarray:
-        """Drift (D,) with what the leaks' loss of mean flow makes of an orifice set anew."""
-        lost = sum(
+        """Drift (D,) with what the leaks' change of mean flow makes of an orifice set anew."""
+        gained = sum(
             self.flows[fault.name].harmonics(area)[0].real / self.flows[fault.name].mean
             for fault, area in zip(hypothesis.state, hypothesis.areas)
         )
-        return self.line.reset_orifice(np.array(hypothesis.drift, float), lost)
+        return self.line.reset_orifice(np.array(hypothesis.drift, float), gained)
 
     def change_of_flow(self, hypothesis: Hypothesis) -> np.ndarray:
         """Change (F,) of the pump's flow from that of the hypothesis to the recording's, m3/s, as
@@ -137,7 +136,6 @@ class ObservationModel:
 
     def _divide(self, drift: np.ndarray) -> None:
         response, slopes = self.line.response(drift), self.line.slopes(drift)
-        response, slopes = response[:, : len(self.orders)], slopes[..., : len(self.orders)]
         self._at, self.division = drift, Division(response)
         divide = self.division.divide
         self.response, self._slopes = divide(response), divide(slopes)

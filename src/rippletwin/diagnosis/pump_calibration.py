@@ -22,6 +22,7 @@ from rippletwin.diagnosis.pump_flow import (
     TIMING_SD_DEG,
     healthy_flow,
     load_pressure_of,
+    rebuild,
     with_fitted_pump,
 )
 from rippletwin.pump.geometry import Geometry
@@ -42,10 +43,11 @@ HIGHEST_HZ = 2500.0  # up to which the flow is fitted
 RELATIVE_ERROR, LEAST_ERROR = 0.1, 0.03  # of the flow at an order, and over the flow's rms
 MOST_SDS = 4.0  # from the data sheet
 MOST_OVERLAP_DEG = 90.0  # so that ports are open for half of the time that they could be
-STEP = 0.05  # of difference quotients, in standard deviations
 EVALUATIONS = 8
 ROUNDS = 2
 ALIGNMENT_ROUNDS = 3
+IMPOSSIBLE = 1e3  # residual of a pump that cannot be simulated
+POINT_DIGITS = 2  # of speed and pressure that make an operating point
 
 
 @dataclass(frozen=True)
@@ -64,17 +66,17 @@ def calibrate_pump(twin: Twin, healthy: Sequence) -> Twin:
     """The twin with its pump fitted to the flow of healthy periodic observations.
 
     Its line must be known; the pump's numbers are no parameters (`with_fitted_pump`). It is
-    returned as it is where there is one sensor, which cannot tell the flow from the line, and where
-    the data sheet has no geometry of the pump.
+    returned as it is where the data sheet has no geometry of the pump.
     """
     twin = with_fitted_pump(twin)
     pump = dict(twin.rig.pump)
-    if len(twin.rig.sensors) < 2 or set(pump) == {"pistons"} or not healthy:
+    if set(pump) == {"pistons"}:
         return twin
     fitted = twin
     for _ in range(ROUNDS):  # the flow is told beside the chambers of the pump that was fitted
         flows = [_measured_flow(fitted, observation) for observation in healthy]
-        fitted = _with_pump(twin, pump | _fit_numbers(pump, twin.rig.fluid, flows))
+        numbers = pump | _fit_numbers(pump, twin.rig.fluid, flows)
+        fitted = rebuild(twin, replace(twin.rig, pump=numbers), theta=twin.theta)
     return fitted
 
 
@@ -83,20 +85,23 @@ def _fit_numbers(pump: dict, fluid: Fluid, flows: Sequence[_Flow]) -> dict:
 
     def residuals(x: np.ndarray) -> np.ndarray:
         numbers, scale = pump | _numbers(pump, x), np.exp(SCALE_SD * x[-1])
-        left = [_residual(numbers, fluid, flow, scale) for flow in flows]
+        try:
+            left = [_residual(numbers, fluid, flow, scale) for flow in flows]
+        except ArithmeticError:  # no such pump can be simulated: the step is taken back
+            left = [np.full(2 * len(flow.values), IMPOSSIBLE) for flow in flows]
         return np.concatenate([*left, x])
 
     start = np.zeros(len(PRIOR_SD) + 2)
     ends = -MOST_SDS, MOST_SDS
-    found = least_squares(residuals, start, bounds=ends, diff_step=STEP, max_nfev=EVALUATIONS)
+    found = least_squares(residuals, start, bounds=ends, max_nfev=EVALUATIONS)
     return _numbers(pump, found.x)
 
 
-def one_each_point(observations: Sequence, digits: int = 2) -> list:
-    """The first of the observations of each operating point, to some digits."""
+def one_each_point(observations: Sequence) -> list:
+    """The first of the observations of each operating point, to POINT_DIGITS."""
     first: dict[tuple[str, ...], Any] = {}
     for o in observations:
-        point = tuple(f"{x or 0.0:.{digits}g}" for x in (o.speed_hz, o.load_pressure))
+        point = tuple(f"{x or 0.0:.{POINT_DIGITS}g}" for x in (o.speed_hz, o.load_pressure))
         first.setdefault(point, o)
     return list(first.values())
 
@@ -136,18 +141,8 @@ def _numbers(pump: dict, x: np.ndarray) -> dict:
         name: getattr(sheet, name) * float(np.exp(sd * u))
         for (name, sd), u in zip(PRIOR_SD.items(), x)
     }
-    found["port_overlap_deg"] = min(found["port_overlap_deg"], MOST_OVERLAP_DEG)
+    overlap = np.clip(found["port_overlap_deg"], -MOST_OVERLAP_DEG, MOST_OVERLAP_DEG)
+    found["port_overlap_deg"] = float(overlap)
     return found | {
         "port_timing_deg": sheet.port_timing_deg + TIMING_SD_DEG * float(x[len(PRIOR_SD)])
     }
-
-
-def _with_pump(twin: Twin, pump: dict) -> Twin:
-    return Twin(
-        replace(twin.rig, pump=pump),
-        friction=twin.friction,
-        effects=twin.effects,
-        source_sd=twin.source_sd,
-        theta=twin.theta,
-        guessed_load=twin.guessed_load,
-    )

@@ -8,15 +8,16 @@ what a leak's own law is uncertain by.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
 from scipy.interpolate import CubicSpline, make_interp_spline
 
-from rippletwin.case.model import Fluid
+from rippletwin.case.model import Fluid, Rig
 from rippletwin.diagnosis.faults.base import Fault
+from rippletwin.errors import InputError
 from rippletwin.harmonics import peak_amplitudes
 from rippletwin.pump.geometry import Geometry
 from rippletwin.pump.outlets import ConstantPressure
@@ -55,12 +56,21 @@ def with_fitted_pump(twin: Twin, mean_flow: float | None = None, speed_hz: float
     fitted = {key: value for key, value in twin.fitted_pump().items() if value is not None}
     pump = _with_stated_discharge(pump | fitted, pump.get("discharge_coefficient"))
     kept = [name not in own for name in twin.index]
+    return rebuild(twin, replace(twin.rig, pump=pump), theta=twin.theta[kept])
+
+
+def rebuild(
+    twin: Twin, rig: Rig, observations: Sequence = (), theta: np.ndarray | None = None
+) -> Twin:
+    """A twin of `rig` and the observations with the friction, effects and source error of `twin`;
+    theta (P,), nominal where None."""
     return Twin(
-        replace(twin.rig, pump=pump),
+        rig,
+        observations,
         friction=twin.friction,
         effects=twin.effects,
         source_sd=twin.source_sd,
-        theta=twin.theta[kept],
+        theta=theta,
         guessed_load=twin.guessed_load,
     )
 
@@ -78,9 +88,20 @@ def _with_stated_discharge(pump: dict, stated: float | None) -> dict:
 
 
 def load_pressure_of(twin: Twin, observation) -> float:
-    """Load pressure, Pa, of an observation: as stated, or as its sensors' means have it."""
+    """Load pressure, Pa, of an observation: as stated, or as its sensors' means have it.
+
+    Raises InputError where it is not positive: no leak flows then.
+    """
     point = twin.operating_point(replace(observation, source="free"))
-    return observation.load_pressure or point.load_pressure
+    pressure = observation.load_pressure or point.load_pressure
+    if not pressure > 0.0:
+        raise InputError(
+            f"recording {observation.label}",
+            "load_pressure",
+            f"not given, and the mean of the sensors is {pressure:.3g} Pa: no leak flows",
+            "Give the mean gauge pressure at the load, Pa",
+        )
+    return pressure
 
 
 def _scaled(pump: Geometry, displacement: float) -> dict:
@@ -132,7 +153,10 @@ class LeakFlow:
 
 
 def healthy_flow(pump: Mapping, fluid: Fluid, speed_rpm: float, pressure: float) -> PumpRipple:
-    """Ripple of the healthy pump at r/min into a pressure, Pa; simulations are kept."""
+    """Ripple of the healthy pump at r/min into a pressure, Pa; simulations are kept.
+
+    Raises ArithmeticError where the chamber equations cannot be solved.
+    """
     return _simulated(_key(pump), fluid, float(speed_rpm), float(pressure), None, 0.0)
 
 
@@ -142,6 +166,7 @@ def leaking_flow(
     """Ripple of the pump with a fault of this leak area, m2, at piston 0; simulations are kept.
 
     The area is of a leak with LEAK_DISCHARGE where the data sheet gives no discharge coefficient.
+    Raises ArithmeticError where the chamber equations cannot be solved.
     """
     scale = 1.0
     if not pump.get("discharge_coefficient"):
@@ -159,7 +184,10 @@ def leak_velocity(pump: Mapping, fluid: Fluid, pressure: float) -> float:
 def leak_flow(
     pump: Mapping, fluid: Fluid, speed_rpm: float, pressure: float, fault: Fault
 ) -> LeakFlow:
-    """`LeakFlow` of a fault at r/min into a pressure, Pa; it is kept."""
+    """`LeakFlow` of a fault at r/min into a pressure, Pa; it is kept.
+
+    Raises ArithmeticError where the chamber equations cannot be solved.
+    """
     return _leak_flow(_key(pump), fluid, float(speed_rpm), float(pressure), fault)
 
 

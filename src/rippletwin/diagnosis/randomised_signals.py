@@ -125,12 +125,17 @@ class SignalSource:
         flow = np.empty((len(classes), count, 1, len(self.orders)), complex)
         for k in range(count):
             theta = self._draw_theta(rng)
-            fixed = self._line.response(theta=theta)
+            known = None
+            if anchored:
+                known = flow_at_pump(self._line.response(theta=theta), self._healthy)
             for c, name in enumerate(classes):
-                change, lost = self._leak(leaks.get(name), areas[c, k], rng)
-                moved = self._line.response(self._draw_drift(lost, rng), theta)
-                read = self._anchored if anchored else self._simulated
-                pressure[c, k] = read(fixed, moved, change, rng)
+                change, gained = self._leak(leaks.get(name), areas[c, k], rng)
+                moved = self._line.response(self._draw_drift(gained, rng), theta)
+                pressure[c, k] = (
+                    self._simulated(moved, change, rng)
+                    if known is None
+                    else self._anchored(*known, moved, change, rng)
+                )
                 flow[c, k] = self._smooth(self.misfit, 1, rng) * (self._flow + change)
         return RandomisedSignals(
             pressure=one_period(pressure, self._samples, self.orders),
@@ -138,21 +143,21 @@ class SignalSource:
             leak_area=areas,
         )
 
-    def _simulated(self, fixed, moved, change, rng) -> np.ndarray:
+    def _simulated(self, moved, change, rng) -> np.ndarray:
         """Readings (S, F): all of the ripple is the twin's."""
         return self._smooth(self.misfit, len(moved), rng) * moved * (self._flow + change)
 
-    def _anchored(self, fixed, moved, change, rng) -> np.ndarray:
-        """Readings (S, F): the measured healthy ripple through the drifted line, as the shaft stood
-        when it was recorded, and the twin's change."""
-        flow, rest = flow_at_pump(fixed, self._healthy)
+    def _anchored(self, flow, rest, moved, change, rng) -> np.ndarray:
+        """Readings (S, F): the measured healthy ripple, a flow (F,) at the pump and what it leaves
+        (S, F), through the drifted line, as the shaft stood when it was recorded, and the twin's
+        change."""
         angle = self._angle + TURN_SD * rng.standard_normal()
         changed = moved * change * np.exp(1j * self.orders * angle)
         own = self._smooth(SOURCE_DRIFT, 1, rng) * moved * flow + rest
         return own + self._smooth(self.misfit, len(moved), rng) * changed
 
     def _leak(self, leak, area: float, rng) -> tuple[np.ndarray | float, float]:
-        """Change (F,) of the flow at a random piston, and the share of the mean flow it loses."""
+        """Change (F,) of the flow at a random piston, and that of the mean flow, relative."""
         piston = rng.integers(self._pistons)
         if leak is None:
             return 0.0, 0.0
@@ -166,9 +171,9 @@ class SignalSource:
             return theta
         return theta + self._root @ rng.standard_normal(len(theta))
 
-    def _draw_drift(self, lost: float, rng) -> np.ndarray:
+    def _draw_drift(self, gained: float, rng) -> np.ndarray:
         """Drift (D,) of the line; an orifice is set anew, so that the load pressure is held."""
-        return self._line.reset_orifice(rng.standard_normal(len(self._line.drifts)), lost)
+        return self._line.reset_orifice(rng.standard_normal(len(self._line.drifts)), gained)
 
     def _smooth(self, size: float | np.ndarray, rows: int, rng) -> np.ndarray:
         """Random factors (rows, F) about 1, smooth in frequency, of relative deviation `size`, a

@@ -102,5 +102,5 @@ def _element(model: ObservationModel, residual, variance, of_pump, of_line) -> s
     at_sensors = model.division.at_sensors(residual)
     by_sensor = np.sum(np.abs(at_sensors) ** 2 / np.mean(variance, axis=0), axis=1)
     if model.sensors > 1 and by_sensor.max() > ONE_SENSOR * by_sensor.sum():
-        return f"sensor {model.line.twin.rig.sensors[int(np.argmax(by_sensor))].name}"
+        return f"sensor {model.observation.sensors[int(np.argmax(by_sensor))].name}"
     return "line"

@@ -11,16 +11,24 @@ The steps of the method, each with the module that takes it:
  7. Judge the support of each effect, drop what has none          checks.support
  8. Find the intervals of the effects' parameters                 checks.profile_intervals
  9. Fit passive networks, which need no name                      search.passive_networks
-10. Find swapped sensors and inverted signs                       checks.sensor_wiring
-11. Read the alarms: misfit, pull, disagreement, drift            checks.alarms
-12. Repeat the best fits with an unknown source                   localise.source_free_fits
-13. Cross-validate the base and the explanation                   checks.cross_validation
-14. Draw the null distribution of the evidence, if asked for      checks.bootstrap
-15. Test the data sheet: prior sensitivity of accepted effects    checks.prior_sensitivity
-16. Decide                                                        verdict.decision
-17. Locate the mismatch and what remains, by free corrections     localise.free_corrections,
+10. Judge the effects beside a network that stands in, and find
+    the intervals of both                                         checks.support,
+                                                                  checks.profile_intervals
+11. Fit gas in place of volumes of liquid                         search.gas_rivals
+12. Find swapped sensors and inverted signs                       checks.sensor_wiring
+13. Read the alarms: misfit, pull, disagreement, drift            checks.alarms
+14. Repeat the best fits with an unknown source                   localise.source_free_fits
+15. Cross-validate the base and the explanation                   checks.cross_validation
+16. Draw the null distribution of the evidence, if asked for      checks.bootstrap
+17. Test the data sheet: prior sensitivity of accepted effects    checks.prior_sensitivity
+18. Withhold a name from what is in doubt                         checks.support
+19. Decide; cross-validate the line alone if that is accepted     verdict.decision,
+                                                                  checks.cross_validation
+20. Add the tolerances of the sensors to the intervals            checks.sensor_tolerance
+21. Locate the mismatch and what remains, by free corrections     localise.free_corrections,
                                                                   localise.remainder
-18. Analyse the shaft orders by the explained line                localise.shaft_orders
+22. Analyse the shaft orders by the explained line                localise.shaft_orders,
+                                                                  localise.shaft_order_intervals
 
 `verdict.verdict_file` writes the result.
 """
@@ -33,8 +41,8 @@ from dataclasses import replace
 from rippletwin.case.model import Case, Rig
 from rippletwin.errors import InputError
 from rippletwin.explanation.checks.alarms import fit_each_observation, read_alarms
-from rippletwin.explanation.checks.bootstrap import bootstrap_null
-from rippletwin.explanation.checks.cross_validation import cross_validate
+from rippletwin.explanation.checks.bootstrap import bootstrap_null, check_draws
+from rippletwin.explanation.checks.cross_validation import Halves, cross_validate
 from rippletwin.explanation.checks.data_contradictions import find_contradictions
 from rippletwin.explanation.checks.prior_sensitivity import (
     PriorSensitivity,
@@ -49,13 +57,15 @@ from rippletwin.explanation.checks.support import (
     judge_effects,
     withhold_what_is_in_doubt,
 )
-from rippletwin.explanation.fit_jobs import FitJob, PlainCalibration, open_workers
+from rippletwin.explanation.fit_jobs import FitJob, PlainCalibration, Workers, open_workers
 from rippletwin.explanation.localise.free_corrections import locate_mismatch
 from rippletwin.explanation.localise.remainder import find_remainder
 from rippletwin.explanation.localise.shaft_order_intervals import add_amplitude_intervals
 from rippletwin.explanation.localise.shaft_orders import analyse_shaft_orders
 from rippletwin.explanation.localise.source_free_fits import refit_source_free
+from rippletwin.explanation.search.gas_rivals import fit_gas_rivals
 from rippletwin.explanation.search.passive_networks import accepted_network, fit_passive_networks
+from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.stages.preparation import HIGHEST_HZ, observe_all, select_fitted_as
 from rippletwin.explanation.stages.staged_search import (
     Progress,
@@ -73,12 +83,14 @@ def explain(
 ) -> Explanation:
     """Explain the healthy recordings of a case.
 
-    progress  gets what is being fitted, how many fits are done and how many there are
-    draws     recordings without an effect to draw for the threshold (`checks.bootstrap`); 0 for
-              the default threshold
+    processes  that fit side by side
+    progress   gets what is being fitted, how many fits are done and how many there are
+    draws      recordings without an effect to draw for the threshold (`checks.bootstrap`); 0 for
+               the default threshold
 
-    Raises InputError if no recording is healthy.
+    Raises InputError if no recording is healthy, ValueError for too few draws.
     """
+    check_draws(draws)
     if not case.healthy:
         raise InputError(
             case.folder / "rig.yaml",
@@ -104,11 +116,14 @@ def explain_observations(
     contradiction: str = "",
     draws: int = 0,
 ) -> Explanation:
-    """Explain observations: steps 3 to 18.
+    """Explain observations: steps 3 to 22.
 
     early, late    observations of the two halves of periodic recordings
     contradiction  why the data contradict themselves, if they do; then nothing is searched for
+
+    `processes`, `progress` and `draws` are those of `explain`. Raises ValueError for too few draws.
     """
+    check_draws(draws)
     # Steps 3 to 6: search
     stage = prepare_stage(rig, observations)
     if contradiction:
@@ -121,17 +136,8 @@ def explain_observations(
     judged = Judged(search.best, (), ())
     with open_workers(base, data, processes) as workers:
         if not contradiction:
-            # Steps 7 to 10: the best explanation and its competitors
-            judged = judge_effects(workers, search.base, search.best, halves)
-            judged = replace(judged, best=add_profile_intervals(workers, judged.best))
-            networks = fit_passive_networks(workers, judged.best)
-            search = replace(search, best=judged.best, passive_networks=networks)
-            network = accepted_network(search)
-            if network is not None and set(judged.best.hypothesis) <= set(network.hypothesis):
-                network, judged = judge_beside_network(workers, search.base, network, judged)
-                search = replace(search, best=judged.best, passive_networks=[network, *networks])
-            contradiction = find_swapped_sensors(base, data, search)
-        # Steps 11 to 14: checks
+            search, judged, contradiction = _judge_explanation(workers, search, halves)
+        # Steps 13 to 16: checks
         point_fits = fit_each_observation(workers, search.base)
         alarms = read_alarms(search.base, data, point_fits, early, late, rig.delay)
         source_free_fits = refit_source_free(workers, search.leading_fits)
@@ -143,7 +149,7 @@ def explain_observations(
         null_distribution = None
         if draws and search.best.hypothesis:
             null_distribution = bootstrap_null(search.base, data, draws, processes, progress)
-        # Steps 15 and 16: the data sheet, and the decision
+        # Steps 17 to 19: the data sheet, and the decision
         sensitivity: tuple[PriorSensitivity, ...] = ()
         if judged.supports:
             sensitivity = compare_without_each_effect(workers, search.best, judged.without)
@@ -152,9 +158,12 @@ def explain_observations(
                 judged, explanation, validation.model_error, has_rivals
             )
         decision = decide(search, alarms, judged.supports, contradiction, null_distribution)
+        if explanation.hypothesis and not decision.accepted.hypothesis:
+            # The explanation is rejected: the scores are those of the line alone.
+            validation = cross_validate(workers, search.base, search.base, halves, calibrated)
+    # Steps 20 to 22: the sensors' tolerances, and where the mismatch is
     accepted = add_sensor_tolerance(decision.accepted, data)
     decision = replace(decision, accepted=accepted)
-    # Steps 17 and 18: where the mismatch is
     location = locate_mismatch(search.base, data)
     remainder = None if contradiction else find_remainder(decision.accepted, data)
     shaft_orders = add_amplitude_intervals(
@@ -171,7 +180,6 @@ def explain_observations(
         validation=validation,
         calibrated=calibrated,
         decision=decision,
-        point_fits=tuple(point_fits),
         source_free_fits=tuple(source_free_fits),
         prior_sensitivity=sensitivity if decision.supports else (),
         shaft_orders=shaft_orders,
@@ -179,3 +187,26 @@ def explain_observations(
         remainder=remainder,
         null_distribution=null_distribution,
     )
+
+
+def _judge_explanation(
+    workers: Workers, search: Search, halves: Halves | None
+) -> tuple[Search, Judged, str]:
+    """Steps 7 to 12: the search with the explanation that the checks leave and its competitors,
+    the support of its effects, and the contradiction in words where the sensors are wired wrongly.
+    """
+    judged = judge_effects(workers, search.base, search.best, halves)
+    judged = replace(judged, best=add_profile_intervals(workers, judged.best))
+    networks = fit_passive_networks(workers, judged.best)
+    search = replace(search, best=judged.best, passive_networks=networks)
+    network = accepted_network(search)
+    if network is not None:
+        if set(judged.best.hypothesis) <= set(network.hypothesis):
+            network, judged = judge_beside_network(workers, search.base, network, judged)
+        network = add_profile_intervals(workers, network)
+        others = [fit for fit in networks if set(fit.hypothesis) != set(network.hypothesis)]
+        search = replace(search, best=judged.best, passive_networks=[network, *others])
+    search = replace(search, rivals=[*search.rivals, *fit_gas_rivals(workers, search.best)])
+    explanation = accepted_network(search) or search.best
+    wrong = find_swapped_sensors(workers.base, workers.observations, explanation)
+    return search, judged, wrong

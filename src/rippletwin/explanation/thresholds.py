@@ -16,14 +16,14 @@ from rippletwin.twin.effects.base import Effect, Place
 # Evidence
 
 MIN_LOG_BAYES_FACTOR = 8.0
-"""An effect is accepted if it adds at least this. It is above the largest value in parametric
-bootstraps of cases without an effect, with refitting (docs/explanation/explain.md)."""
+"""An effect is accepted if it adds at least this. In parametric bootstraps of cases without an
+effect, with refitting, none does (tests/explanation/test_bootstrap.py)."""
 
 EQUIVALENT_LOG_BAYES_FACTOR = 3.0  # two explanations closer than this are equivalent: 20 to 1
 
 MIN_LOG_BAYES_FACTOR_ALWAYS_PRESENT = -3.0
-"""The same as MIN_LOG_BAYES_FACTOR for an effect that is always present: it is accepted unless the
-data are 20 to 1 against it."""
+"""The same for an effect that is always present: beside another effect it is accepted unless the
+data are 20 to 1 against it. Alone it needs as much as any."""
 
 FALSE_ALARM_RATE = 0.02  # of cases without an effect, for the threshold of a bootstrap
 
@@ -31,15 +31,15 @@ GOOD_MODEL_ERROR = 1.25 * MIN_MODEL_ERROR
 """Relative model error up to which no effect can improve a fit noticeably. It saves work: beside
 such a fit no network is tried. No name depends on it."""
 
-MUCH_MODEL_ERROR = 0.05
-"""Relative model error above which only a usual effect is established. The checks of an effect
-allow for an error elsewhere to first order. Where physics is left out that makes more than a few
-per cent, an effect that is not there may pass them."""
-
 GOOD_RIPPLE_ERROR = 0.05
 """Relative error of the nominal ripple up to which the same holds. A line that lacks an element
 leaves to the pump what it cannot fit: with two sensors each harmonic has one equation more than the
 pump has unknowns."""
+
+MUCH_MODEL_ERROR = 0.05
+"""Relative model error above which only a usual effect is established. The checks of an effect
+allow for an error elsewhere to first order. Where physics is left out that makes more than a few
+per cent, an effect that is not there may pass them."""
 
 
 def leaves_nothing(fit: Fit) -> bool:
@@ -79,5 +79,5 @@ def min_log_bayes_factor(rig: Rig, effect: Effect, place: Place) -> float:
 
 
 def min_log_bayes_factor_of_newest(fit: Fit) -> float:
-    """Log evidence that the newest effect of a fit must have added."""
+    """The same of the newest effect of a fit."""
     return min_log_bayes_factor(fit.twin.rig, *fit.hypothesis[-1])

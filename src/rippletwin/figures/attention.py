@@ -22,7 +22,7 @@ _BAR = dict(color=style.ALARM, lw=0)
 _OUTLINED = [patheffects.withStroke(linewidth=1.5, foreground="black")]  # visible on any heat
 
 
-def windows(
+def plot_windows(
     networks: Sequence[str],
     states: Sequence[str],
     ripple: np.ndarray,
@@ -57,7 +57,7 @@ def windows(
     return fig
 
 
-def images(
+def plot_images(
     networks: Sequence[str],
     states: Sequence[str],
     pictures: np.ndarray,
@@ -101,7 +101,9 @@ def images(
     return fig
 
 
-def ranks(groups: Mapping[str, tuple[Sequence[str], np.ndarray, np.ndarray, np.ndarray]]) -> Figure:
+def plot_ranks(
+    groups: Mapping[str, tuple[Sequence[str], np.ndarray, np.ndarray, np.ndarray]],
+) -> Figure:
     """Accuracy against alignment, a panel a dataset, a point a network.
 
     groups : dataset -> names, whether each judges images (A,), alignment (A, 2) and accuracy
@@ -132,7 +134,7 @@ def ranks(groups: Mapping[str, tuple[Sequence[str], np.ndarray, np.ndarray, np.n
     return fig
 
 
-def claims(groups: Mapping[str, tuple[Sequence[str], np.ndarray]]) -> Figure:
+def plot_claims(groups: Mapping[str, tuple[Sequence[str], np.ndarray]]) -> Figure:
     """Differences that claims predict to be positive: claim -> labels, (n, 3) difference, ends of
     its 95 % interval (NaN where unknown), per cent of the windows."""
     groups = groups or {"nothing to compare": ([], np.empty((0, 3)))}

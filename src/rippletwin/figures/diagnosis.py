@@ -13,7 +13,7 @@ from rippletwin.figures import style
 ORDERS = "frequency in multiples of shaft\nand pumping frequency"
 
 
-def confusion(
+def plot_confusion(
     matrices: Mapping[str, np.ndarray], truth: Sequence[str], predicted: Sequence[str]
 ) -> Figure:
     """Confusion matrices, one panel a name: (len(truth), len(predicted)) shares of a row."""
@@ -40,7 +40,7 @@ def confusion(
     return fig
 
 
-def accuracy(
+def plot_accuracy(
     architectures: Sequence[str],
     ours: Mapping[str, np.ndarray],
     paper: Mapping[str, np.ndarray],
@@ -68,7 +68,7 @@ def accuracy(
     return fig
 
 
-def sst(
+def plot_sst(
     images: Mapping[str, np.ndarray],
     frequency_hz: np.ndarray,
     shaft_hz: float,

@@ -191,7 +191,7 @@ def _places(e: Explanation) -> Places:
     found = []
     for entry in effect_intervals(e.decision.accepted):
         effect, place, parameters = entry["effect"], entry["place"], entry["parameters"]
-        _, (low, high) = element_and_extent(e.rig, effect, place, parameters)
+        _, (low, high) = element_and_extent(e.rig, place, parameters)
         found.append(LinePlace(name_effect(effect.name, str(place)), float(low), float(high)))
     location = e.location
     return Places(

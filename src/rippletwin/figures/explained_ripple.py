@@ -71,7 +71,7 @@ def plot_ripple(numbers: ExplainedNumbers) -> Figure:
         for s, (ax, sensor) in enumerate(zip(column, point.sensors)):
             for name in names:
                 ax.plot(*curve(point, getattr(point, name)[s]), label=name, **LOOKS[name])
-            x_label, y_label = axis_labels(point, sensor)
+            x_label, y_label = axis_labels(point, style.plain(sensor))
             if point.kind == "input_impedance":
                 ax.set_ylim(0.0, 1.1)  # the reflection of a passive line is at most 1
             elif point.orders is None:
@@ -79,7 +79,7 @@ def plot_ripple(numbers: ExplainedNumbers) -> Figure:
             if k == 0:
                 ax.set_ylabel(y_label, fontsize=8)
             errors = [write_share(point.misfit(getattr(point, n), s)) for n in names[1:]]
-            head = f"{title_of(point)}\n" if s == 0 else ""
+            head = f"{style.plain(title_of(point))}\n" if s == 0 else ""
             ax.set_title(f"{head}error {' → '.join(errors)}", loc="left", fontsize=8)
         column[len(point.measured) - 1].set_xlabel(x_label)
     if len(names) > 2:
@@ -103,8 +103,9 @@ def plot_residuals(numbers: ExplainedNumbers) -> Figure:
                 _edges(point.frequency_hz), np.arange(len(size) + 1), size, norm=norm,
                 cmap=style.SEQUENTIAL,
             )  # fmt: skip
-            ax.set_yticks(np.arange(len(size)) + 0.5, point.sensors[: len(size)])
-            ax.set_title(f"{name}: {title_of(point)}", loc="left", fontsize=8)
+            sensors = [style.plain(sensor) for sensor in point.sensors[: len(size)]]
+            ax.set_yticks(np.arange(len(size)) + 0.5, sensors)
+            ax.set_title(f"{name}: {style.plain(title_of(point))}", loc="left", fontsize=8)
     for ax in axes[-1]:
         ax.set_xlabel("frequency / Hz")
     bar = fig.colorbar(image, ax=axes, extend="both", ticks=[0.1, 1, 10, 100])
@@ -115,6 +116,8 @@ def plot_residuals(numbers: ExplainedNumbers) -> Figure:
 
 
 def _edges(x: np.ndarray) -> np.ndarray:
-    """Cell edges (N + 1,) between and around points (N,)."""
+    """Cell edges (N + 1,) between and around points (N,), a single one 1 % wide."""
+    if len(x) == 1:
+        return x[0] * np.array([0.995, 1.005])
     middle = 0.5 * (x[1:] + x[:-1])
     return np.concatenate([[2 * x[0] - middle[0]], middle, [2 * x[-1] - middle[-1]]])

@@ -61,7 +61,7 @@ def plot_evidence(numbers: ExplainedNumbers) -> Figure | None:
     ticks = [t for t in TICKS if ax.get_xlim()[0] <= t <= ax.get_xlim()[1]]
     ax.set_xticks(ticks, [f"{t:,}".replace(",", "\u202f").replace("-", "−") for t in ticks])
     ax.minorticks_off()
-    ax.set_yticks(heights, ["\n+ ".join(c.effects) for c in shown])
+    ax.set_yticks(heights, [style.plain("\n+ ".join(c.effects)) for c in shown])
     ax.set_xlabel(
         "log Bayes factor against the calibrated line\n(scale linear to ±10, logarithmic beyond)"
     )
@@ -96,7 +96,7 @@ def plot_immittance(numbers: ExplainedNumbers) -> Figure | None:
             if m is columns[0]:
                 ax.set_ylabel(f"{part_name} part")
         title = textwrap.fill(f"{m.effect}: {m.quantity}", LETTERS // len(columns))
-        column[0].set_title(f"{title}\nin {unit.name}", loc="left", fontsize=8)
+        column[0].set_title(f"{style.plain(title)}\nin {unit.name}", loc="left", fontsize=8)
         column[-1].set_xlabel("frequency / Hz")
     fig.suptitle("What do the effects add to the line, and does the recording ask for it?")
     style.legend_below(fig, axes[0, 0])

@@ -54,9 +54,9 @@ def plot_change(d: DiagnosedNumbers) -> Figure:
         ax.set_yscale("log")
         ax.set_ylim(0.2 * max(float(np.min(allowed)), 1e-8), 2.0 * float(np.max(measured[k])))
         ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        ax.set_ylabel(f"{sensor}: change / bar,\nlogarithmic", fontsize=8)
+        ax.set_ylabel(f"{style.plain(sensor)}: change / bar,\nlogarithmic", fontsize=8)
     axes[-1, 0].set_xlabel("shaft order (multiples of the speed)")
-    fig.suptitle(f"How does {d.label} differ from the healthy pump?")
+    fig.suptitle(f"How does {style.plain(d.label)} differ from the healthy pump?")
     style.legend_below(fig, axes[0, 0])
     return fig
 
@@ -77,7 +77,7 @@ def plot_severity(d: DiagnosedNumbers) -> Figure:
     ax.set_xlabel("probability / %")
     ax.set_title("Which state?", loc="left")
     _plot_areas(axes[0, 1], d)
-    fig.suptitle(f"{d.label}: {name_state(d.state)}")
+    fig.suptitle(f"{style.plain(d.label)}: {name_state(d.state)}")
     return fig
 
 

@@ -109,7 +109,7 @@ def _draw_line(ax, places: Places) -> None:
     for name, x in places.sensors:
         ax.plot([x, x], [0.5, 1.2], color=style.CALIBRATED, lw=1.2)
         ax.plot(x, 1.25, "v", color=style.CALIBRATED, ms=6)
-        ax.text(x, 1.5, f"{name}\n{x:.2f} m", ha="center", va="bottom", fontsize=8)
+        ax.text(x, 1.5, f"{style.plain(name)}\n{x:.2f} m", ha="center", va="bottom", fontsize=8)
 
 
 def _draw_intervals(ax, places: Places, shown: Sequence[LinePlace]) -> None:
@@ -126,6 +126,6 @@ def _draw_intervals(ax, places: Places, shown: Sequence[LinePlace]) -> None:
         where = f"{place.low:.2f} to {place.high:.2f} m"
         if place.high - place.low < 1e-6 * places.length:
             where = f"{place.low:.2f} m"
-        ax.text(x, y - 0.22, f"{place.words}: {where}", ha=align, va="top", fontsize=8)
+        ax.text(x, y - 0.22, f"{style.plain(place.words)}: {where}", ha=align, va="top", fontsize=8)
     if not shown:
         ax.text(0.5 * places.length, -2.2, "nothing found", ha="center", fontsize=8)

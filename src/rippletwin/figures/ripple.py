@@ -18,7 +18,7 @@ _LOOK = {
 }
 
 
-def overlay(
+def plot_overlay(
     angle_deg: np.ndarray, curves: Mapping[str, np.ndarray], sensors: Sequence[str], title: str = ""
 ) -> Figure:
     """Pressure ripple at each sensor: measured, nominal, calibrated (and corrected).
@@ -29,16 +29,16 @@ def overlay(
     for k, (ax, sensor) in enumerate(zip(axes[:, 0], sensors)):
         for name, values in sorted(curves.items(), key=lambda item: list(_LOOK).index(item[0])):
             ax.plot(angle_deg, values[k] / 1e5, label=name, **_LOOK[name])
-        ax.set_ylabel(f"{sensor}: ripple / bar")
+        ax.set_ylabel(f"{style.plain(sensor)}: ripple / bar")
     style.legend_below(fig, axes[0, 0])
-    fig.suptitle(f"Does calibration bring the twin to the recording? {title}".rstrip())
+    fig.suptitle(f"Does calibration bring the twin to the recording? {style.plain(title)}".rstrip())
     axes[-1, 0].set_xlabel("crank angle / degrees")
     axes[-1, 0].set_xlim(angle_deg[0], angle_deg[-1])
     axes[-1, 0].set_xticks(np.arange(0, 361, 40))
     return fig
 
 
-def states(
+def plot_states(
     angle_deg: np.ndarray, curves: Mapping[str, np.ndarray], ylabel: str, scale: float = 1.0
 ) -> Figure:
     """One ripple a state, one panel each: curves name -> (M,), divided by `scale`."""

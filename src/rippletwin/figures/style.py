@@ -1,8 +1,8 @@
 """One look for every picture: sizes, fonts, colours that survive colour blindness.
 
 Colours are the qualitative set of Okabe and Ito (2008, Color Universal Design), which differ under
-all common forms of colour blindness; maps are viridis (sequential) and `RdBu_r` (diverging, centred
-on zero). Lines that differ in colour also differ in dash or marker.
+all common forms of colour blindness; maps are viridis. Lines that differ in colour also differ in
+dash or marker.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from rippletwin import store
 MEASURED, NOMINAL, CALIBRATED, CORRECTED = "#000000", "#E69F00", "#0072B2", "#009E73"
 ALARM, NEUTRAL = "#D55E00", "#8C8C8C"
 CYCLE = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000000")
-SEQUENTIAL, DIVERGING = "viridis", "RdBu_r"
+SEQUENTIAL = "viridis"
 COLUMN = 7.0  # inches, width of a text column
 
 # Set once for the process: text and legends drawn after a figure is made follow it too.
@@ -47,6 +47,11 @@ def figure(rows: int = 1, columns: int = 1, height: float = 2.2, **kwargs):
     """A figure one text column wide and its axes (rows, columns), `height` inches a row."""
     fig = Figure(figsize=(COLUMN, height * rows), layout="constrained")
     return fig, fig.subplots(rows, columns, squeeze=False, **kwargs)
+
+
+def plain(text: str) -> str:
+    """A name that a user gave, drawn as it is: between two $ matplotlib would read mathematics."""
+    return text.replace("$", r"\$")
 
 
 def legend_below(fig: Figure, ax) -> None:

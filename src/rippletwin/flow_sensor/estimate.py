@@ -71,12 +71,16 @@ def estimate(
 
 
 def orders_within(bandwidth_hz: float, speed_hz: float, samples: int) -> np.ndarray:
-    """Shaft orders 1, 2, ... up to `bandwidth_hz`, (F,) integers."""
+    """Shaft orders 1, 2, ... up to `bandwidth_hz`, (F,) integers.
+
+    Raises ValueError where the bandwidth is below the speed, or not below half of the sampling rate
+    of `samples` a revolution.
+    """
     highest = int(np.floor(bandwidth_hz / speed_hz * (1 + 1e-9)))
     if not 1 <= highest < samples / 2:
         raise ValueError(
-            f"a bandwidth of {bandwidth_hz} Hz at {speed_hz} rev/s needs between 1 and "
-            f"{(samples - 1) // 2} orders"
+            f"flow_sensor.bandwidth_hz, {bandwidth_hz:g} Hz, must lie between the speed, "
+            f"{speed_hz:.4g} Hz, and half the sampling rate, {samples * speed_hz / 2:.4g} Hz"
         )
     return np.arange(1, highest + 1)
 

@@ -18,10 +18,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rippletwin.flow_sensor.estimate import FlowEstimate, band_limit, estimate
+from rippletwin.flow_sensor.estimate import FlowEstimate, estimate
 from rippletwin.flow_sensor.line_response import LineFactory, LineResponse, line_response
-
-__all__ = ["band_limit", "estimate_flow", "flow_operator"]
 
 MODEL_ERROR = 0.01  # of a predicted pressure, over the wave amplitude
 LOAD_ERROR = 0.1  # of the load's reflection coefficient

@@ -27,7 +27,7 @@ class Geometry:
     air_fraction: float = 5e-4  # undissolved air, volume at ATMOSPHERE over liquid volume
     port_area: float = 1.2e-4  # of a fully open port, m2
     port_opening_deg: float = 30.0  # from closed to fully open
-    port_overlap_deg: float = 5.0  # both ports closed for so long, half before each dead centre
+    port_overlap_deg: float = 5.0  # both ports closed about each dead centre; negative: both open
     port_timing_deg: float = 0.0  # angle by which the port plate is turned, later being positive
     discharge_coefficient: float = 0.65
     case_leakage: float = 3e-13  # laminar, of a chamber, m3/s/Pa
@@ -41,8 +41,8 @@ class Geometry:
         if unknown:
             raise ValueError(f"unknown pump keys {unknown}; known are {known}")
         geometry = cls(**{key: value for key, value in pump.items() if value is not None})
-        may_be_negative = ("port_timing_deg", "suction_pressure")
-        may_be_zero = ("air_fraction", "case_leakage", "port_overlap_deg")
+        may_be_negative = ("port_timing_deg", "port_overlap_deg", "suction_pressure")
+        may_be_zero = ("air_fraction", "case_leakage")
         for name in known:
             value = getattr(geometry, name)
             if name in may_be_negative:
@@ -54,9 +54,10 @@ class Geometry:
                 f"pump key suction_pressure = {geometry.suction_pressure}, a gauge pressure, must "
                 "be above that of a vacuum"
             )
-        if geometry.port_overlap_deg >= 180.0:
+        if abs(geometry.port_overlap_deg) >= 180.0:
             raise ValueError(
-                f"pump key port_overlap_deg = {geometry.port_overlap_deg} must be below 180"
+                f"pump key port_overlap_deg = {geometry.port_overlap_deg} must be between -180 "
+                "and 180"
             )
         return geometry
 
@@ -94,7 +95,7 @@ class Geometry:
 
         (Edge & Darling 1989, J. Dyn. Sys. Meas. Control 111, 307, found such grooves best.)
         """
-        phi = (np.degrees(phi) - self.port_timing_deg) % 360.0
+        phi = (np.degrees(phi) - self.port_timing_deg + 90.0) % 360.0 - 90.0  # 90 is its middle
         shut = self.port_overlap_deg / 2
         rising = np.clip((phi - shut) / self.port_opening_deg, 0.0, 1.0)
         falling = np.clip((180.0 - shut - phi) / self.port_opening_deg, 0.0, 1.0)

@@ -3,7 +3,8 @@
 A chamber open to delivery responds to the outlet pressure through its port. Per unit of outlet
 pressure it takes in the flow
 
-    Y_k(s) = 1 / (1/G_k + B/(s V_k)),     G_k = dq/dp of the port at this crank angle.
+    Y_k(s) = 1 / (1/G_k + 1/(s C_k)),     G_k = dq/dp of the port at this crank angle,
+    C_k = V_k (1/B + x p0/p_k^2)          of the liquid with its air, as in `simulation`.
 
 Ports and volumes vary with the shaft angle. A harmonic's response at its own frequency is the mean
 over a revolution: the diagonal of the harmonic transfer matrix (Wereley 1991, Analysis and Control
@@ -15,6 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rippletwin.case.model import ATMOSPHERE, absolute
 from rippletwin.pump.geometry import Geometry
 
 LINEAR_DROP = 1e3  # Pa, below which a port's orifice law is taken as linear
@@ -37,6 +39,7 @@ def source_admittance(
     drop = np.abs(chamber_pressure[:, at] - pressure)
     port = geometry.discharge_coefficient * area * np.sqrt(2 / density)
     port = port / (2 * np.sqrt(drop + LINEAR_DROP))
-    compliance = geometry.volume(phi - lag) / geometry.bulk_modulus
+    air = geometry.air_fraction * ATMOSPHERE / absolute(chamber_pressure[:, at]) ** 2
+    compliance = geometry.volume(phi - lag) * (1.0 / geometry.bulk_modulus + air)
     s = np.asarray(s)[:, None, None]
     return np.sum(port * s * compliance / (port + s * compliance), axis=1).mean(axis=-1)

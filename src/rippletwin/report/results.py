@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -56,14 +57,13 @@ def read_results(
     Raises InputError where the case is wrong, or a folder that is named holds no result.
     """
     case = load_case(case_folder)
-    command = f"rippletwin {{}} {case_folder} --out {Path(case_folder) / '{}'}"
     missing = []
     diagnosis_folder = _folder(diagnosed, case.folder / DIAGNOSED, "diagnosis.json", "--diagnosed")
     inside = diagnosis_folder if (diagnosis_folder / "verdict.json").exists() else None
     folder = _folder(explained, inside or case.folder / EXPLAINED, "verdict.json", "--explained")
     verdict, numbers, twin, covariance = _read_json(folder / "verdict.json"), None, None, None
     if verdict is None:
-        missing.append(f"There is no verdict: {command.format('explain', EXPLAINED)}")
+        missing.append(f"There is no verdict: {_command('explain', case, EXPLAINED)}")
     else:
         numbers = explained_numbers.load(folder)
         if numbers is None:
@@ -74,8 +74,13 @@ def read_results(
         if (folder / "twin.json").exists():
             twin, covariance = _line_of_twin(folder / "twin.json")
     diagnosis = _read_json(diagnosis_folder / "diagnosis.json")
-    if diagnosis is None and any(r.state != "healthy" for r in case.recordings):
-        missing.append(f"There is no diagnosis: {command.format('diagnose', DIAGNOSED)}")
+    ill = [r for r in case.recordings if r.kind == "periodic" and r.state != "healthy"]
+    if diagnosis is None and ill:
+        named = []
+        if all(r.state != "unknown" for r in ill):  # diagnose takes known faults where named alone
+            named = [word for r in ill for word in ("--recording", r.label)]
+        told = _command("diagnose", case, DIAGNOSED, *named)
+        missing.append(f"There is no diagnosis: {told}")
     return Results(
         case=case,
         verdict=verdict,
@@ -105,6 +110,12 @@ def refuse_foreign(case_folder: str | Path) -> Iterator[None]:
         ) from error
 
 
+def _command(name: str, case: Case, out: str, *options: str) -> str:
+    """The command line that makes a result, as a shell takes it."""
+    folder = case.folder
+    return shlex.join(["rippletwin", name, str(folder), *options, "--out", str(folder / out)])
+
+
 def _folder(named: str | Path | None, default: Path, file: str, option: str) -> Path:
     """The folder that is named, or the default; InputError where a named one lacks `file`."""
     if named is None:
@@ -126,7 +137,9 @@ def _line_of_twin(path: Path) -> tuple[Twin, np.ndarray | None]:
     """
     data = _read_json(path)
     data = data.get("twin", data) | {"covariance": data.get("covariance")}
-    count = sum("@" not in name for name in data["values"])  # effects' own parameters come last
+    own = tuple(f"{effect['name']}@" for effect in data["effects"])
+    # Effects' own parameters come last. A label or a sensor's name may hold an @ too.
+    count = sum(not name.startswith(own) for name in data["values"])
     twin = from_dict(data | {"effects": [], "theta": data["theta"][:count]})
     if data["covariance"] is None:
         return twin, None

@@ -50,10 +50,10 @@ def text(words: str) -> Cell:
 
 
 def parameter_table(twin: Twin, covariance: np.ndarray | None) -> Table:
-    """The numbers of line, fluid, load and pump beside the data sheet."""
+    """The numbers of line, fluid, load and pump beside the data sheet; the twin has no effects."""
     rows = []
     for k, p in enumerate(twin.parameters):
-        if p.flat or "@" in p.place:
+        if p.flat:
             continue
         sd = None if covariance is None else float(np.sqrt(max(covariance[k][k], 0.0)))
         rows.append(_parameter_row(p, float(twin.theta[k]), sd))

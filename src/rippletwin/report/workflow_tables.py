@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rippletwin.case.quantities import write_number
+from rippletwin.case.words import name_state
 from rippletwin.report.tables import Cell, Table, text
 
 ATTENTION = {
@@ -73,7 +74,7 @@ def answer_table(answers: Mapping[str, Mapping[str, Mapping]]) -> Table:
         [
             text(label),
             text(network),
-            text(said["state"]),
+            text(name_state(said["state"])),
             *(Cell(f"{100 * said[key]:.0f}", said[key]) for key in ("share", "unlike")),
         ]
         for label, networks in answers.items()

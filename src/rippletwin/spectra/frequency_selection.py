@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from rippletwin.errors import InputError
+
 FREQUENCIES_PER_RESONANCE = 12  # of the line, whose resonances are 1/(2 delay) apart
 
 
@@ -16,7 +18,10 @@ def select_fitted_frequencies(observations: Sequence, rig, highest_hz: float | N
     Of a periodic recording the piston orders of its band, the only ones of a healthy nominal pump.
     Of a dense spectrum FREQUENCIES_PER_RESONANCE: the error of a model has the bandwidth of the
     line's resonances, so that closer points are no further evidence.
+
+    Raises InputError where nothing of an observation is left, and as `check_sources`.
     """
+    check_sources(observations)
     spacing = 1.0 / (2.0 * FREQUENCIES_PER_RESONANCE * rig.delay)
     prepared = []
     for o in observations:
@@ -33,8 +38,29 @@ def select_fitted_frequencies(observations: Sequence, rig, highest_hz: float | N
                     )
                 )
             ] = True
+            keep[0] = True  # a table may have one
+        if not np.any(keep):
+            raise InputError(
+                o.label,
+                "min_frequency_hz, max_frequency_hz",
+                "no frequency that is fitted is between them (of a pump: multiples of its piston "
+                "frequency)",
+                "Give a wider band",
+            )
         prepared.append(select_frequencies(o, keep))
     return prepared
+
+
+def check_sources(observations: Sequence) -> None:
+    """Raise InputError where all observations are readings of one sensor and of an unknown source:
+    nothing tells the line from the source then."""
+    if observations and all(o.source == "free" and len(o.values) < 2 for o in observations):
+        raise InputError(
+            observations[0].label,
+            "sensors",
+            "one sensor, and a source whose amplitude is not known: nothing tells the line",
+            "Give a second sensor, or of a pump its geometry or a flow_ripple",
+        )
 
 
 def select_frequencies(observation, keep: np.ndarray | slice):

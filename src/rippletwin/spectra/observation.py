@@ -14,19 +14,8 @@ from rippletwin.errors import InputError
 from rippletwin.harmonics import peak_amplitudes
 from rippletwin.spectra.angular_resampling import Revolutions, cut_revolutions
 from rippletwin.spectra.frequency_selection import select_frequencies
-from rippletwin.spectra.noise import noise_cycle_scatter, noise_mad
 from rippletwin.spectra.speed_regression import harmonics_at_mean_speed, mean_speed
 from rippletwin.spectra.transfer_function import coherent_spectra
-
-__all__ = [
-    "Observation",
-    "Revolutions",
-    "cut_revolutions",
-    "noise_cycle_scatter",
-    "noise_mad",
-    "observe",
-    "revolutions_of",
-]
 
 MAX_SAMPLING_SHARE = 0.4  # of the sampling rate, up to which frequencies are kept
 DEFAULT_RELATIVE_ERROR = 0.02  # of a spectrum or impedance without repeats or a stated error
@@ -102,7 +91,8 @@ def observe(
     else:
         observation = _observe_spectra(recording, rig, max_frequency_hz)
     low = recording.min_frequency_hz or 0.0
-    kept = observation.frequency_hz >= low
+    # a table may begin at 0 Hz, where no wave is
+    kept = (observation.frequency_hz >= low) & (observation.frequency_hz > 0.0)
     _check_any(recording, kept)
     observation = replace(observation, min_frequency_hz=low)
     together = observation.orders is not None and not piston_harmonics_only

@@ -231,7 +231,7 @@ class DifferentiableForward(ForwardModel):
             network.shunt[k] = shunt_admittance(self.s, density=density, wave_speed=a, diameter=d)
         network.shunt *= self._state_factor(coordinates)
         state = self.line_state(v)
-        for effect, place, own in twin.effect_values(coordinates):
+        for effect, place, own in twin.applied_effects(coordinates):
             own = {name: x[:, None] for name, x in own.items()}
             if "position" in own:
                 own["position"] = own["position"][0, 0]

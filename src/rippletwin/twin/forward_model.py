@@ -173,7 +173,7 @@ class ForwardModel:
         )
         if twin.effects:
             state = self.line_state(v)
-            for effect, place, values in twin.effect_values(theta):
+            for effect, place, values in twin.applied_effects(theta):
                 effect.apply(network, state, values, place)
         return network
 

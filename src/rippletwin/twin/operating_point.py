@@ -82,10 +82,13 @@ class OperatingPoint(NamedTuple):
     ripple: FlowRipple | None
 
 
-def operating_point(rig: Rig, observation, ripple: FlowRipple | None) -> OperatingPoint:
+def operating_point(
+    rig: Rig, observation, ripple: FlowRipple | None, guessed_load: bool = False
+) -> OperatingPoint:
     """Operating point of an observation with the flow ripple `ripple` in the data sheet's line.
 
-    An orifice's coefficient is the data sheet's, else it follows from mean flow and load pressure.
+    An orifice's coefficient is the data sheet's, else it follows from mean flow and load pressure;
+    with `guessed_load` from a guess of the mean flow, whatever flow is given.
     Raises InputError for an orifice load without a mean pressure.
     """
     load = rig.load
@@ -105,11 +108,16 @@ def operating_point(rig: Rig, observation, ripple: FlowRipple | None) -> Operati
     root = np.sqrt(mean - load.back_pressure)
     if load.coefficient is not None:
         coefficient = load.coefficient
-    elif np.isfinite(flow):
+    elif np.isfinite(flow) and not guessed_load:
         coefficient = flow / root
     else:
-        coefficient = GUESSED_VELOCITY * rig.line[-1].area / root
+        coefficient = guessed_flow(rig) / root
     return OperatingPoint(mean, coefficient * root, coefficient, ripple)
+
+
+def guessed_flow(rig: Rig) -> float:
+    """Mean flow, m3/s, where nothing tells it."""
+    return GUESSED_VELOCITY * rig.line[-1].area
 
 
 def _load_pressure(rig: Rig, observation, flow: float) -> float | None:
@@ -124,7 +132,7 @@ def _load_pressure(rig: Rig, observation, flow: float) -> float | None:
     fall = np.array([_fall(rig, sensor.position, flow) for sensor in sensors]) / stated
     if len(fall) != len(means):
         return stated
-    used = np.abs(means / stated - 1.0) < MAX_MEAN_DEVIATION
+    used = np.abs(means / stated - 1.0 - fall) < MAX_MEAN_DEVIATION
     sheet = rig.uncertainty
     fall_sd = max(np.hypot(sheet.viscosity, 4.0 * sheet.diameter), MIN_FALL_SD)
     relative = _estimate_pressure(tuple(means[used] / stated), tuple(fall[used]), fall_sd)
@@ -138,7 +146,7 @@ def _estimate_pressure(means: tuple[float, ...], falls: tuple[float, ...], fall_
 
     Unknowns are the pressure and a factor on its calculated fall along the line. They are estimated
     by iteratively reweighted least squares with Student's distribution for the sensors. The effort
-    pays: the compressibility of air goes with the pressure to the power -1.7 and an orifice's
+    pays: the compressibility of air goes with the pressure to the power -1.8 and an orifice's
     resistance with the pressure, so that 0.3 % of pressure make 0.5 % of ripple.
     """
     # Rows: prior of the pressure, prior of the factor, one for each sensor.

@@ -162,7 +162,7 @@ def pump_parameters(rig: Rig) -> list[Parameter]:
         nominal = getattr(geometry, key)
         if name == "port_timing":
             prior = normal(nominal, PORT_TIMING_SD)
-        elif nominal > 0.0:
+        elif nominal != 0.0:  # an overlap may be negative
             prior = lognormal(nominal, PUMP_SDS[name])
         else:
             continue

@@ -12,6 +12,7 @@ from rippletwin.harmonics import one_period, peak_amplitudes, resample_period
 from rippletwin.line.time_domain import method_of_characteristics
 from rippletwin.line.time_domain.line_elements import End, Pipe, TimeDomainLine, capacitance
 from rippletwin.twin.effects.base import LineState
+from rippletwin.twin.operating_point import guessed_flow
 from rippletwin.twin.time_domain_form import apply_in_time, series_elements
 from rippletwin.twin.twin import Twin
 from rippletwin.twin.unknown_load import unknown_impedance
@@ -60,11 +61,21 @@ def propagate(
 def line_in_time(
     twin: Twin, flow, healthy_flow, speed_hz, load_pressure, source_capacitance=0.0
 ) -> TimeDomainLine:
-    """The twin as a `TimeDomainLine`, every effect in it; arguments as `propagate`'s."""
+    """The twin as a `TimeDomainLine`, every effect in it; arguments as `propagate`'s.
+
+    Raises InputError for a load that has no time domain, and for a mean flow into a closed end.
+    """
     rig = twin.calibrated_rig()
     if rig.load.kind == "impedance":
         raise InputError(
             "rig.yaml", "load.kind", "a measured impedance has no time domain", "Give an orifice"
+        )
+    if rig.load.kind == "closed" and np.mean(healthy_flow) != 0.0:
+        raise InputError(
+            "rig.yaml",
+            "load.kind",
+            "the mean flow of a pump has no way out of a closed end",
+            "Give an orifice",
         )
     change, more = pump_change(twin, healthy_flow, speed_hz, load_pressure)
     if source_capacitance:  # a given ripple is an ideal source
@@ -75,7 +86,8 @@ def line_in_time(
     unknown = rig.load.kind == "unknown"
     if rig.load.kind == "orifice":
         root = np.sqrt(load_pressure - rig.load.back_pressure)
-        coefficient = rig.load.coefficient or factor * mean / root
+        known = guessed_flow(rig) if twin.guessed_load else mean
+        coefficient = rig.load.coefficient or factor * known / root
         mean, resistance = coefficient * root, 2.0 * root / coefficient
         nominal = mean / factor
     pressure = rig.load.back_pressure if rig.load.kind == "orifice" else load_pressure
@@ -107,10 +119,11 @@ def line_in_time(
         heat_capacity_ratio=rig.fluid.heat_capacity_ratio,
         prandtl=rig.fluid.prandtl,
         mean_flow=np.array(nominal),
-        load_passes_flow=rig.load.passes_flow,
+        load_passes_flow=rig.load.passes_flow and not twin.guessed_load,
+        friction=twin.friction_law,
         effects=twin.effects,
     )
-    for effect, place, values in twin.effect_values(twin.theta):
+    for effect, place, values in twin.applied_effects(twin.theta):
         apply_in_time(effect, line, state, values, place)
     return line
 

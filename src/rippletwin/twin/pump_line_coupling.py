@@ -3,8 +3,7 @@
 As a source the lumped pump is its flow into a constant pressure and, parallel to it, the mean
 admittance of its chambers (`source_admittance`). That is an approximation: ports open and close as
 the shaft turns, and the flow through a nearly shut port goes with the root of the pressure drop, so
-that the outlet ripple changes the flow at other harmonics too, and not in proportion. For the
-default pump in a 5 m pipe that is 5 % of the ripple (docs/explanation/pump.md). Where a twin
+that the outlet ripple changes the flow at other harmonics too, and not in proportion. Where a twin
 predicts the pressure at the outlet, the pump is simulated against it: one step of waveform
 relaxation (Lelarasmee, Ruehli & Sangiovanni-Vincentelli 1982, IEEE Trans. CAD 1, 131). The new
 source is the flow that with the same admittance delivers what the pump delivers there.

@@ -98,7 +98,7 @@ def _probe(line: TimeDomainLine, state: LineState, s: np.ndarray) -> FrequencyDo
         for pipe in pipes
     ]
     load: tuple = (line.end.kind, None)
-    if line.end.kind in ("orifice", "resistance"):
+    if line.end.kind == "orifice":
         load = "admittance", np.full(len(s), 1.0 / (state.load_resistance or np.inf))
     return FrequencyDomainLine(
         s=s,

@@ -29,11 +29,11 @@ from typing import NamedTuple
 import numpy as np
 
 from rippletwin.case.model import FlowRipple, Rig, Segment, Sensor
-from rippletwin.harmonics import modulate_ripple
 from rippletwin.line.frequency_domain.pipe_immittance import FRICTION_LAWS
 from rippletwin.twin import parameters as coordinates
 from rippletwin.twin.corrected_ripple import CorrectedRipple
 from rippletwin.twin.forward_model import ForwardModel, characteristic_impedance
+from rippletwin.twin.nominal_ripples import NominalRipples
 from rippletwin.twin.operating_point import (
     OperatingCondition,
     OperatingPoint,
@@ -143,7 +143,7 @@ class Twin:
         if self.theta.shape != (len(self.parameters),):
             raise ValueError(f"theta must have {len(self.parameters)} entries")
         # Shared by copies with other effects: ripples, and the changes that `FlowSource` keeps.
-        self._ripples: dict = {}
+        self._ripples = NominalRipples(rig)
         self.kept_changes: dict = {}
 
     # parameters and their values
@@ -198,6 +198,10 @@ class Twin:
             k += len(own)
         return out
 
+    def applied_effects(self, theta: np.ndarray) -> list[tuple]:
+        """`effect_values` in the order in which a line takes them (`Effect.rank`)."""
+        return sorted(self.effect_values(theta), key=lambda each: each[0].rank)
+
     @property
     def friction_law(self) -> str:
         """Friction law of the line with its effects."""
@@ -217,8 +221,8 @@ class Twin:
         `OperatingCondition`."""
         ripple = None
         if observation.kind == "periodic" and observation.source != "free":
-            ripple = self._nominal_ripple(observation)
-        return operating_point(self.rig, observation, ripple)
+            ripple = self._ripples.of(observation)
+        return operating_point(self.rig, observation, ripple, self.guessed_load)
 
     def respond(
         self,
@@ -226,16 +230,14 @@ class Twin:
         speed_hz: float,
         load_pressure: float,
         orders: np.ndarray,
-        friction: str | None = None,
     ) -> np.ndarray:
         """Sensors' pressure harmonics (S, F) at shaft `orders` (F,) for any flow ripple, angle 0.
 
         This is how the ripple of a faulty pump is propagated in the frequency domain. Where the
         data sheet gives no orifice coefficient, it follows from the mean flow of `ripple`.
         """
-        twin = self if friction is None else self.with_(friction=friction)
         condition = OperatingCondition.at_orders(orders, speed_hz, load_pressure, ripple)
-        return twin.predict([condition])[0]
+        return self.predict([condition])[0]
 
     def reference_impedance(self, theta: np.ndarray, observation) -> float:
         """Reference of an input impedance, Pa s/m3: rho a/A of the first segment.
@@ -314,28 +316,3 @@ class Twin:
             )
             changes.append((k, change))
         return changes
-
-    def _nominal_ripple(self, observation) -> FlowRipple:
-        """Ripple that the shaft of a recording delivers: the stated or the simulated one."""
-        even = observation.flow_ripple or self._pump_ripple(observation)
-        if not observation.modulation:
-            return even
-        key = id(even), observation.modulation
-        if key not in self._ripples:  # with the even one, whose id stays its own
-            self._ripples[key] = even, modulate_ripple(even, observation.modulation)
-        return self._ripples[key][1]
-
-    def _pump_ripple(self, observation) -> FlowRipple:
-        """Ripple of the lumped pump model, for a recording without a flow ripple."""
-        key = observation.speed_hz, observation.load_pressure
-        if key not in self._ripples:
-            from rippletwin.pump.outlets import ConstantPressure
-            from rippletwin.pump.simulation import simulate
-
-            self._ripples[key] = simulate(
-                self.rig.pump,
-                self.rig.fluid,
-                60.0 * observation.speed_hz,
-                ConstantPressure(observation.load_pressure),
-            )
-        return self._ripples[key]

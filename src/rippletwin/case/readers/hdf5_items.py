@@ -18,19 +18,19 @@ MAX_NAMES = 50
 HERE = "Store the numbers themselves in this file, as a dataset"
 
 
-def names_in(file: h5py.Group, most: int = MAX_NAMES) -> list[str]:
+def names_in(file: h5py.Group) -> list[str]:
     """Names of what lies at the top of a file or group, without MATLAB's own."""
-    return [name for name, _ in zip(file, range(most)) if not name.startswith("#")]
+    return [name for name, _ in zip(file, range(MAX_NAMES)) if not name.startswith("#")]
 
 
-def datasets_in(file: h5py.File, most: int = MAX_NAMES) -> list[str]:
+def datasets_in(file: h5py.File) -> list[str]:
     """Names of the first datasets of a file, those in groups with their path; links are left."""
     found: list[str] = []
 
     def visit(name: str, item: object) -> bool | None:
         if isinstance(item, h5py.Dataset) and not name.startswith("#"):
             found.append(name)
-        return True if len(found) >= most else None
+        return True if len(found) >= MAX_NAMES else None
 
     file.visititems(visit)
     return found

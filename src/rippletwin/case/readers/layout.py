@@ -15,7 +15,7 @@ from rippletwin.case.readers.file_checks import check_size
 from rippletwin.case.readers.signals import numbers
 from rippletwin.errors import InputError, raise_any
 
-SENSORS_BY_SAMPLES, SAMPLES_BY_SENSORS = "sensors_by_samples", "samples_by_sensors"
+SAMPLES_BY_SENSORS = "samples_by_sensors"
 
 KEYS = {"rate": "sampling_rate_name"}
 """Keys of rig.yaml that are called otherwise than the fields of a layout."""
@@ -47,7 +47,10 @@ class Layout:
             sensors=tuple(sensors),
             dataset=entry.get("dataset"),
             orientation=entry.get("orientation"),
-            channels=entry.get("channels", {}),
+            channels={  # 2.0 is a whole number too
+                sensor: int(channel) if isinstance(channel, float) else channel
+                for sensor, channel in entry.get("channels", {}).items()
+            },
             time=entry.get("time"),
             rate=entry.get("sampling_rate_name"),
         )
@@ -74,12 +77,25 @@ class Layout:
 def choose(path: Path, layout: Layout, present: Sequence[str]) -> list[int]:
     """Positions, from 0, of the sensors' channels among those that a file names.
 
-    Raises InputError for each sensor whose channel is absent or there more than once.
+    Raises InputError for each sensor whose channel is absent, there more than once, or another
+    sensor's too.
     """
     present = list(present)
     raise_any(filter(None, [_choice_error(path, layout, s, present) for s in layout.sensors]))
     chosen = [layout.channel(sensor) for sensor in layout.sensors]
-    return [c - 1 if isinstance(c, int) else present.index(c) for c in chosen]
+    places = [c - 1 if isinstance(c, int) else present.index(c) for c in chosen]
+    raise_any(
+        InputError(
+            path,
+            sensor,
+            f"its channel, number {place + 1} of the file, is that of "
+            f"{layout.sensors[places.index(place)]} too",
+            "Give each sensor its own channel",
+        )
+        for k, (sensor, place) in enumerate(zip(layout.sensors, places))
+        if place in places[:k]
+    )
+    return places
 
 
 def _choice_error(path: Path, layout: Layout, sensor: str, present: list[str]) -> InputError | None:

@@ -25,6 +25,9 @@ def read(path: Path, layout: Layout) -> Signals:
         if not file.metadata.num_rows:
             raise InputError(path, "file", "no rows", "Export the recording again")
         wanted = [names[k] for k in (*chosen, *([] if time is None else [time]))]
+        for name in wanted:
+            if names.count(name) > 1:
+                raise InputError(path, name, "two columns have this name", "Rename one of them")
         table = file.read(columns=wanted)
         columns = [_column(path, name, table.column(name)) for name in wanted]
     return Signals(

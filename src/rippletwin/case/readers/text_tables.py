@@ -95,7 +95,7 @@ def _tried(
         header, first = named, _after_units(rows, named + 1, decimal)
     else:
         first = next((k for k, row in enumerate(rows) if _is_numeric(row, decimal)), None)
-        header = None if first is None else _header_before(rows, first, decimal)
+        header = None if first is None else _header_before(rows, first)
     if first is None and header is None:  # no numbers: the line with most fields may be a header
         header = max(range(len(rows)), key=lambda k: len(rows[k]))
     names = None if header is None else rows[header]
@@ -119,7 +119,7 @@ def _after_units(rows: list[list[str]], start: int, decimal: str) -> int | None:
     return None
 
 
-def _header_before(rows: list[list[str]], first: int, decimal: str) -> int | None:
+def _header_before(rows: list[list[str]], first: int) -> int | None:
     """The nearest row above the numbers that has as many fields, of which one is no number."""
     count = len(rows[first])
     for k in range(first - 1, max(first - 2 - MOST_UNIT_ROWS, -1), -1):

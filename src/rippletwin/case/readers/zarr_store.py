@@ -16,9 +16,12 @@ from rippletwin.case.readers.layout import Layout
 from rippletwin.case.readers.signals import Signals, check_type
 from rippletwin.errors import InputError
 
+COPY = "Copy what it leads to in its place"
+
 
 def read(path: Path, layout: Layout) -> Signals:
     """Read a recording in a zarr store, a folder; raises InputError."""
+    _refuse_links(path)
     with refuse_damaged(path, "or is no zarr store"):
         store = zarr.open_group(path, mode="r")
         members = store.members(max_depth=4)
@@ -39,3 +42,11 @@ def read(path: Path, layout: Layout) -> Signals:
             return next((h.attrs[name] for h in holders if name in h.attrs), None)
 
         return read_arrays(ArrayFile(path, lambda: list(arrays), array, attribute), layout)
+
+
+def _refuse_links(path: Path) -> None:
+    """Raise InputError where a member of a store is a link, which may lead out of the case."""
+    for member in path.rglob("*"):
+        if member.is_symlink():
+            name = member.relative_to(path).as_posix()
+            raise InputError(path, name, "a link; those in a store are not followed", COPY)

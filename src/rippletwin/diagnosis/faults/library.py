@@ -22,7 +22,7 @@ def _discover() -> dict[str, Fault]:
             if fault.name in found:
                 raise ValueError(f"two faults are called {fault.name!r}")
             found[fault.name] = fault
-    # The order of the contract: slipper before cylinder.
+    # The order in diagnosis.json: slipper before cylinder.
     first = [name for name in ("slipper", "cylinder") if name in found]
     return {name: found[name] for name in [*first, *sorted(set(found) - set(first))]}
 

@@ -102,10 +102,11 @@ def largest_pull(fit: Fit) -> tuple[float, str]:
     """Largest distance of a line parameter from the data sheet, in standard deviations as stated,
     and the parameter's name."""
     scale = fit.twin.rig.tolerance_scale
+    effects = {f"{effect.name}@{place}" for effect, place in fit.twin.effects}
     pulls = [
         (abs(float(u)) * (scale if p.is_sheet_number else 1.0), p.name)
         for p, u in zip(fit.twin.parameters, fit.twin.theta)
-        if p.stated and not p.flat and "@" not in p.name
+        if p.stated and not p.flat and p.place not in effects
     ]
     return max(pulls, default=(0.0, ""))
 
@@ -118,9 +119,10 @@ def largest_disagreement(fits: Sequence[Fit]) -> tuple[float, str]:
     """
     worst = (0.0, "")
     for i, a in enumerate(fits):
+        effects = {f"{effect.name}@{place}" for effect, place in a.twin.effects}
         for b in fits[i + 1 :]:
             for p in a.twin.parameters:
-                if p.flat or "@" in p.name or p.name not in b.twin.index:
+                if p.flat or p.place in effects or p.name not in b.twin.index:
                     continue
                 k, m = a.twin.index[p.name], b.twin.index[p.name]
                 va, vb = a.covariance[k, k], b.covariance[m, m]
@@ -179,9 +181,10 @@ def aligned_difference(a, b, delay: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def evidence_p_value(log_bayes_factor: float, tried: int) -> float:
-    """Upper bound on the probability of so much evidence from `tried` effects if none is present.
+    """Upper bound on the probability of so much evidence for one of `tried` hypotheses if no effect
+    is present.
 
     Markov's inequality on the Bayes factor, whose mean under the base is 1, with a union bound over
-    the effects.
+    the hypotheses.
     """
     return float(min(1.0, tried * np.exp(-min(log_bayes_factor, 700.0))))

@@ -60,10 +60,14 @@ def bootstrap_null(
 ) -> NullDistribution:
     """Null distribution of `base`, the line without effects as fitted to `observations`.
 
+    draws      recordings without an effect that are drawn
+    processes  that fit them side by side
+    progress   gets what is being fitted, how many draws are done and how many there are
+    seed       of the random numbers; a draw has the same whatever the number of processes
+
     Raises ValueError for fewer than MIN_DRAWS draws.
     """
-    if draws < MIN_DRAWS:
-        raise ValueError(f"{draws} draws are too few for a threshold: at least {MIN_DRAWS}")
+    check_draws(draws)
     jobs = [(base, tuple(observations), seed, k) for k in range(draws)]
     if processes < 2:
         values = tuple(_with_progress(map(_largest_log_bayes_factor, jobs), draws, progress))
@@ -71,6 +75,12 @@ def bootstrap_null(
     with ProcessPoolExecutor(processes, get_context("fork")) as pool:
         values = tuple(_with_progress(pool.map(_largest_log_bayes_factor, jobs), draws, progress))
     return NullDistribution(values)
+
+
+def check_draws(draws: int) -> None:
+    """Raises ValueError for fewer than MIN_DRAWS draws, but for none."""
+    if draws and draws < MIN_DRAWS:
+        raise ValueError(f"{draws} draws are too few for a threshold: at least {MIN_DRAWS}")
 
 
 def draw_without_effects(fit: Fit, observations: Sequence, rng: np.random.Generator) -> list:

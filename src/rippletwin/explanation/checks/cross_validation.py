@@ -171,7 +171,7 @@ def make_folds(workers: Workers, halves: Halves | None = None) -> list[Fold]:
     frequencies = len(observation.frequency_hz)
     block = np.floor(FREQUENCY_BLOCKS * np.arange(frequencies) / frequencies)
     folds = []
-    for parity, words in enumerate(("odd", "even")):
+    for parity, words in enumerate(("even", "odd")):  # counted from 1, of what is held out
         inside = block % 2 == parity
         own = Workers(workers.base, [select_frequencies(observation, inside)])
         held_out = [select_frequencies(observation, ~inside)]

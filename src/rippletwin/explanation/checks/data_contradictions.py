@@ -15,11 +15,11 @@ import numpy as np
 
 from rippletwin.case.quantities import BAR, write_value
 from rippletwin.explanation.checks.alarms import (
-    DRIFT_SIGNIFICANCE,
     aligned_difference,
     at_common_orders,
     drift_p_value,
 )
+from rippletwin.explanation.thresholds import DRIFT_SIGNIFICANCE
 
 DEAD_RIPPLE_SHARE = 3e-3
 """Ripple of a dead sensor relative to the others: no node of a line is as deep at all harmonics."""

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtri
 
-from rippletwin.calibration.fit import Fit
+from rippletwin.calibration.fit import HALF_INTERVAL, Fit
 from rippletwin.calibration.levenberg_marquardt import descend
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.explanation.fit_jobs import FitJob, FromTheta, Workers
@@ -28,7 +28,7 @@ MAX_RISE = 4.0 * INTERVAL_RISE  # at which a profile ends
 PROFILE_DISTANCES = (1.5, 2.5, 4.0, 6.0)  # from the mode, in standard deviations by the curvature
 PROFILE_STEPS = 8  # Levenberg-Marquardt steps per point; each starts from the last point
 BETTER_MODE_GAIN = 0.5  # log posterior by which a point of a profile belongs to a better mode
-MAX_MODE_CHANGES = 3
+MAX_MODE_CHANGES = 2  # better modes that a profile finds and that are taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,8 @@ class ProfileJob:
 class ProfileTrace(NamedTuple):
     """Result of a `ProfileJob`.
 
-    end    coordinate at which the interval ends
+    end    coordinate at which the interval ends; where the fits fail before that, at least where
+           the curvature at the mode puts it
     value  least minus log posterior on the profile
     theta  (P,) where that is
     """
@@ -66,6 +67,8 @@ def add_profile_intervals(
     """`best` with the interval ends of its effects' parameters.
 
     If a profile finds a better mode, that mode is fitted and takes the place of `best`.
+
+    max_mode_changes   how often it may
     """
     indices = sorted({k for _, _, own in own_parameter_indices(best.twin) for k in own})
     correction = _jacobian_correction(workers, best) if best.has_nonlinear_compliance else None
@@ -73,7 +76,7 @@ def add_profile_intervals(
     traces = workers.map(trace_profile, jobs)
     lowest = min(traces, key=lambda trace: trace.value, default=None)
     is_better = lowest is not None and lowest.value < best.objective - BETTER_MODE_GAIN
-    if is_better and max_mode_changes > 1:
+    if is_better and max_mode_changes > 0:
         (better,) = workers.fit([FitJob(best.hypothesis, FromTheta(lowest.theta))])
         # A fit that fails from there, with an infinite objective, is none.
         if better.objective < best.objective:
@@ -113,7 +116,10 @@ def trace_profile(base: Twin, observations: Sequence, job: ProfileJob) -> Profil
         if value - min(values) > MAX_RISE:
             break
     lowest = int(np.argmin(values))
-    end = interpolate_crossing((0.0, *PROFILE_DISTANCES), np.array(values) - values[0])
+    rises = np.array(values) - values[0]
+    end = interpolate_crossing((0.0, *PROFILE_DISTANCES), rises)
+    if not np.isfinite(value) and rises[-1] < INTERVAL_RISE:
+        end = max(end, HALF_INTERVAL)  # no prediction beyond: the profile says nothing
     return ProfileTrace(float(fit.twin.theta[k] + side * end * sd), values[lowest], thetas[lowest])
 
 

@@ -9,8 +9,8 @@ from itertools import combinations
 import numpy as np
 
 from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
+from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.frequency_continuation import fit_hypothesis
-from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
 from rippletwin.twin.twin import Twin
 
@@ -18,24 +18,25 @@ MAX_EXPLAINED_MODEL_ERROR = 10.0 * MIN_MODEL_ERROR
 """Relative model error above which the explanation of correctly wired data is implausible."""
 
 
-def find_swapped_sensors(base: Twin, observations: Sequence, search: Search) -> str:
+def find_swapped_sensors(base: Twin, observations: Sequence, explanation: Fit) -> str:
     """Two swapped sensors or a sensor with inverted sign, in words; "" if there are none.
 
+    explanation   the best of the data as they are, with a passive network if one stands in
+
     Each swap and each inversion is undone and the line without effects is fitted. It is reported if
-    its evidence exceeds that of the best explanation of the data as they are by as much as an
-    effect must add. The check costs several fits, so it runs only where the search left a large
-    model error.
+    its evidence exceeds that of the explanation by as much as an effect must add. The check costs
+    several fits, so it runs only where the explanation leaves a large model error.
     """
     sensors = base.rig.sensors
     pressures = all(o.kind != "input_impedance" for o in observations)
-    if search.best.model_error <= MAX_EXPLAINED_MODEL_ERROR or len(sensors) < 2 or not pressures:
+    if explanation.model_error <= MAX_EXPLAINED_MODEL_ERROR or len(sensors) < 2 or not pressures:
         return ""
     evidence = {
         fault: fit_hypothesis(base, (), corrected).evidence
         for fault, corrected in _corrected_wirings(sensors, observations).items()
     }
     best = max(evidence, key=evidence.get)
-    return best if evidence[best] > search.best.evidence + MIN_LOG_BAYES_FACTOR else ""
+    return best if evidence[best] > explanation.evidence + MIN_LOG_BAYES_FACTOR else ""
 
 
 def _corrected_wirings(sensors: Sequence, observations: Sequence) -> dict[str, list]:

@@ -51,7 +51,7 @@ class Support:
     """What supports one accepted effect.
 
     name, place   of the effect
-    level         one of LEVELS
+    level         "suggested", "supported" or "established"
     robustness    its log Bayes factors beside free corrections
     held_out      log predictive probability of held-out data that it adds, over all folds
     pull          prior standard deviations between its parameters and their medians, at most

@@ -36,7 +36,7 @@ from rippletwin.explanation.thresholds import (
 class Remainder:
     """What remains beside a fit.
 
-    misfit            relative, in sample, with the pump's nominal ripple
+    misfit            relative, in sample, with the pump's ripple as the fit corrects it
     model_error       relative, what neither noise nor an error of the pump's ripple accounts for
     element           ("source", None), ("sensor", index), ("segment series" or "segment shunt",
                       index), ("shunt" or "series", position in m), or None where no element
@@ -55,11 +55,6 @@ class Remainder:
     law: str | None
     bands_hz: list
     conditions: list
-
-    @property
-    def is_significant(self) -> bool:
-        """Whether a correction of some element adds enough evidence to say that it is there."""
-        return self.log_bayes_factor >= MIN_LOG_BAYES_FACTOR
 
 
 def find_remainder(fit: Fit, observations: Sequence) -> Remainder | None:
@@ -93,7 +88,8 @@ def _interval(corrections: SmoothCorrections, best: tuple) -> tuple[float, float
     if kind not in corrections.promises:
         return None
     positions, promises = corrections.promises[kind]
-    half, length = 0.5 * (positions[1] - positions[0]), corrections.network.length
+    length = corrections.network.length
+    half = 0.5 * length / len(positions)  # of their distance; a short line has one position only
     close = positions[promises > np.max(promises) - EQUIVALENT_LOG_BAYES_FACTOR]
     low, high = min(close[0] - half, position), max(close[-1] + half, position)
     return float(max(low, 0.0)), float(min(high, length))

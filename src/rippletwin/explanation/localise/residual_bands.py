@@ -19,6 +19,8 @@ from rippletwin.calibration.posterior import Posterior
 EXCESS_SHARE = 0.9  # of the excess that the intervals hold together
 MAX_INTERVALS = 4
 GRID_CELLS = 400  # of the frequency grid on which neighbours are averaged
+LONE_SPACING_HZ = 1.0
+"""Width of that average where each operating point has one frequency, which has no neighbour."""
 PITCH_SHARE_AVERAGED = 0.02  # of a piston's pitch, width of the average over shaft angles
 MIN_CONCENTRATED_SHARE = 0.2  # of a residual's energy above its median, to be concentrated at all
 MAX_MEAN_SQUARE = 4.0  # of the whitened residual at an operating point that does not stand out
@@ -36,13 +38,16 @@ def find_frequency_bands(
     mean_square   (F,) of the whitened residual: 1 where the fit is as good as expected
     spacing_hz    of neighbouring harmonics, over which the excess is averaged
 
-    Empty if nothing exceeds 1.
+    Empty if nothing exceeds 1; the one frequency where all are the same.
     """
     frequency_hz = np.asarray(frequency_hz, float)
     excess = np.maximum(np.asarray(mean_square) - 1.0, 0.0)
     if not np.any(excess > 0):
         return []
-    grid = np.linspace(frequency_hz.min(), frequency_hz.max(), GRID_CELLS)
+    low, high = float(frequency_hz.min()), float(frequency_hz.max())
+    if low == high:
+        return [[low, high]]
+    grid = np.linspace(low, high, GRID_CELLS)
     weight = np.exp(-0.5 * ((grid[:, None] - frequency_hz) / (0.5 * spacing_hz)) ** 2)
     total = np.sum(weight, axis=1)
     # Between harmonics farther apart than the average is wide, take the nearest one.
@@ -108,7 +113,8 @@ def residual_frequency_bands(fit: Fit, observations: Sequence) -> list[list[floa
     """Frequency bands (Hz) in which the fit's whitened residual exceeds its expected size."""
     posterior, r = _whitened_residual(fit, observations)
     frequency = [o.frequency_hz for o in posterior.observations]
-    spacing = max(float(np.median(np.diff(f))) for f in frequency if len(f) > 1)
+    distances = [float(np.median(np.diff(f))) for f in frequency if len(f) > 1]
+    spacing = max(distances, default=LONE_SPACING_HZ)
     mean_square = np.mean(np.abs(r) ** 2, axis=0)
     return find_frequency_bands(np.concatenate(frequency), mean_square, spacing)
 
@@ -126,6 +132,8 @@ def residual_crank_angles(
     """Shaft angles (deg, within a piston's pitch) at which the fit's residual is concentrated.
 
     Of periodic recordings, on the common shaft angle.
+
+    samples   angles of a pitch at which the residual is calculated
     """
     posterior = _posterior(fit, observations)
     prediction = posterior.predict(fit.twin.theta)

@@ -39,6 +39,10 @@ def add_amplitude_intervals(
 ) -> ShaftOrders | None:
     """`shaft_orders`, as analysed with the twin of `fit`, with the intervals of its effects.
 
+    highest_hz   of the shaft orders, as in the analysis
+    draws        of noise and of the twin's parameters
+    seed         of the random numbers
+
     There is no interval if the fit has no covariance.
     """
     if shaft_orders is None or not shaft_orders.effects:

@@ -181,7 +181,11 @@ class SmoothCorrections:
         return least
 
     def unit(self, element: tuple) -> np.ndarray:
-        """The immittance (F,) of which a correction is a multiple, of an element of the line."""
+        """The immittance (F,) of which a correction is a multiple, of an element of the line.
+
+        In SI units: of a segment per metre, Pa s/m4 in series or m2/(Pa s) as a shunt; elsewhere
+        the characteristic impedance of the first segment, Pa s/m3, or its inverse.
+        """
         kind, where = element
         if kind.startswith("segment"):
             per_metre = getattr(self.network, kind.split()[1])

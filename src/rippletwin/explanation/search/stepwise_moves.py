@@ -58,10 +58,14 @@ def fit_extensions(workers: Workers, best: Fit, candidates: Sequence, progress) 
     jobs = [extension_job(best, c) for c in _additions(rig, best.hypothesis, candidates)]
     usual = all(effect.usual(rig, place) for effect, place in best.hypothesis)
     few = len(jobs) <= PROMISING or usual
-    report = progress_callback(
-        progress, f"{len(best.hypothesis) + 1} effects", len(jobs) if few else PROMISING
-    )
-    fits = workers.fit(jobs, report) if few else _fit_promising(workers, best, jobs, report)
+    certain = [job for job in jobs if _is_certain(rig, job)]
+    searched = [job for job in jobs if not _is_certain(rig, job)]
+    total = len(jobs) if few else len(certain) + min(len(searched), PROMISING)
+    report = progress_callback(progress, f"{len(best.hypothesis) + 1} effects", total)
+    if few:
+        fits = workers.fit(jobs, report)
+    else:
+        fits = _fit_promising(workers, best, certain, searched, report)
     fits = rank_by_evidence(fits)
     if fits and fits[0].model_error > GOOD_MODEL_ERROR:
         # What is missing may have led the line into a wrong local mode: start again from the data
@@ -74,14 +78,17 @@ def fit_extensions(workers: Workers, best: Fit, candidates: Sequence, progress) 
     return rank_at_exact_modes(workers, best, fits)
 
 
-def _fit_promising(workers: Workers, best: Fit, jobs: Sequence[FitJob], report) -> list[Fit]:
-    """Fits of always-present effects, and of the jobs that promise most, in that order, until one
-    of them has added as much as the next promises."""
-    certain: list[FitJob] = []
-    searched: list[FitJob] = []
-    for job in jobs:
-        effect, place = job.hypothesis[-1]
-        (certain if effect.certain(workers.base.rig, place) else searched).append(job)
+def _is_certain(rig, job: FitJob) -> bool:
+    """Whether the newest effect of a job is always present."""
+    effect, place = job.hypothesis[-1]
+    return effect.certain(rig, place)
+
+
+def _fit_promising(
+    workers: Workers, best: Fit, certain: Sequence[FitJob], searched: Sequence[FitJob], report
+) -> list[Fit]:
+    """Fits of always-present effects, the jobs `certain`, and of those of `searched` that promise
+    most, in that order, until one of them has added as much as the next promises."""
     scored = sorted(workers.map(score_extension, searched), key=lambda pair: -pair[0])[:PROMISING]
     fits = workers.fit(certain, report)
     needed = MIN_PROMISE

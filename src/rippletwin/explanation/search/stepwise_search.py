@@ -17,6 +17,7 @@ from rippletwin.explanation.fit_jobs import (
     progress_callback,
     rank_by_evidence,
 )
+from rippletwin.explanation.search.gas_rivals import GAS, has_one_pressure
 from rippletwin.explanation.search.position_search import move_to_best_position
 from rippletwin.explanation.search.single_effects import fit_single_effects
 from rippletwin.explanation.search.stepwise_moves import (
@@ -31,7 +32,6 @@ from rippletwin.explanation.search.stepwise_moves import (
 from rippletwin.explanation.thresholds import (
     GOOD_MODEL_ERROR,
     MIN_LOG_BAYES_FACTOR,
-    MIN_LOG_BAYES_FACTOR_ALWAYS_PRESENT,
     min_log_bayes_factor_of_newest,
 )
 from rippletwin.twin.effects import library
@@ -51,7 +51,7 @@ def applicable_candidates(
     """The effects at their places that these observations can show.
 
     An input impedance shows neither source nor sensors. Entrained air needs a mean pressure, hence
-    a periodic recording.
+    a periodic recording. A volume of gas needs two: at one it is a volume of liquid (`gas_rivals`).
     """
     kinds = {o.kind for o in observations}
     applicable = []
@@ -59,6 +59,8 @@ def applicable_candidates(
         if kinds == {"input_impedance"} and effect.element in ("source", "sensor"):
             continue
         if effect.name == "entrained_air" and "periodic" not in kinds:
+            continue
+        if effect.name == GAS and has_one_pressure(observations):
             continue
         if effect.name in SHAFT_ORDER_EFFECTS:
             continue
@@ -145,22 +147,12 @@ def _search_stepwise(
         if extended is None and best.label == settled:
             return replace(start, best=best, rivals=[*rivals, *extensions])
         if extended is None:
-            exchanged = exchange_effects(workers, best, single_effect_fits)
-            moved, other_positions = move_to_best_position(workers, exchanged)
-            if exchanged is not best:
-                moved = _revise(workers, moved, candidates)
-            was_there = frozenset(moved.hypothesis) in visited
-            if moved is best or (exchanged is not best and was_there):
-                # Simplifying may lead back from an exchange: only two effects at once lead on, or
-                # an effect that was not tried beside those that came later.
-                pair = _accepted_pair(workers, best, extensions, candidates)
-                moved = best if pair is None else _revise(workers, pair, candidates)
-                if frozenset(moved.hypothesis) in visited:
-                    substitutes = fit_substitutes(workers, best, candidates)
-                    moved = _better_substitute(workers, best, substitutes, candidates)
-                    if frozenset(moved.hypothesis) in visited:
-                        break
-                    rivals = [*rivals, *substitutes]
+            moved, other_positions, substitutes = _move_without_extension(
+                workers, best, visited, single_effect_fits, extensions, candidates
+            )
+            rivals = [*rivals, *substitutes]
+            if moved is None:
+                break
             best = moved
         else:
             revised = _revise(workers, extended, candidates)
@@ -173,13 +165,44 @@ def _search_stepwise(
             best = revised
         visited.add(frozenset(best.hypothesis))
         extensions = fit_extensions(workers, best, candidates, progress)
-    return Search(
-        start.base,
-        single_effect_fits,
-        best,
-        [*rivals, *substitutes],
-        other_positions=other_positions,
-    )
+    return Search(start.base, single_effect_fits, best, rivals, other_positions=other_positions)
+
+
+def _move_without_extension(
+    workers: Workers,
+    best: Fit,
+    visited: set[frozenset],
+    single_effect_fits: Sequence[Fit],
+    extensions: Sequence[Fit],
+    candidates: Sequence,
+) -> tuple[Fit | None, list[Fit], list[Fit]]:
+    """The fit with which the search goes on where no extension adds enough evidence, None where it
+    ends; the other positions of `best`, and the substitutes that were fitted.
+
+    No move leads to a hypothesis that was visited but one to a better position of `best`, which
+    adds at least MIN_IMPROVEMENT of log evidence: the search comes to an end.
+    """
+    exchanged = exchange_effects(workers, best, single_effect_fits)
+    if exchanged is not best:
+        moved, other_positions = move_to_best_position(workers, exchanged)
+        moved = _revise(workers, moved, candidates)
+        if frozenset(moved.hypothesis) not in visited:
+            return moved, other_positions, []
+        # Simplifying has led back from the exchange: `best` itself may have a better position.
+    moved, other_positions = move_to_best_position(workers, best)
+    if moved is not best:
+        return moved, other_positions, []
+    # Only two effects at once lead on, or an effect that was not tried beside those that came
+    # later.
+    pair = _accepted_pair(workers, best, extensions, candidates)
+    if pair is not None:
+        moved = _revise(workers, pair, candidates)
+        if frozenset(moved.hypothesis) not in visited:
+            return moved, other_positions, []
+    substitutes = fit_substitutes(workers, best, candidates)
+    moved = _better_substitute(workers, best, substitutes, candidates)
+    is_new = frozenset(moved.hypothesis) not in visited
+    return moved if is_new else None, other_positions, substitutes
 
 
 def _better_substitute(
@@ -218,19 +241,12 @@ def _revise(workers: Workers, best: Fit, candidates: Sequence) -> Fit:
 
 
 def _accepted_extension(best: Fit, extensions: Sequence[Fit]) -> Fit | None:
-    """The extension with which the search goes on; None if none adds enough evidence.
+    """The best of `extensions`, best first, that adds enough evidence; None if none does.
 
-    An always-present effect is accepted only together with another effect.
+    An always-present effect needs less beside another effect; alone it needs as much as any.
     """
-    if extensions:
-        gain = extensions[0].evidence - best.evidence
-        if gain >= min_log_bayes_factor_of_newest(extensions[0]):
-            return extensions[0]
-    if not best.hypothesis:
-        return None
     for fit in extensions:
-        effect, place = fit.hypothesis[-1]
-        if effect.certain(fit.twin.rig, place):
-            gain = fit.evidence - best.evidence
-            return fit if gain >= MIN_LOG_BAYES_FACTOR_ALWAYS_PRESENT else None
+        needed = min_log_bayes_factor_of_newest(fit) if best.hypothesis else MIN_LOG_BAYES_FACTOR
+        if fit.evidence - best.evidence >= needed:
+            return fit
     return None

@@ -129,8 +129,17 @@ def rival_fits(search: Search) -> list[Fit]:
 
 
 def _fits_at_other_positions(search: Search) -> list[Fit]:
-    """The other positions of the search that still belong to its best hypothesis."""
-    return [f for f in search.other_positions if set(f.hypothesis) == set(search.best.hypothesis)]
+    """The other positions of the search that still belong to its best hypothesis and are as good.
+
+    The best fit may have come to a better mode since.
+    """
+    best = search.best
+    return [
+        f
+        for f in search.other_positions
+        if set(f.hypothesis) == set(best.hypothesis)
+        and best.evidence - f.evidence < EQUIVALENT_LOG_BAYES_FACTOR
+    ]
 
 
 def _equivalent_substitutes(search: Search) -> list[tuple[tuple[str, Place], list[tuple]]]:
@@ -159,7 +168,8 @@ def _equivalent_substitutes(search: Search) -> list[tuple[tuple[str, Place], lis
 def posterior_probabilities(search: Search, accepted: Fit) -> dict[str, float]:
     """Posterior probability of each accepted effect among all hypotheses that were tried.
 
-    All of them have the same prior probability.
+    All of them have the same prior probability. One that was fitted several times, or with its
+    effects in several orders, counts once, by the fit of greatest evidence.
     """
     fits: list[Fit] = [
         search.base,
@@ -168,7 +178,8 @@ def posterior_probabilities(search: Search, accepted: Fit) -> dict[str, float]:
         *search.passive_networks,
         accepted,
     ]
-    unique = {tuple((e.name, str(p)) for e, p in f.hypothesis): f for f in fits}
+    fits.sort(key=lambda fit: fit.evidence)  # the last of a hypothesis is kept
+    unique = {frozenset((e.name, str(p)) for e, p in f.hypothesis): f for f in fits}
     evidence = np.array([f.evidence for f in unique.values()])
     weight = np.exp(evidence - evidence.max())
     weight /= weight.sum()

@@ -183,7 +183,7 @@ def _coordinate(prior, strength: float) -> float:
     return float(np.exp(min(strength, 1.0))) if centred else 0.0
 
 
-def in_words(found: Sequence[Discrimination]) -> list[str]:
+def describe_discriminations(found: Sequence[Discrimination]) -> list[str]:
     """Lines of text: what would go unnoticed, and what could not be told from what."""
 
     def plain(names) -> str:

@@ -31,7 +31,6 @@ class Explanation:
     alarms             of the base fit
     validation         cross-validation of base, explanation and plain calibration
     decision           the verdict and the accepted fit
-    point_fits         the base fitted to each observation alone; empty for a single one
     source_free_fits   the leading fits of the search, with an unknown source
     prior_sensitivity  fits with wide priors without each accepted effect
     shaft_orders       ripple at orders that are no multiples of the number of pistons
@@ -48,7 +47,6 @@ class Explanation:
     alarms: Alarms
     validation: Validation
     decision: Decision
-    point_fits: tuple[Fit, ...]
     source_free_fits: tuple[Fit, ...] = ()
     prior_sensitivity: tuple[PriorSensitivity, ...] = ()
     shaft_orders: ShaftOrders | None = None

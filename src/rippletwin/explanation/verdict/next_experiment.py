@@ -29,8 +29,6 @@ from rippletwin.explanation.verdict.candidate_recordings import (
     further_sensors,
 )
 from rippletwin.spectra.observation import Observation
-from rippletwin.twin.effects.base import Place
-from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.twin import Twin
 
 RANDOM_ERROR = 0.01  # relative, of cross spectra under random excitation: 100 averages or more
@@ -73,23 +71,18 @@ def propose_recording(
 
 
 def propose_sensor_position(
-    fit: Fit, observations: Sequence, kind: str, low: float, high: float
+    fit: Fit, observations: Sequence, low: float, high: float
 ) -> Proposal | None:
-    """The further sensor that best narrows the position of a passive network.
+    """The further sensor that best narrows the position of the newest effect of a fit.
 
-    kind       "shunt" or "series"
     low, high  ends (m) of the interval of its position
 
-    The loss is the log evidence between the network at one end and at the other, at the same
-    operating point. None where no sensor can be added or the fit has no such network.
+    The loss is the log evidence between the effect at one end and at the other, at the same
+    operating point. None where no sensor can be added.
     """
-    effect = EFFECTS["passive_network"]
-    place = Place("position", form=kind)
-    if (effect, place) not in fit.hypothesis:
-        return None
     ends = []
-    prefix = f"{effect.name}@{place}.position"
-    k = fit.twin.index[next(name for name in fit.twin.index if name.startswith(prefix))]
+    effect, place = fit.hypothesis[-1]
+    k = fit.twin.index[f"{effect.name}@{place}.position"]
     for x in (low, high):
         theta = fit.twin.theta.copy()
         theta[k] = fit.twin.parameters[k].prior.coordinate(x)

@@ -9,7 +9,7 @@ import numpy as np
 from rippletwin.explanation.localise.free_corrections import element_extent
 
 
-def element_and_extent(rig, effect, place, parameters: dict) -> tuple[str, list[float]]:
+def element_and_extent(rig, place, parameters: dict) -> tuple[str, list[float]]:
     """Element and interval along the line (m) at which an effect acts.
 
     An effect at a position acts in a segment if the whole 95 % interval is in it, otherwise between

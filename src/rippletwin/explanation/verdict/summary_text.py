@@ -236,9 +236,7 @@ def _data_sheet_rivals(e: Explanation, fit: dict) -> list[str]:
 def _alike(e: Explanation, entries: Sequence[dict]) -> list[str]:
     """What the mean pressures of these recordings cannot tell from the effects of `entries`."""
     names = [entry["effect"].name for entry in entries]
-    if not names:
-        return []
-    return pressure_sentences(names, [o.load_pressure for o in e.observations], e.rig.fluid.is_gas)
+    return pressure_sentences(names, e.observations, e.rig.fluid.is_gas) if names else []
 
 
 def _source_free(e: Explanation) -> list[str]:
@@ -303,5 +301,5 @@ def _place(e: Explanation, entry: dict, extent: bool = True) -> str:
 
 
 def _element(e: Explanation, entry: dict) -> str:
-    element, _ = element_and_extent(e.rig, entry["effect"], entry["place"], entry["parameters"])
+    element, _ = element_and_extent(e.rig, entry["place"], entry["parameters"])
     return element

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rippletwin import store
+from rippletwin.calibration.fit import Fit
 from rippletwin.explanation.checks.alarms import evidence_p_value
 from rippletwin.explanation.checks.profile_intervals import (
     effect_intervals,
@@ -56,7 +57,8 @@ def verdict_dict(explanation: Explanation) -> dict:
     if verdict in ("named", "ambiguous", "unexplained"):
         entries = effect_intervals(decision.accepted)
     effects = [*_line_effects(e, entries), *shaft_effects]
-    places = equivalent_places(e.search) if verdict in ("named", "ambiguous") else ()
+    # Not where shaft orders alone are named: the search accepted nothing then.
+    places = equivalent_places(e.search) if decision.verdict in ("named", "ambiguous") else ()
     curve = load_curve(decision.accepted.twin, decision.accepted.covariance, e.observations)
     result = {
         "verdict": verdict,
@@ -138,13 +140,18 @@ def _shaft_effect(effect: ShaftEffect, support: str) -> dict:
 def _mismatch(e: Explanation, verdict: str, entries: list[dict]) -> dict:
     """Whether something is missing, how surely, and where."""
     search, null_distribution = e.search, e.null_distribution
-    fits = [*search.single_effect_fits, e.decision.accepted]
-    largest = max([0.0, *(search.log_bayes_factor(f) for f in fits)])
+    singles, accepted = search.single_effect_fits, e.decision.accepted
     is_present = verdict not in NOTHING_MISSING
+
+    def largest(fits: list[Fit]) -> float:
+        return max([0.0, *map(search.log_bayes_factor, fits)])
+
     if null_distribution is None:
-        p_value = evidence_p_value(largest, len(search.single_effect_fits) + 1)
-    else:
-        p_value = null_distribution.p_value(largest)
+        tried = [*singles, *search.rivals, *search.passive_networks, accepted]
+        count = len({frozenset(fit.hypothesis) for fit in tried})
+        p_value = evidence_p_value(largest([*singles, accepted]), count)
+    else:  # the draws are fitted with single effects only
+        p_value = null_distribution.p_value(largest(singles))
     mismatch = {
         "present": is_present,
         "p_value": p_value,
@@ -165,9 +172,7 @@ def _where(e: Explanation, entries: list[dict]) -> dict:
     element, position = "line", [0.0, float(e.rig.length)]
     if entries:
         first = entries[0]
-        element, position = element_and_extent(
-            e.rig, first["effect"], first["place"], first["parameters"]
-        )
+        element, position = element_and_extent(e.rig, first["place"], first["parameters"])
     elif any(effect["support"] == "established" for effect in _shaft_effects(e)):
         element, position = "source", [0.0, 0.0]
     elif location is not None:
@@ -205,12 +210,12 @@ def _next_recording(e: Explanation, places: tuple) -> str | None:
     if verdict == "ambiguous" or places:
         proposal = propose_recording(accepted, rival_fits(e.search), e.observations)
     elif verdict == "unexplained" and accepted.hypothesis:
-        effect, place = accepted.hypothesis[-1]
+        effect, _ = accepted.hypothesis[-1]
         if effect.named:
             return None
         low, high = effect_intervals(accepted)[-1]["parameters"]["position"]["ci95"]
         if high - low > WIDE_INTERVAL * e.rig.length:
-            proposal = propose_sensor_position(accepted, e.observations, place.form, low, high)
+            proposal = propose_sensor_position(accepted, e.observations, low, high)
     return None if proposal is None else str(proposal)
 
 
@@ -252,7 +257,7 @@ def _stand_in(e: Explanation, entries: list[dict], index: int) -> dict:
     else:
         missing = missing_immittance(accepted, e.observations, index)
         follows = None if missing is None else missing.law_in_words
-    element, _ = element_and_extent(e.rig, entry["effect"], entry["place"], entry["parameters"])
+    element, _ = element_and_extent(e.rig, entry["place"], entry["parameters"])
     return {
         "form": "short two-port" if form is None else f"{form} one-port",
         "element": element,

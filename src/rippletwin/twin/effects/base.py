@@ -121,6 +121,7 @@ class Effect:
     friction    law by which it replaces the line's, as in `series_impedance`
     limits      (name, form) of effects that this one becomes at a limit of its parameters or at an
                 end of the line; what those are limits of, it is too
+    rank        effects of a higher one act on the line that those of a lower one leave
     immittances (network, state, values, place) -> immittances per metre of what it puts in place of
                 a stretch of the line; None for one-ports, whose inserts say whether it is passive
     describe    values -> what it is like, in words; None where a law against frequency says it
@@ -141,6 +142,7 @@ class Effect:
     named: bool = True
     friction: str | None = None
     limits: tuple[tuple[str, str | None], ...] = ()
+    rank: int = 0
     immittances: Callable[[object, LineState, Mapping[str, object], Place], Sequence] | None = None
     describe: Callable[[Mapping[str, object]], str] | None = None
     file: str | None = None

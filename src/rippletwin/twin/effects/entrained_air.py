@@ -64,4 +64,5 @@ EFFECT = Effect(
     places=line_place,
     apply=_apply,
     apply_in_time=_apply_in_time,
+    rank=1,  # walls creep under the liquid alone
 )

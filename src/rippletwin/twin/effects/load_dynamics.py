@@ -18,8 +18,8 @@ def _places(rig):
     # Without a static resistance there is no valve to move; a closed end has no flow to resist.
     if rig.load.kind == "closed":
         return ()
-    inertance = Place("load", form="inertance")
-    return (Place("load", form="spool"), inertance) if rig.load.kind == "orifice" else (inertance,)
+    column = Place("load", form="inertance")
+    return (Place("load", form="spool"), column) if rig.load.kind == "orifice" else (column,)
 
 
 def _apply(network, state, values, place):
@@ -37,8 +37,8 @@ def _parameters(rig, place):
     last = rig.line[-1]
     if place.form == "inertance":
         area = 0.25 * np.pi * last.diameter**2
-        inertance = 0.1 * rig.fluid.density / area  # ten centimetres of the last pipe
-        return (Parameter("inertance", "Pa s2/m3", lognormal(inertance, 1.2)),)
+        of_the_pipe = 0.1 * rig.fluid.density / area  # ten centimetres of the last one
+        return (Parameter("inertance", "Pa s2/m3", lognormal(of_the_pipe, 1.2)),)
     return (
         Parameter("gain", "1", normal(0.0, 2.0), (0.2,)),
         Parameter("natural_frequency", "Hz", lognormal(400.0, 1.0), (-1.0, 0.5)),

@@ -56,8 +56,8 @@ def _try_at(effect: Effect, rig, place: Place, values: dict) -> None:
     line, state = _lossless_line(rig, effect.element == "load")
     _run(effect, "apply", effect.apply, line, state, values, place)
     impedance = _run(effect, "apply", line.input_impedance)
-    reading = np.asarray(line.sensor_factor) * np.ones(1)
-    if not (np.all(np.isfinite(impedance)) and np.all(np.isfinite(reading))):
+    changed = line.sensor_factor, line.source_flow, line.source_admittance
+    if not all(np.all(np.isfinite(np.asarray(x))) for x in (impedance, *changed)):
         raise _fault(effect, "apply", f"is not finite at {values}", "Correct the equation")
     if effect.element not in ("source", "sensor"):
         if np.any(impedance.real < -ROUNDING * np.abs(impedance)):
@@ -107,6 +107,9 @@ def _lossless_line(rig, matched: bool) -> tuple[FrequencyDomainLine, LineState]:
         load_resistance=resistance,
         heat_capacity_ratio=fluid.heat_capacity_ratio,
         prandtl=fluid.prandtl,
+        orders=np.arange(1, len(s) + 1),
+        recording=np.zeros(len(s), int),
+        mean_flow=np.full(len(s), last.area),  # at a metre a second
     )
     return line, state
 

@@ -164,6 +164,7 @@ EFFECT = Effect(
     apply=_apply,
     apply_in_time=_apply_in_time,
     immittances=_immittances,
+    rank=2,  # it takes a stretch as all else has made it
     describe=_describe,
     named=False,
 )

@@ -20,8 +20,14 @@ def half_sine(orders: np.ndarray) -> np.ndarray:
     return np.where(n == 1, -0.5j * np.pi, even)
 
 
+def _places(rig):
+    # Of an even number the harmonic of half that order is real: `spread` has odd numbers alone.
+    return source_place(rig) if rig.pump.get("pistons", 9) % 2 else ()
+
+
 def spread(orders: np.ndarray, values) -> np.ndarray:
-    """Harmonics (F,) that unequal pistons add per unit of mean flow, at shaft `orders` >= 1."""
+    """Harmonics (F,) that unequal pistons, an odd number of them, add per unit of mean flow, at
+    shaft `orders` >= 1; shaft angles count from the recording's first sample."""
     count = 2 * len([name for name in values if name.startswith("cosine")]) + 1
     turn = np.asarray(orders, int) % count
     amplitude = np.zeros(len(turn), complex)
@@ -61,7 +67,7 @@ EFFECT = Effect(
     "1 + a_j times the mean, h_n the harmonics of a half sine; odd z",
     source="Ivantysyn & Ivantysynova 2001, Hydrostatic Pumps and Motors, sec. 3.2 (kinematic flow)",
     parameters=_parameters,
-    places=source_place,
+    places=_places,
     apply=_apply,
     apply_in_time=_apply_in_time,
 )
