@@ -245,6 +245,17 @@ def test_what_a_doubtful_line_establishes(monkeypatch, left, pull, held_out, riv
     assert [support.level for support in found.supports] == [hose, "established"]
 
 
+@pytest.mark.parametrize(("gain", "hose"), [(2.9, "established"), (3.1, "supported")])
+def test_a_fit_that_did_not_converge_establishes_what_is_usual_alone(monkeypatch, gain, hose):
+    """Where one more step promises more than 3 of log posterior, the fit is at no mode: the hose is
+    no more than supported, unsteady friction keeps its level."""
+    monkeypatch.setattr(rules, "largest_pull", lambda fit: (0.0, ""))
+    judged = judged_of(HOSE, FRICTION)
+    explanation = replace(judged.best, model_error=0.004, expected_gain=gain)
+    found = rules.withhold_what_is_in_doubt(judged, explanation, 0.004, [False, False])
+    assert [support.level for support in found.supports] == [hose, "established"]
+
+
 def test_an_effect_must_be_plausible_in_the_explanation_too(monkeypatch):
     """A network that stands in moves the parameters of the effects: an effect, usual or not, whose
     own are not plausible then is no more than supported."""

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rippletwin.calibration.fit import Fit
+from rippletwin.calibration.laplace import UNCONVERGED_GAIN
 from rippletwin.explanation.checks.alarms import largest_pull
 from rippletwin.explanation.checks.cross_validation import (
     Disagreement,
@@ -141,7 +142,7 @@ def withhold_what_is_in_doubt(
     The explanation has a network if one stands in. An effect is in doubt
 
     * whose own parameters are not plausible in the explanation: a network moves them,
-    * where the explanation leaves much, but a usual effect,
+    * where the explanation leaves much or did not converge, but a usual effect,
     * that has a rival in the data sheet, where the line does the work of physics that is left out:
       a parameter contradicts the sheet, or held-out data leave much; but a usual effect.
 
@@ -149,13 +150,14 @@ def withhold_what_is_in_doubt(
     has_rivals       of each effect, whether other values of the data sheet do nearly as well
     """
     leaves_much = explanation.model_error > MUCH_MODEL_ERROR
+    converged = explanation.expected_gain <= UNCONVERGED_GAIN  # else its evidence is not known
     bent = largest_pull(explanation)[0] > PULL_ALARM or held_out_error > MUCH_MODEL_ERROR
     rig = judged.best.twin.rig
     supports = []
     for support, (effect, place), has_rival in zip(
         judged.supports, judged.best.hypothesis, has_rivals, strict=True
     ):
-        is_doubtful_line = leaves_much or (bent and has_rival)
+        is_doubtful_line = leaves_much or not converged or (bent and has_rival)
         in_doubt = is_doubtful_line and not effect.usual(rig, place)
         if _pull_of_effect(explanation, f"{effect.name}@{place}.") > PULL_ALARM:
             in_doubt = True
