@@ -132,7 +132,7 @@ def test_one_sensor_beside_an_unknown_source_is_bad_input():
     )
     with pytest.raises(InputError) as caught:
         check_sources([one])
-    told(caught.value, "noise", "sensors", "nothing tells the line")
+    told(caught.value, "noise", "sensors", "the line cannot be fitted")
     check_sources([one, two])
     one.source = "nominal"
     check_sources([one])

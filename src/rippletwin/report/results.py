@@ -74,11 +74,13 @@ def read_results(
         if (folder / "twin.json").exists():
             twin, covariance = _line_of_twin(folder / "twin.json")
     diagnosis = _read_json(diagnosis_folder / "diagnosis.json")
-    ill = [r for r in case.recordings if r.kind == "periodic" and r.state != "healthy"]
-    if diagnosis is None and ill:
+    faulty = [r for r in case.recordings if r.kind == "periodic" and r.state != "healthy"]
+    if diagnosis is None and faulty:
         named = []
-        if all(r.state != "unknown" for r in ill):  # diagnose takes known faults where named alone
-            named = [word for r in ill for word in ("--recording", r.label)]
+        if all(
+            r.state != "unknown" for r in faulty
+        ):  # diagnose takes known faults where named alone
+            named = [word for r in faulty for word in ("--recording", r.label)]
         told = _command("diagnose", case, DIAGNOSED, *named)
         missing.append(f"There is no diagnosis: {told}")
     return Results(

@@ -53,12 +53,12 @@ def select_fitted_frequencies(observations: Sequence, rig, highest_hz: float | N
 
 def check_sources(observations: Sequence) -> None:
     """Raise InputError where all observations are readings of one sensor and of an unknown source:
-    nothing tells the line from the source then."""
+    any line fits them then."""
     if observations and all(o.source == "free" and len(o.values) < 2 for o in observations):
         raise InputError(
             observations[0].label,
             "sensors",
-            "one sensor, and a source whose amplitude is not known: nothing tells the line",
+            "one sensor, and a source whose amplitude is not known: the line cannot be fitted",
             "Give a second sensor, or of a pump its geometry or a flow_ripple",
         )
 

@@ -15,8 +15,9 @@ from scipy.special import binom
 from rippletwin.case.model import ATMOSPHERE
 from rippletwin.line.frequency_domain.nonlinear_compliance import NonlinearCompliance
 from rippletwin.twin.effects.base import Effect, line_place
+from rippletwin.twin.effects.lumped_elements import polytropic_parameter
 from rippletwin.twin.parameters import Parameter
-from rippletwin.twin.priors import lognormal, normal
+from rippletwin.twin.priors import lognormal
 
 SERIES_TERMS = 6  # in x = p/mean; the next is 1e-3 of the second at x = 0.3
 
@@ -59,7 +60,7 @@ EFFECT = Effect(
     "Merritt 1967, Hydraulic Control Systems, eq. 2-11",
     parameters=lambda rig, place: (
         Parameter("gas_fraction", "1", lognormal(5e-3, 1.2)),
-        Parameter("polytropic_exponent", "1", normal(1.2, 0.12)),
+        polytropic_parameter(),
     ),
     places=line_place,
     apply=_apply,

@@ -5,18 +5,14 @@ Its compliance falls with the mean pressure, that of a volume of liquid does not
 
 from __future__ import annotations
 
-from rippletwin.line.frequency_domain.line_network import Insert
-from rippletwin.line.time_domain.line_elements import capacitance
-from rippletwin.twin.effects.base import (
-    Effect,
-    on_line,
-    position_parameter,
-    position_place,
-    segment_at,
+from rippletwin.twin.effects.base import Effect, position_parameter, position_place
+from rippletwin.twin.effects.lumped_elements import (
+    capacitance_at_position,
+    gas_compliance,
+    polytropic_parameter,
 )
-from rippletwin.twin.effects.lumped_elements import POLYTROPIC_EXPONENT, gas_compliance
 from rippletwin.twin.parameters import Parameter
-from rippletwin.twin.priors import lognormal, normal
+from rippletwin.twin.priors import lognormal
 
 
 def _compliance(state, k, values):
@@ -24,18 +20,7 @@ def _compliance(state, k, values):
     return gas_compliance(values["gas_volume"], values["polytropic_exponent"], pressure)
 
 
-def _apply(network, state, values, place):
-    k = segment_at(network.lengths, values["position"])
-    position = on_line(network, values["position"])
-    admittance = network.s * _compliance(state, k, values)
-    network.inserts.append(Insert(position, "shunt", admittance))
-
-
-def _apply_in_time(line, state, values, place):
-    k = segment_at([pipe.length for pipe in line.pipes], values["position"])
-    compliance = float(_compliance(state, k, values))
-    line.inserts.append(capacitance(on_line(line, values["position"]), compliance))
-
+_apply, _apply_in_time = capacitance_at_position(_compliance)
 
 EFFECT = Effect(
     name="gas_volume",
@@ -46,7 +31,7 @@ EFFECT = Effect(
     parameters=lambda rig, place: (
         position_parameter(rig),
         Parameter("gas_volume", "m3", lognormal(3e-7 * (rig.line[0].diameter / 0.02) ** 3, 2.0)),
-        Parameter("polytropic_exponent", "1", normal(POLYTROPIC_EXPONENT, 0.12)),
+        polytropic_parameter(),
     ),
     places=position_place,
     apply=_apply,

@@ -2,32 +2,17 @@
 
 from __future__ import annotations
 
-from rippletwin.line.frequency_domain.line_network import Insert
-from rippletwin.line.time_domain.line_elements import capacitance
-from rippletwin.twin.effects.base import (
-    Effect,
-    on_line,
-    position_parameter,
-    position_place,
-    segment_at,
-)
-from rippletwin.twin.effects.lumped_elements import volume_compliance
+from rippletwin.twin.effects.base import Effect, position_parameter, position_place
+from rippletwin.twin.effects.lumped_elements import capacitance_at_position, volume_compliance
 from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal
 
 
-def _apply(network, state, values, place):
-    k = segment_at(network.lengths, values["position"])
-    compliance = volume_compliance(values["volume"], state.density, state.wave_speeds[k])
-    position = on_line(network, values["position"])
-    network.inserts.append(Insert(position, "shunt", network.s * compliance))
+def _compliance(state, k, values):
+    return volume_compliance(values["volume"], state.density, state.wave_speeds[k])
 
 
-def _apply_in_time(line, state, values, place):
-    k = segment_at([pipe.length for pipe in line.pipes], values["position"])
-    compliance = volume_compliance(values["volume"], state.density, state.wave_speeds[k])
-    line.inserts.append(capacitance(on_line(line, values["position"]), compliance))
-
+_apply, _apply_in_time = capacitance_at_position(_compliance)
 
 EFFECT = Effect(
     name="line_volume",
