@@ -1,8 +1,12 @@
 """Networks that a rig's twin teaches, each on its own kind of simulated signals.
 
-    P     one signal a class of fixed severities, from the twin in the time domain (the paper's)
+    P     pressure: one signal a class of fixed severities, from the twin in the time domain (the
+          paper's)
     PR    severities, twins and their errors at random
     PRA   the same, the measured healthy ripple with the twin's change
+    Q     flow: one signal a class of fixed severities; recordings become flow at the pump's outlet
+          by the twin's line
+    QR    severities and errors of the flow at random
 
 They learn the operating point that has most healthy recordings and answer there alone.
 """
@@ -13,19 +17,19 @@ from collections import Counter
 
 import numpy as np
 
+from diagnosis_trial.taught_signals import TaughtSignals
 from rippletwin.case.model import Case, Recording, Rig
-from rippletwin.diagnosis.faults.library import FAULTS
 from rippletwin.diagnosis.network_answers import (
     STATE_OF,
     is_at_their_point,
     judge_windows,
     windows_of,
 )
-from rippletwin.diagnosis.pump_flow import healthy_flow, leak_velocity, with_fitted_pump
-from rippletwin.diagnosis.randomised_signals import FAULT_OF, SignalSource, severity_bins
-from rippletwin.diagnosis.simulated_fault import simulate_fault
-from rippletwin.harmonics import one_period, peak_amplitudes
-from rippletwin.learning.architectures import CLASSES
+from rippletwin.diagnosis.pump_flow import healthy_flow, with_fitted_pump
+from rippletwin.flow_sensor.estimate import band_limit
+from rippletwin.flow_sensor.line_response import line_factory
+from rippletwin.flow_sensor.methods import noise_of_flow
+from rippletwin.flow_sensor.spectral_inversion import estimate_flow
 from rippletwin.learning.conformal import fit_conformal
 from rippletwin.learning.dataset import augment, each_once
 from rippletwin.learning.kept_networks import KeptNetworks
@@ -39,8 +43,8 @@ ARCHITECTURE = "cnn1d_150_50"
 SAMPLES = 3072  # of a revolution
 DRAWS, HELD_OUT = 400, 100  # simulated revolutions of a class, to learn and for p-values
 SAMPLES_OF_A_DRAW = 2
-FIXED = {"S": 0.26, "C1": 0.26, "C2": 0.77}
-"""Class -> the paper's leak on the default pump: its flow over the mean flow of one piston."""
+FLOW_KINDS = ("Q", "QR")
+BANDWIDTH_HZ = 1500.0  # of the estimated flow, the workflow's default
 SETTINGS = TrainingSettings(
     batch_size=8, learning_rate=0.003, target_loss=0.05, patience=1, max_epochs=40
 )
@@ -48,34 +52,33 @@ SEED = 0
 
 
 def teach_network(kind: str, twin: Twin, covariance: np.ndarray | None, case: Case) -> KeptNetworks:
-    """The network of `kind`, P, PR or PRA, that the twin of a case teaches.
+    """The network of `kind`, P, PR, PRA, Q or QR, that the twin of a case teaches.
 
     covariance   of the twin's theta, None where it is not known
     """
     recording = _most_recorded(case.healthy)
     revolutions = revolutions_of(recording, case.rig, SAMPLES)
     speed_hz, pressure = float(np.mean(revolutions.speed_hz)), recording.load_pressure
-    noise, rng = noise_mad(recording.pressure), np.random.default_rng(SEED)
-    if kind == "P":
-        signals = _fixed_signals(twin, speed_hz, pressure)
-        x, y = augment(signals, DRAWS * SAMPLES_OF_A_DRAW, noise, rng)
-        held_out, _ = augment(signals, HELD_OUT, noise, rng)
-    else:
-        source = SignalSource(twin, covariance, revolutions.windows, speed_hz, pressure)
-        bins = _severities(twin, speed_hz, pressure)
-        learnt, others = (
-            source.draw(bins, CLASSES, count, rng, kind == "PRA").pressure
-            for count in (DRAWS, HELD_OUT)
-        )
-        x, y = augment(learnt, DRAWS * SAMPLES_OF_A_DRAW, noise, rng)
-        held_out, _ = each_once(others, noise, rng)
+    source = TaughtSignals(twin, covariance, revolutions.windows, speed_hz, pressure)
+    rng = np.random.default_rng(SEED)
+    learnt, others = (source.draw(kind, count, rng) for count in (DRAWS, HELD_OUT))
+    signal, channels = "pressure", [sensor.name for sensor in case.rig.sensors]
+    noise = noise_mad(recording.pressure)
+    if kind in FLOW_KINDS:
+        signal, channels = "flow", ["outlet"]
+        band = (_highest_order(speed_hz) + 0.5) * speed_hz
+        learnt, others = (band_limit(s, speed_hz, band) for s in (learnt, others))
+        flow = _flow_windows(recording, case.rig, twin, speed_hz)[:, 0]
+        noise = noise_of_flow(flow, np.zeros(len(flow)), np.ones(len(flow), bool))
+    x, y = augment(learnt, DRAWS * SAMPLES_OF_A_DRAW, noise, rng)
+    held_out, _ = each_once(others, noise, rng)
     network, _ = train(build(ARCHITECTURE, x.shape[1]), x, y, SETTINGS, SEED)
     seen, unseen = (activation_statistics(network, samples) for samples in (x, held_out))
     return KeptNetworks(
         architecture=ARCHITECTURE,
         dataset=kind,
-        signal="pressure",
-        channels=[sensor.name for sensor in case.rig.sensors],
+        signal=signal,
+        channels=channels,
         samples_per_revolution=SAMPLES,
         speed_hz=speed_hz,
         load_pressure=pressure,
@@ -85,14 +88,18 @@ def teach_network(kind: str, twin: Twin, covariance: np.ndarray | None, case: Ca
     )
 
 
-def ask_network(kept: KeptNetworks, recordings: list[Recording], rig: Rig) -> dict:
+def ask_network(kept: KeptNetworks, recordings: list[Recording], rig: Rig, twin: Twin) -> dict:
     """What a network says, with the keys of diagnosis.json that are scored, of the recordings at
-    its operating point. The p-value is that of the middle one of a recording's windows."""
+    its operating point. The p-value is that of the middle one of a recording's windows. A network
+    that judges flow is asked about the flow by the line of `twin`."""
     entries = []
     for recording in recordings:
         if not is_at_their_point(recording, kept):
             continue
-        windows = windows_of(recording, rig, kept.samples_per_revolution)
+        if kept.signal == "flow":
+            windows = _flow_windows(recording, rig, twin, kept.speed_hz)
+        else:
+            windows = windows_of(recording, rig, kept.samples_per_revolution)
         probabilities = dict.fromkeys(dict.fromkeys(STATE_OF.values()), 0.0)
         for name, share in zip(kept.classes, kept.probabilities(windows), strict=True):
             probabilities[STATE_OF[name]] += float(share)
@@ -116,32 +123,23 @@ def _most_recorded(recordings: list[Recording]) -> Recording:
     return next(r for r in periodic if (r.speed_rpm, r.load_pressure) == point)
 
 
-def _fixed_signals(twin: Twin, speed_hz: float, pressure: float) -> np.ndarray:
-    """One revolution (classes, sensors, M) of each class, Pa."""
-    velocity, flow = _leak_scale(twin, speed_hz, pressure)
-    signals = []
-    for name in CLASSES:
-        fault = FAULTS[FAULT_OF[name]] if name in FIXED else None
-        area = FIXED.get(name, 0.0) * flow / velocity
-        run = simulate_fault(twin, fault, area, 60.0 * speed_hz, pressure)
-        orders = np.arange(1, min(run.pressure.shape[1], SAMPLES) // 2)
-        signals.append(one_period(peak_amplitudes(run.pressure)[:, orders], SAMPLES, orders))
-    return np.array(signals)
+def _flow_windows(recording: Recording, rig: Rig, twin: Twin, learnt_speed_hz: float) -> np.ndarray:
+    """Flow (R, 1, M) of the source by the twin's line in windows of one revolution, m3/s, at the
+    shaft orders that a network has learnt."""
+    revolutions = revolutions_of(recording, rig, SAMPLES)
+    fitted, pressure = with_fitted_pump(twin), recording.load_pressure
+    ripple = healthy_flow(fitted.rig.pump, fitted.rig.fluid, recording.speed_rpm, pressure)
+    found = estimate_flow(
+        revolutions.windows,
+        revolutions.speed_hz,
+        line_factory(fitted, pressure, ripple),
+        noise_mad(recording.pressure),
+        (_highest_order(learnt_speed_hz) + 0.5) * float(np.mean(revolutions.speed_hz)),
+    )
+    return found.flow[:, None]
 
 
-def _severities(twin: Twin, speed_hz: float, pressure: float) -> dict:
-    """Leak areas, m2, of each faulty class: what `diagnose` considers, the cylinder's halved."""
-    velocity, flow = _leak_scale(twin, speed_hz, pressure)
-    ends = {
-        name: [FAULTS[fault].smallest * flow / velocity, FAULTS[fault].largest * flow / velocity]
-        for name, fault in (("S", "slipper"), ("C", "cylinder"))
-    }
-    return severity_bins(ends, float(np.sqrt(np.prod(ends["C"]))))
-
-
-def _leak_scale(twin: Twin, speed_hz: float, pressure: float) -> tuple[float, float]:
-    """Velocity of a leak, m/s, and mean flow of one piston, m3/s."""
-    rig = with_fitted_pump(twin).rig
-    flow = healthy_flow(rig.pump, rig.fluid, 60.0 * speed_hz, pressure).flow.mean()
-    velocity = leak_velocity(rig.pump, rig.fluid, pressure)
-    return float(velocity), float(flow) / rig.pump["pistons"]
+def _highest_order(speed_hz: float) -> int:
+    """Highest shaft order of the flow at rev/s. It follows from one speed, that of learning: by
+    each recording's own speed an order at the edge would come and go."""
+    return int(BANDWIDTH_HZ / speed_hz)

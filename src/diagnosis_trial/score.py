@@ -23,6 +23,8 @@ def score_rig(rig: int, truth: dict, diagnosis: dict, run: dict) -> list[dict]:
         right                 see `is_right`
         suspicion             see `suspicion`
         probability           the tool's of the state that it names; None where it states none
+        likeliest             the known state that it gives the highest probability, also where it
+                              names "unlike"; None where it crashed
         severities            a list of {fault, true, value, low, high} for each fault that is both
                               true and named, m2
         piston_right          None where the tool tells no piston or no single one is true
@@ -55,6 +57,7 @@ def _score_column(rig: int, truth: dict, entries: list[dict], run: dict) -> list
                 "right": is_right(true["state"], said["state"]),
                 "suspicion": suspicion(said),
                 "probability": said.get("probabilities", {}).get(said["state"]),
+                "likeliest": likeliest_state(said),
                 "severities": compare_severities(true["areas"], said),
                 "piston_right": is_piston_right(true["pistons"], said),
                 "twin_misfit": run["misfit"],
@@ -86,6 +89,12 @@ def suspicion(said: dict) -> float:
         p_value = said["unlike"]["p_value"]
         odds = max(odds, _log(1.0 - p_value) - _log(p_value))
     return odds
+
+
+def likeliest_state(said: dict) -> str | None:
+    """The known state of the highest stated probability, None where none is stated."""
+    probabilities = said.get("probabilities")
+    return max(probabilities, key=probabilities.get) if probabilities else None
 
 
 def _log(share: float) -> float:

@@ -56,6 +56,8 @@ def score_table(rows: list[dict]) -> list[Score]:
               right(of(*SINGLE, where=lambda row: 0.02 <= row["change"] < PLAIN))),
         Score("One leak, change below 2 %: state right", "",
               right(of(*SINGLE, where=lambda row: row["change"] < 0.02))),
+        Score("One leak, change 5 % or more: likeliest known state right, unlike or not", "",
+              rate_of(row["likeliest"] == row["state"] for row in of(*SINGLE, where=plain))),
         Score("Both leaks, each changing the ripple by 2 % or more: both named", "at least 90 %",
               right(of(COMPOUND, where=lambda row: row["weakest"] >= 0.02))),
         Score("Both leaks, all severities: both named", "", right(of(COMPOUND))),

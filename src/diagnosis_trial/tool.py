@@ -3,9 +3,9 @@ column.
 
 Its arguments are a case, an output folder and the columns, METHOD@TWIN. METHOD is
 
-    anchored     `rippletwin diagnose`
-    unanchored   the same, but compared with the twin's own healthy ripple
-    P, PR, PRA   a network that the twin teaches (`diagnosis_trial.networks`)
+    anchored              `rippletwin diagnose`
+    unanchored            the same, but compared with the twin's own healthy ripple
+    P, PR, PRA, Q, QR     a network that the twin teaches (`diagnosis_trial.networks`)
 
 and TWIN one of `diagnosis_trial.twins`. Writes diagnosis.json, column -> the content of a file of
 `rippletwin diagnose`, and run.json, column -> the seconds that twin and diagnoses took and the
@@ -67,7 +67,7 @@ def diagnose_by(method: str, kind: str, fitted: FittedTwin, case: Case) -> dict:
             diagnose(case, fitted.twin, recordings, recalibrate=again, anchored=anchored)
         )
     network = teach_network(method, fitted.twin, fitted.covariance, case)
-    return ask_network(network, recordings, case.rig)
+    return ask_network(network, recordings, case.rig, fitted.twin)
 
 
 def timed(work: Callable, *arguments) -> tuple:

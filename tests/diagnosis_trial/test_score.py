@@ -63,7 +63,7 @@ def test_a_crash_is_no_finding():
     true = truth(unknown_00=("slipper", 0.08, {"slipper": 3e-8}))
     crashed = [{"label": "unknown_00", "state": "crashed"}]
     (row,) = scored(0, true, crashed, RUN | {"misfit": None, "diagnose_s": None})
-    assert not row["right"] and row["suspicion"] == -math.inf
+    assert not row["right"] and row["suspicion"] == -math.inf and row["likeliest"] is None
 
 
 def test_a_row_says_where_and_when():
@@ -77,6 +77,7 @@ def test_a_row_says_where_and_when():
     rows = scored(0, true, told)
     assert [r["label"] for r in rows] == ["unknown_00", "unknown_01"]
     assert {(r["twin_misfit"], r["fit_s"], r["diagnose_s"]) for r in rows} == {(0.2, 30.0, 12.0)}
+    assert [r["likeliest"] for r in rows] == ["healthy", "cylinder"]
     assert rows[1]["severities"] == [] and rows[1]["piston_right"] is None
     assert rows[0]["probability"] == 0.9 and rows[1]["weakest"] == 0.04
 

@@ -34,6 +34,8 @@ def test_shares_of_the_main_table():
     )
     plain = by_words(table, "change of the ripple 5 % or more")
     assert (plain.hits, plain.count) == (5, 10)  # slippers right, cylinders wrong
+    likeliest = by_words(table, "likeliest known state")
+    assert (likeliest.hits, likeliest.count) == (5, 10)
     assert by_words(table, "given the name of a known one").share == 0.5
     assert by_words(table, "the line was changed, change".capitalize()).share == 1.0
     assert by_words(table, "95 % intervals").hits == by_words(table, "95 % intervals").count - 1

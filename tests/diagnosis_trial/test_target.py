@@ -17,6 +17,7 @@ from virtualrig.draw_population import STATES
 def test_one_rig_from_drawing_to_the_page(tmp_path):
     """The target runs, nothing crashes, and every state is scored as the diagnosis says."""
     columns = ["anchored@calibrated", "unanchored@calibrated", "PRA@calibrated", "P@nominal"]
+    columns += ["QR@calibrated"]
     trial = f"{{rigs: 1, number: 1001, methods: [{', '.join(columns)}]}}"
     (tmp_path / "one.yaml").write_text(f"results: {tmp_path}/out\ndiagnosis_trial: {trial}\n")
     command = [sys.executable, "-m", "snakemake", "--cores", "2", "--configfile"]
