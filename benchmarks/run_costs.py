@@ -15,14 +15,15 @@ import pandas as pd
 
 
 def jobs_of(results: Path) -> pd.DataFrame:
-    """One row for each job that has ended: rule, wall_s, cpu_s, resident memory peak_mb."""
+    """One row for each job that has ended: rule, wall_s, cpu_s, resident memory peak_mb, and when
+    its file was written, s."""
     rows = []
     folder = results / "benchmarks"
     for path in sorted(folder.rglob("*.tsv")):
         row = pd.read_csv(path, sep="\t", na_values="-").iloc[0]
         rule = path.relative_to(folder).with_suffix("").parts[0]
-        rows.append((rule, row["s"], row["cpu_time"], row["max_rss"]))
-    return pd.DataFrame(rows, columns=["rule", "wall_s", "cpu_s", "peak_mb"])
+        rows.append((rule, row["s"], row["cpu_time"], row["max_rss"], path.stat().st_mtime))
+    return pd.DataFrame(rows, columns=["rule", "wall_s", "cpu_s", "peak_mb", "ended"])
 
 
 def by_rule(jobs: pd.DataFrame) -> pd.DataFrame:
@@ -32,9 +33,9 @@ def by_rule(jobs: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(
         {
             "jobs": grouped.size(),
-            "wall_s": grouped.wall_s.sum().round(),
-            "cpu_s": grouped.cpu_s.sum().round(),
-            "peak_mb": grouped.peak_mb.max().round(),
+            "wall_s": grouped.wall_s.sum(),
+            "cpu_s": grouped.cpu_s.sum(),
+            "peak_mb": grouped.peak_mb.max(),
         }
     ).sort_values("wall_s", ascending=False)
 
@@ -46,7 +47,7 @@ def main() -> None:
     if not any((results / "benchmarks").rglob("*.tsv")):
         parser.error(f"{results}: holds no benchmark files; run the workflow first")
     table = by_rule(jobs_of(results))
-    print(table.to_string())
+    print(table.round().to_string())
     size = sum(path.stat().st_size for path in results.rglob("*") if path.is_file())
     print(f"all: {table.wall_s.sum():.0f} s of jobs, largest job {table.peak_mb.max():.0f} MB")
     print(f"disk: {size / 1e6:.0f} MB in {results}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import json
+import os
 import re
 
 import numpy as np
@@ -109,27 +110,30 @@ def test_the_page_says_plainly_what_is_missed(tmp_path):
     assert Result.from_json(record(result)["result"]) == result
 
 
-def made_run(folder, seconds):
-    """A results folder whose jobs, "RULE/JOB" or "RULE", took these wall seconds."""
-    for job, wall in seconds.items():
+def made_run(folder, jobs):
+    """A results folder of jobs "RULE/JOB" or "RULE": the wall seconds that each took, and when it
+    ended."""
+    for job, (wall, ended) in jobs.items():
         path = folder / "benchmarks" / f"{job}.tsv"
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(f"s\tmax_rss\tcpu_time\n{wall}\t100\t-\n")
+        os.utime(path, (ended, ended))
     return folder
 
 
 def test_time_of_a_run_by_hand(tmp_path, monkeypatch):
-    """Imports take 1 s. Two trainings of 2 and 10 s and a recording of 12 s, which runs no script:
-    0.2 minutes on two cores, half of the shorter training is imports, 2 of 12 s in all; a job of
-    0.5 s is nothing but imports. The chart has the same numbers, the costliest rule first."""
+    """Imports take 1 s. Two trainings of 2 and 10 s and a recording of 12 s, which runs no script;
+    the last ends 30 s after the recording began: half a minute, half of the shorter training is
+    imports, 2 of 12 s in all. A job of 0.5 s is nothing but imports. Chart and table have the same
+    numbers. In a copy, all of whose files are of one moment, two cores take 12 s at least."""
     monkeypatch.setattr(workflow, "script_seconds", lambda path: 1.0)
     monkeypatch.delenv(workflow.DEFAULT_RUN, raising=False)
-    seconds = {"train/a": 2.0, "train/b": 10.0, "record": 12.0}
-    monkeypatch.setenv(workflow.SMOKE_RUN, str(made_run(tmp_path / "first", seconds)))
+    jobs = {"train/a": (2.0, 114), "train/b": (10.0, 130), "record": (12.0, 112)}
+    monkeypatch.setenv(workflow.SMOKE_RUN, str(made_run(tmp_path / "first", jobs)))
     result = workflow.run()
     default, smoke, largest, whole = result.claims
     assert default.result is None and len(result.notes) == 1
-    assert smoke.result == pytest.approx(0.2) and smoke.target == 3.0 and smoke.met
+    assert smoke.result == pytest.approx(0.5) and smoke.target == 3.0 and smoke.met
     assert (largest.result, largest.met) == (50.0, False) and "1 of 2 jobs" in largest.note
     assert whole.result == pytest.approx(100 * 2 / 12)
     (chart,) = result.charts
@@ -142,8 +146,10 @@ def test_time_of_a_run_by_hand(tmp_path, monkeypatch):
         "train": ["2.0", "50 %"],
         "record": ["–"] * 2,
     }
-    monkeypatch.setenv(workflow.SMOKE_RUN, str(made_run(tmp_path / "short", {"claims": 0.5})))
+    monkeypatch.setenv(workflow.SMOKE_RUN, str(made_run(tmp_path / "short", {"claims": (0.5, 9)})))
     assert workflow.run().claims[2].result == 100.0
+    copied = made_run(tmp_path / "copy", {job: (wall, 200) for job, (wall, _) in jobs.items()})
+    assert workflow.minutes_of(workflow.jobs_of(copied)) == pytest.approx(0.2)
 
 
 @pytest.mark.parametrize(("has", "minutes"), [(False, 100.0), (True, 60.0)])
