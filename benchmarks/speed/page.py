@@ -8,7 +8,7 @@ from pathlib import Path
 from matplotlib.ticker import NullFormatter
 
 from rippletwin.figures import style
-from speed.result import Claim, Result, Table
+from speed.result import Chart, Claim, Result, Table
 
 INTRODUCTION = """# Benchmarks
 
@@ -32,13 +32,16 @@ for what is measured here.
 
 
 def write(records: list[dict], page: Path, picture: Path) -> None:
-    """Write the page and the figure of `records`, one for each benchmark."""
+    """Write the page and the figures of `records`, one for each benchmark; charts lie beside
+    `picture`, in the folder figures of the page."""
     records = sorted(records, key=lambda record: record["result"]["point"])
     results = [Result.from_json(record["result"]) for record in records]
     parts = [INTRODUCTION, machine_words(records), summary(results)]
     parts += [section(result) for result in results]
     page.write_text("\n".join(part.rstrip() + "\n" for part in parts))
     draw(results, picture)
+    for chart in (chart for result in results for chart in result.charts):
+        draw_chart(chart, picture.parent / chart.file)
 
 
 def machine_words(records: list[dict]) -> str:
@@ -97,6 +100,8 @@ def section(result: Result) -> str:
         target = "" if claim.target is None else f" (target {target_words(claim)})"
         note = f": {claim.note}" if claim.note else ""
         lines.append(f"* {sentence(claim.text)}: **{result_words(claim)}**{target}{note}.")
+    for chart in result.charts:
+        lines += ["", f"![{chart.title}](figures/{chart.file})"]
     for table in result.tables:
         lines += ["", f"{table.caption}:", "", markdown(table).rstrip()]
     if result.bound:
@@ -178,4 +183,17 @@ def draw(results: list[Result], path: Path) -> None:
     values = [0.1, 10.0, *map(advantage, shown)]  # at least three labelled ticks
     ax.set_xlim(min(values) / 1.2, max(values) * 1.2)
     ax.set_xlabel("times faster than the target (open: missed)")
+    style.save(fig, path)
+
+
+def draw_chart(chart: Chart, path: Path) -> None:
+    """Horizontal bars, the first on top, each beginning with its part."""
+    fig, axes = style.figure(height=1.0 + 0.16 * len(chart.labels))
+    ax, rows = axes[0, 0], range(len(chart.labels))
+    ax.barh(rows, chart.values, color=style.CALIBRATED)
+    ax.barh(rows, chart.parts, color=style.NOMINAL)
+    ax.set_yticks(rows, chart.labels, fontsize=7)
+    ax.set_ylim(len(chart.labels) - 0.5, -0.5)
+    ax.set_title(chart.title, loc="left")
+    ax.set_xlabel(chart.axis)
     style.save(fig, path)

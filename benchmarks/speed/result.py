@@ -42,6 +42,19 @@ class Table:
 
 
 @dataclass(frozen=True)
+class Chart:
+    """A bar for each label, of which a part, 0 to its value, is drawn in another colour; `file` is
+    its name in the folder of the page's figures."""
+
+    file: str
+    title: str
+    labels: list[str]
+    values: list[float]
+    parts: list[float]
+    axis: str
+
+
+@dataclass(frozen=True)
 class Result:
     """One benchmark.
 
@@ -51,6 +64,7 @@ class Result:
     claims, tables
     bound    sentences: what limits the time, and how far from it we are
     notes    sentences: what was left out
+    charts   figures of its own
     """
 
     point: int
@@ -60,6 +74,7 @@ class Result:
     tables: list[Table] = field(default_factory=list)
     bound: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    charts: list[Chart] = field(default_factory=list)
 
     def to_json(self) -> dict:
         return asdict(self)
@@ -71,5 +86,6 @@ class Result:
             | {
                 "claims": [Claim(**claim) for claim in content["claims"]],
                 "tables": [Table(**table) for table in content["tables"]],
+                "charts": [Chart(**chart) for chart in content.get("charts", ())],
             }
         )

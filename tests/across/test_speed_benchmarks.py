@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import json
+import os
 import re
 
 import numpy as np
@@ -23,7 +24,7 @@ from speed import (
     workflow,
 )
 from speed.page import advantage, known_versions, write
-from speed.result import Claim, Result, Table
+from speed.result import Chart, Claim, Result, Table
 from speed.timing import alternate, median_ratio
 
 PEERS_ALONE = {"rthym_moc", "ptsnet", "tsnet", "openwind"}
@@ -109,6 +110,76 @@ def test_the_page_says_plainly_what_is_missed(tmp_path):
     assert Result.from_json(record(result)["result"]) == result
 
 
+def made_run(folder, jobs):
+    """A results folder of jobs "RULE/JOB" or "RULE": the wall seconds that each took, and when it
+    ended."""
+    for job, (wall, ended) in jobs.items():
+        path = folder / "benchmarks" / f"{job}.tsv"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"s\tmax_rss\tcpu_time\n{wall}\t100\t-\n")
+        os.utime(path, (ended, ended))
+    return folder
+
+
+def test_time_of_a_run_by_hand(tmp_path, monkeypatch):
+    """Imports take 1 s. Two trainings of 2 and 10 s and a recording of 12 s, which runs no script;
+    the last ends 30 s after the recording began: half a minute, half of the shorter training is
+    imports, 2 of 12 s in all. A job of 0.5 s is nothing but imports. Chart and table have the same
+    numbers. In a copy, all of whose files are of one moment, two cores take 12 s at least."""
+    monkeypatch.setattr(workflow, "script_seconds", lambda path: 1.0)
+    monkeypatch.delenv(workflow.DEFAULT_RUN, raising=False)
+    jobs = {"train/a": (2.0, 114), "train/b": (10.0, 130), "record": (12.0, 112)}
+    monkeypatch.setenv(workflow.SMOKE_RUN, str(made_run(tmp_path / "first", jobs)))
+    result = workflow.run()
+    default, smoke, largest, whole = result.claims
+    assert default.result is None and len(result.notes) == 1
+    assert smoke.result == pytest.approx(0.5) and smoke.target == 3.0 and smoke.met
+    assert (largest.result, largest.met) == (50.0, False) and "1 of 2 jobs" in largest.note
+    assert whole.result == pytest.approx(100 * 2 / 12)
+    (chart,) = result.charts
+    assert sorted(zip(chart.labels, chart.values, chart.parts)) == [
+        ("record", 12.0, 0.0),
+        ("train", 12.0, 2.0),
+    ]
+    (table,) = result.tables
+    assert {row[0]: row[-2:] for row in table.rows} == {
+        "train": ["2.0", "50 %"],
+        "record": ["–"] * 2,
+    }
+    monkeypatch.setenv(workflow.SMOKE_RUN, str(made_run(tmp_path / "short", {"claims": (0.5, 9)})))
+    assert workflow.run().claims[2].result == 100.0
+    copied = made_run(tmp_path / "copy", {job: (wall, 200) for job, (wall, _) in jobs.items()})
+    assert workflow.minutes_of(workflow.jobs_of(copied)) == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(("has", "minutes"), [(False, 100.0), (True, 60.0)])
+def test_target_of_the_default_run_is_that_of_the_processor(has, minutes, monkeypatch):
+    """With either instruction for bfloat16 products an hour, without both 100 minutes."""
+    there = {"instructions": {"avx512_bf16": False, "amx_bf16": has, "avx2": True}}
+    monkeypatch.setattr(workflow, "describe", lambda: there)
+    assert workflow.default_minutes() == minutes
+
+
+def test_every_rule_with_a_benchmark_file_and_a_script_is_found():
+    """A rule with its script's name, one made from another rule, and one that runs a program."""
+    assert workflow.script_of("train").name == "train.py"
+    assert workflow.script_of("synchrosqueeze_seeds").name == "synchrosqueeze.py"
+    assert workflow.script_of("record") is None
+
+
+def test_charts_are_drawn_and_shown(tmp_path):
+    """The page names the file, which has both rules' names; a record without charts is read."""
+    chart = Chart("made.svg", "Where?", ["slow", "fast"], [3.0, 1.0], [1.0, 0.5], "seconds")
+    result = Result(1, "Made", ["It is timed."], [Claim("a", 1.0, 1.0)], charts=[chart])
+    (tmp_path / "figures").mkdir()
+    write([record(result)], tmp_path / "page.md", tmp_path / "figures" / "benchmarks.svg")
+    assert "![Where?](figures/made.svg)" in (tmp_path / "page.md").read_text()
+    assert (tmp_path / "figures" / "made.svg").stat().st_size > 1000
+    assert Result.from_json(record(result)["result"]) == result
+    old = {k: v for k, v in result.to_json().items() if k != "charts"}
+    assert Result.from_json(old).charts == []
+
+
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_version_that_one_record_knows_is_kept(turned):
     """In either order: a program of another Python is measured by one benchmark alone."""
@@ -183,7 +254,8 @@ def test_plain_networks_are_the_same_networks():
 def test_a_benchmark_runs_on_tiny_sizes(benchmark, monkeypatch):
     """Its result has claims and texts, and can be written as JSON."""
     monkeypatch.delenv(line_time_domain.NETWORK_PYTHON, raising=False)
-    monkeypatch.delenv(workflow.RUN, raising=False)
+    monkeypatch.delenv(workflow.DEFAULT_RUN, raising=False)
+    monkeypatch.delenv(workflow.SMOKE_RUN, raising=False)
     result = benchmark.run(quick=True)
     assert result.claims and result.what
     assert Result.from_json(json.loads(json.dumps(result.to_json()))) == result

@@ -6,6 +6,7 @@ import pytest
 import leaking_pump
 from rippletwin.diagnosis import randomised_signals
 from rippletwin.diagnosis.anchor import alignment
+from rippletwin.diagnosis.pump_flow import NUMBERS
 from rippletwin.diagnosis.randomised_signals import SignalSource, severity_bins
 from rippletwin.harmonics import one_period, peak_amplitudes
 from rippletwin.pump.faults import Cylinder, Slipper
@@ -21,9 +22,9 @@ def recorded(fault=None, turn=0.3):
     return one_period(observation.values, SAMPLES, observation.orders)
 
 
-def source(covariance=None):
+def source(twin=None, covariance=None):
     healthy = recorded()[None] + np.zeros((2, 1, 1))
-    twin = Twin(leaking_pump.rig())
+    twin = twin or Twin(leaking_pump.rig())
     return SignalSource(twin, covariance, healthy, leaking_pump.SPEED / 60, leaking_pump.LOAD)
 
 
@@ -108,15 +109,47 @@ def test_model_errors_are_as_large_as_stated_and_smooth(nominal):
 
 
 def test_twins_are_drawn_from_the_posterior():
-    """Coordinates that are drawn have the covariance given, correlations included."""
+    """Coordinates that are drawn have the covariance given, correlations included; numbers of a
+    pump that is no part of the twin are drawn as the data sheet's tolerances."""
     twin = Twin(leaking_pump.rig())
     count = len(twin.theta)
     root = np.eye(count)
     root[0, 1] = 0.8
     drawn = source(covariance=root @ root.T)
     rng = np.random.default_rng(0)
-    thetas = np.array([drawn._draw_theta(rng) for _ in range(4000)])
-    assert np.abs(np.cov(thetas.T) - root @ root.T).max() < 0.15
+    thetas, numbers = zip(*(drawn._draw_twin(rng) for _ in range(4000)))
+    assert np.abs(np.cov(np.transpose(thetas)) - root @ root.T).max() < 0.15
+    assert np.abs(np.cov(np.transpose(numbers)) - np.eye(len(NUMBERS))).max() < 0.15
+
+
+def test_fitted_numbers_of_the_pump_are_drawn_with_the_line():
+    """A posterior in which dead volume and first wave speed move as one: so do the draws, by as
+    much as the posterior says, and the numbers that it knows exactly stay."""
+    twin = Twin(leaking_pump.rig(), [leaking_pump.record("a")], uncertain_pump=True)
+    direction = np.zeros(len(twin.theta))
+    direction[0], direction[twin.index["dead_volume"]] = 1.0, 0.5
+    drawn = source(twin, np.outer(direction, direction))
+    rng = np.random.default_rng(0)
+    thetas, numbers = map(np.array, zip(*(drawn._draw_twin(rng) for _ in range(400))))
+    volume = numbers[:, NUMBERS.index("dead_volume")]
+    np.testing.assert_allclose(volume, 0.5 * thetas[:, 0], rtol=1e-6, atol=1e-6)
+    assert volume.std() == pytest.approx(0.5, rel=0.15)
+    others = np.delete(numbers, NUMBERS.index("dead_volume"), axis=1)
+    assert np.abs(others).max() < 1e-6
+
+
+def test_the_pump_of_a_signal_is_drawn_once_for_its_classes(certain, monkeypatch):
+    """Certain but for the pump: the healthy flow of every draw differs, a leak's flow less its
+    change does not differ from it; an anchored healthy signal knows no pump of the twin."""
+    rng, drawn = np.random.default_rng(0), iter(np.random.default_rng(1).normal(size=(4, 7)))
+    monkeypatch.setattr(certain, "_draw_twin", lambda rng: (certain._line.twin.theta, next(drawn)))
+    tiny = {"S": (1e-12, 1.001e-12)}
+    flow = certain.draw(tiny, ("H", "S"), 2, rng).flow
+    size = np.linalg.norm(flow[0, 0])
+    assert np.linalg.norm(flow[0, 1] - flow[0, 0]) > 0.05 * size
+    assert np.linalg.norm(flow[1] - flow[0]) < 1e-3 * size
+    healthy = certain.draw({}, ("H",), 2, rng, anchored=True).pressure
+    np.testing.assert_allclose(healthy[0, 0], healthy[0, 1])
 
 
 @pytest.mark.parametrize(

@@ -13,13 +13,17 @@ from rippletwin.learning.paper_claims import (
     cells_of,
     claims_markdown,
     comparisons,
+    difference_over_recordings,
     judge_claim,
     judge_claims,
     paired_difference,
 )
+from rippletwin.learning.recording_accuracy import CELL, recording_shares
 
 PAPER = pd.read_csv(ROOT / "resources" / "paper_accuracy.csv")
 NONE = PAPER.iloc[:0]
+UNSEEN = pd.DataFrame(columns=pd.MultiIndex.from_arrays([[], []], names=CELL))
+"""Shares of no recording."""
 
 
 def summary(values):
@@ -80,8 +84,8 @@ def test_made_results_are_judged_as_made():
             "cnn2d_30_3": [51, 61, 69],
         }
     )
-    cells = cells_of(made, NONE)
-    compared = comparisons(cells)
+    cells = cells_of(made, NONE, UNSEEN)
+    compared = comparisons(cells, UNSEEN)
     table = judge_claims(compared, cells, 3072 / 9).set_index(["claim", "score"]).verdict
     assert table[paper_claims.KERNELS_IN_TIME.text, "strict"] == "reproduced"
     assert table[paper_claims.KERNELS_IN_IMAGES.text, "strict"] == "not"
@@ -97,16 +101,70 @@ def test_calibration_compares_a_network_with_itself():
     made = pd.concat(
         [results({"cnn1d_3_1": [90, 90]}), results({"cnn1d_3_1": [40, 40]}, dataset="CFD-P")]
     )
-    (row,) = comparisons(cells_of(made, NONE)).query("score == 'strict'").itertuples()
+    compared = comparisons(cells_of(made, NONE, UNSEEN), UNSEEN)
+    (row,) = compared.query("score == 'strict'").itertuples()
     assert (row.claim, row.difference, row.worse) == (paper_claims.CALIBRATION, 50, "CFD-P")
+
+
+def seen(said, dataset="CFD-MOC-P"):
+    """Rows of recordings, a row a seed and recording: network -> shares by seed and recording."""
+    return pd.DataFrame(
+        {"architecture": name, "dataset": dataset, "seed": seed, "recording": f"r{k}", "share": x}
+        for name, seeds in said.items()
+        for seed, shares in enumerate(seeds)
+        for k, x in enumerate(shares)
+    )
+
+
+def test_recordings_are_the_unit():
+    """By hand. Two seeds that are each right on all windows of another half of eleven recordings
+    are 50 % right on each. 341@100 is right on six recordings that 3@1 misses, and on none of the
+    other five: the mean is 6/11, and the claim holds for other recordings (sign test: 2 of 64).
+    150@50 misses five of the six: that it is worse by 1/11 may be chance, sure as both seeds are.
+    """
+    right, missed = [1.0] * 6 + [0.0] * 5, [0.0] * 11
+    halves = [[1.0, 0.0] * 5 + [1.0], [0.0, 1.0] * 5 + [0.0]]
+    rows = seen(
+        {
+            "cnn1d_341_100": [right, right],
+            "cnn1d_3_1": [missed, missed],
+            "cnn1d_150_50": [[0.0] + right[1:], [0.0] + right[1:]],
+            "resnet34_1d": halves,
+        }
+    )
+    shares = recording_shares(rows)
+    assert (shares["resnet34_1d", "CFD-MOC-P"] == 50.0).all()
+    nothing = results({"cnn1d_3_1": [0, 0]})
+    cells = cells_of(nothing, NONE, shares)
+    compared = comparisons(cells, shares).query("score == @paper_claims.RECORDINGS")
+    table = compared.set_index(["better", "worse"])
+    over_3, over_150 = (table.loc["CNN1D (341@100)", f"CNN1D ({k})"] for k in ("3@1", "150@50"))
+    assert over_3.difference == pytest.approx(600 / 11) and over_3.verdict == "supports"
+    assert over_150.difference == pytest.approx(100 / 11) and over_150.verdict == "open"
+    judged = judge_claims(compared, cells, 3072 / 9).set_index(["claim", "score"]).verdict
+    assert judged[paper_claims.KERNELS_IN_TIME.text, paper_claims.RECORDINGS] == "partly"
+
+
+def test_three_recordings_leave_everything_open():
+    """Networks that differ in all windows of all three recordings: no interval, no verdict, though
+    seeds agree to the last window."""
+    mean, low, high = difference_over_recordings([100.0] * 3, [0.0] * 3)
+    assert mean == 100 and np.isnan([low, high]).all()
+    assert paper_claims.verdict_of_difference(low, high) == "open"
+
+
+def test_only_recordings_that_both_have_are_compared():
+    """A network that was not asked about the last recording is compared on the other six."""
+    both = difference_over_recordings([50.0] * 6 + [np.nan], [20.0] * 7)
+    assert both == (30.0, 30.0, 30.0)
 
 
 def test_the_papers_own_table():
     """Reading the paper's table by this rule: calibration helps beyond doubt and all learn from
     recordings; kernels in time are not a clean sweep, since 3@1 beats 150@50 on CFD-P, but 341@100
     beats 3@1 on two of three datasets with certainty."""
-    cells = cells_of(results({"cnn1d_3_1": [1, 2]}), PAPER)
-    compared = comparisons(cells)
+    cells = cells_of(results({"cnn1d_3_1": [1, 2]}), PAPER, UNSEEN)
+    compared = comparisons(cells, UNSEEN)
     table = judge_claims(compared, cells, 3072 / 9).set_index(["claim", "score"]).verdict
     assert table[paper_claims.CALIBRATION, paper_claims.PAPER] == "reproduced"
     assert table[paper_claims.LEARNABLE, paper_claims.PAPER] == "reproduced"
@@ -115,8 +173,9 @@ def test_the_papers_own_table():
 
 
 def test_page_names_every_verdict():
-    cells = cells_of(results({"cnn1d_341_100": [95, 96], "cnn1d_3_1": [60, 61]}), PAPER)
-    compared = comparisons(cells)
+    made = results({"cnn1d_341_100": [95, 96], "cnn1d_3_1": [60, 61]})
+    cells = cells_of(made, PAPER, UNSEEN)
+    compared = comparisons(cells, UNSEEN)
     page = claims_markdown(judge_claims(compared, cells, 3072 / 9), compared)
     assert "**reproduced**" in page and "**untested**" in page
     assert "| CNN1D (341@100) | CNN1D (3@1) | +35.0 |" in page

@@ -1,13 +1,18 @@
 """Accuracy with the recording as the unit, by hand."""
 
+from itertools import product
+
+import numpy as np
 import pandas as pd
 import pytest
 from scipy.stats import beta
 
 from rippletwin.learning.recording_accuracy import (
     exact_interval,
+    paired_interval,
     recording_cells,
     recording_rows,
+    recording_shares,
     recording_table,
     severity_table,
 )
@@ -54,6 +59,53 @@ def test_interval_is_that_of_clopper_and_pearson(right, count):
     assert low == pytest.approx(beta.ppf(0.025, right, count - right + 1))
     expected = 1.0 if right == count else beta.ppf(0.975, right + 1, count - right)
     assert high == pytest.approx(expected)
+
+
+def test_shares_are_over_seeds(rows):
+    """By hand: H is right in 3 and 0 of 4 windows, C in 3 and 4, S in 2 and 3."""
+    shares = recording_shares(rows)["cnn1d_3_1", "CFD-MOC-PR"]
+    assert shares.to_dict() == {0: 37.5, 1: 87.5, 2: 62.5}
+
+
+@pytest.mark.parametrize(("right", "below"), [(5, True), (6, False)])
+def test_interval_of_yes_and_no_agrees_with_the_sign_test(right, below):
+    """Of eleven recordings one network is right on five or six more, all others being equal: the
+    sign test has p = 2 of 32 and 2 of 64, the interval's lower end is 0 and above it."""
+    low, high = paired_interval(np.array([1.0] * right + [0.0] * (11 - right)))
+    assert (low == 0.0) == below and 0.0 <= low < high <= 1.0
+
+
+def test_interval_is_that_of_all_changes_of_sign():
+    """Other way to the same: the means that a test by all 2^8 changes of sign of the differences
+    from them does not reject at 5 %."""
+    differences = np.random.default_rng(0).normal(1.0, 1.0, 8)
+    signs = np.array(list(product((-1, 1), repeat=8)))
+
+    def rejected(mean):
+        sums = signs @ (differences - mean)
+        largest = np.abs(np.sum(differences - mean)) - 1e-9
+        return np.mean(np.abs(sums) >= largest) <= 0.05
+
+    low, high = paired_interval(differences)
+    assert not rejected(low + 1e-3) and not rejected(high - 1e-3)
+    assert rejected(low - 1e-3) and rejected(high + 1e-3)
+
+
+@pytest.mark.parametrize("count", [11, 40])
+def test_interval_holds_the_mean_as_often_as_it_says(count):
+    """800 times recordings of a skewless law: 95 % within three deviations, for all subsets and
+    for random ones."""
+    rng = np.random.default_rng(count)
+    ends = np.array([paired_interval(rng.uniform(-1, 1, count)) for _ in range(800)])
+    held = np.mean((ends[:, 0] <= 0) & (ends[:, 1] >= 0))
+    assert held == pytest.approx(0.95, abs=3 * np.sqrt(0.95 * 0.05 / 800))
+
+
+def test_five_recordings_have_no_interval():
+    """The least probability that five differences can show is 1 in 32 on either side."""
+    assert np.isnan(paired_interval(np.ones(5))).all()
+    assert paired_interval(np.ones(6)) == (1.0, 1.0)
+    assert np.isnan(paired_interval(np.zeros(0))).all()
 
 
 def test_pages_show_recordings_and_severities(rows):

@@ -2,6 +2,7 @@
 rule claims:
     input:
         table=rules.accuracy_table.output.table,
+        recordings=rules.recording_table.output.table,
         paper=PAPER,
         rig=rig_sheet(),
         source=scripts_sources("claims.py"),

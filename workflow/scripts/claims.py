@@ -10,14 +10,18 @@ from rippletwin.case.load import load_case
 from rippletwin.figures import attention
 from rippletwin.figures.style import save
 from rippletwin.learning import paper_claims
+from rippletwin.learning.recording_accuracy import recording_shares
 
 report_progress = open_log(snakemake)
 paths = snakemake.output
 pistons = load_case(Path(snakemake.input.rig).parent, states=()).rig.pump["pistons"]
-results = pd.read_csv(snakemake.input.table)
-results = results[results.dataset.isin(snakemake.params.datasets)]
-cells = paper_claims.cells_of(results, pd.read_csv(snakemake.input.paper))
-compared = paper_claims.comparisons(cells)
+results, recordings = (
+    table[table.dataset.isin(snakemake.params.datasets)]
+    for table in map(pd.read_csv, (snakemake.input.table, snakemake.input.recordings))
+)
+shares = recording_shares(recordings)
+cells = paper_claims.cells_of(results, pd.read_csv(snakemake.input.paper), shares)
+compared = paper_claims.comparisons(cells, shares)
 judged = paper_claims.judge_claims(
     compared, cells, snakemake.params.samples_per_revolution / pistons
 )
@@ -35,7 +39,9 @@ groups = {
         ],
         rows[["difference", "low", "high"]].to_numpy(),
     )
-    for claim, rows in compared[compared.score == paper_claims.EITHER].groupby("claim", sort=False)
+    for claim, rows in compared[compared.score == paper_claims.RECORDINGS].groupby(
+        "claim", sort=False
+    )
 }
 save(attention.plot_claims(groups), paths.png, paths.svg)
 report_progress(f"{len(compared)} comparisons")

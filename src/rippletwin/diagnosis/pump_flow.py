@@ -39,6 +39,7 @@ UNCERTAIN = {
 }
 """Relative standard deviations of the numbers of a pump about those of its data sheet."""
 TIMING_SD_DEG = 0.5  # of the port plate
+NUMBERS = (*UNCERTAIN, "port_timing_deg")  # in the order of `moved_pumps`
 
 
 def with_fitted_pump(twin: Twin, mean_flow: float | None = None, speed_hz: float = 1.0) -> Twin:
@@ -123,7 +124,7 @@ class LeakFlow:
     areas    (A,) simulated, m2, ascending
     change   (A, K) change over area of the flow's peak amplitudes at orders 0 to K - 1, m/s
     mean     mean flow of the healthy pump, m3/s
-    slopes   (B, P, K) derivatives of `change` by P uncertain numbers of the pump, in standard
+    slopes   (B, P, K) derivatives of `change` by the P `NUMBERS` of the pump, in standard
              deviations, at areas[SLOPE_NODES]
     periodic whether every simulation behind them came to repeat itself
     """
@@ -211,12 +212,12 @@ def _leak_flow(
 
     found = change(pump, areas)
     at = areas[SLOPE_NODES]
-    slopes = [change(moved, at) - found[SLOPE_NODES] for moved in _moved_pumps(pump)]
+    slopes = [change(moved, at) - found[SLOPE_NODES] for moved in moved_pumps(pump)]
     return LeakFlow(areas, found, float(mean), np.stack(slopes, axis=1), all(periodic))
 
 
-def _moved_pumps(pump: Mapping) -> list[dict]:
-    """The pump with one uncertain number after the other moved by a standard deviation."""
+def moved_pumps(pump: Mapping) -> list[dict]:
+    """The pump with one of `NUMBERS` after the other moved by a standard deviation."""
     geometry = Geometry.from_dict(dict(pump))
     moved = [{**pump, name: getattr(geometry, name) * (1.0 + sd)} for name, sd in UNCERTAIN.items()]
     timing = geometry.port_timing_deg + TIMING_SD_DEG

@@ -4,10 +4,11 @@ A signal is one revolution at the sensors, an inverse Fourier transform of
 
     response of the line x (flow of the healthy pump + change by a leak)
 
-whose line is drawn from the twin's posterior and drifts as between two recordings, whose leak is of
-a log-uniform area at a random piston, and whose error is a smooth random function of frequency,
-about each order as large as the twin's own misfit of the healthy ripple. An anchored signal has the
-measured healthy ripple in place of the twin's, so that the misfit concerns the change alone.
+whose line and pump are drawn from the twin's posterior, whose line drifts as between two
+recordings, whose leak is of a log-uniform area at a random piston, and whose error is a smooth
+random function of frequency, about each order as large as the twin's own misfit of the healthy
+ripple. An anchored signal has the measured healthy ripple in place of the twin's, so that pump and
+misfit concern the change alone.
 """
 
 from __future__ import annotations
@@ -17,11 +18,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rippletwin.diagnosis.anchor import even_flow, flow_at_pump, make_anchor
+from rippletwin.diagnosis.anchor import flow_at_pump, make_anchor
 from rippletwin.diagnosis.drifting_line import DriftingLine
 from rippletwin.diagnosis.faults.library import FAULTS
 from rippletwin.diagnosis.observation_model import SOURCE_DRIFT, TURN_SD
-from rippletwin.diagnosis.pump_flow import ORDERS, healthy_flow, leak_flow, with_fitted_pump
+from rippletwin.diagnosis.pump_flow import (
+    NUMBERS,
+    ORDERS,
+    healthy_flow,
+    leak_flow,
+    with_fitted_pump,
+)
+from rippletwin.diagnosis.uncertain_pump import UncertainPump, number_slopes
 from rippletwin.harmonics import one_period, peak_amplitudes
 from rippletwin.spectra.observation import Observation
 from rippletwin.twin.twin import Twin
@@ -58,7 +66,8 @@ class SignalSource:
     """A twin and a healthy recording at one operating point, from which signals are drawn.
 
     twin, covariance : the twin and the posterior covariance of its theta, None where it is not
-        known; then only the drift of the line is drawn.
+        known; then of line and pump only the drift is drawn. Where the pump's numbers are no
+        parameters of the twin, they are drawn about the data sheet's (`pump_flow.UNCERTAIN`).
     healthy : (R, S, M) consecutive revolutions of one healthy recording, Pa, M even shaft angles.
     speed_hz, load_pressure : rev/s, Pa.
     """
@@ -83,14 +92,15 @@ class SignalSource:
         self._healthy = observed.values
         anchor = make_anchor(fitted, observed, observed, self._line, *self._point)
         self._angle, self.misfit = anchor.angle, anchor.misfit
-        self._flow = even_flow(ripple, self.orders, self._pistons)
+        self._flows = UncertainPump(self._pump, self._fluid, *self._point, self.orders)
         self._waves = np.cos(
             np.pi * np.outer(np.arange(WAVES), observed.frequency_hz / WAVES_HZ)
         ) / np.sqrt(WAVES)
+        self._kept = [twin.index[p.name] for p in fitted.parameters]
+        self._numbers = number_slopes(twin)
         self._root = None
         if covariance is not None:
-            kept = [twin.index[p.name] for p in fitted.parameters]
-            values, vectors = np.linalg.eigh(covariance[np.ix_(kept, kept)])
+            values, vectors = np.linalg.eigh(covariance)
             self._root = vectors * np.sqrt(np.clip(values, 0.0, None))
 
     @property
@@ -124,28 +134,25 @@ class SignalSource:
         pressure = np.empty((len(classes), count, sensors, len(self.orders)), complex)
         flow = np.empty((len(classes), count, 1, len(self.orders)), complex)
         for k in range(count):
-            theta = self._draw_theta(rng)
+            theta, numbers = self._draw_twin(rng)
             known = None
             if anchored:
                 known = flow_at_pump(self._line.response(theta=theta), self._healthy)
             for c, name in enumerate(classes):
-                change, gained = self._leak(leaks.get(name), areas[c, k], rng)
+                change, gained = self._leak(leaks.get(name), areas[c, k], numbers, rng)
                 moved = self._line.response(self._draw_drift(gained, rng), theta)
+                whole = self._flows.healthy(numbers) + change
                 pressure[c, k] = (
-                    self._simulated(moved, change, rng)
+                    self._smooth(self.misfit, sensors, rng) * moved * whole
                     if known is None
                     else self._anchored(*known, moved, change, rng)
                 )
-                flow[c, k] = self._smooth(self.misfit, 1, rng) * (self._flow + change)
+                flow[c, k] = self._smooth(self.misfit, 1, rng) * whole
         return RandomisedSignals(
             pressure=one_period(pressure, self._samples, self.orders),
             flow=one_period(flow, self._samples, self.orders),
             leak_area=areas,
         )
-
-    def _simulated(self, moved, change, rng) -> np.ndarray:
-        """Readings (S, F): all of the ripple is the twin's."""
-        return self._smooth(self.misfit, len(moved), rng) * moved * (self._flow + change)
 
     def _anchored(self, flow, rest, moved, change, rng) -> np.ndarray:
         """Readings (S, F): the measured healthy ripple, a flow (F,) at the pump and what it leaves
@@ -156,20 +163,26 @@ class SignalSource:
         own = self._smooth(SOURCE_DRIFT, 1, rng) * moved * flow + rest
         return own + self._smooth(self.misfit, len(moved), rng) * changed
 
-    def _leak(self, leak, area: float, rng) -> tuple[np.ndarray | float, float]:
-        """Change (F,) of the flow at a random piston, and that of the mean flow, relative."""
+    def _leak(self, leak, area: float, numbers, rng) -> tuple[np.ndarray | float, float]:
+        """Change (F,) of the flow at a random piston of the pump of these numbers, and that of the
+        mean flow, relative."""
         piston = rng.integers(self._pistons)
         if leak is None:
             return 0.0, 0.0
-        harmonics = leak.harmonics(area)
         turn = np.exp(2j * np.pi * self.orders * piston / self._pistons)
-        return harmonics[self.orders] * turn, harmonics[0].real / leak.mean
+        gained = leak.harmonics(area)[0].real / leak.mean
+        return self._flows.change(leak, area, numbers) * turn, gained
 
-    def _draw_theta(self, rng) -> np.ndarray:
+    def _draw_twin(self, rng) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates (P,) of the line and numbers (U,) of the pump, see `UncertainPump`."""
         theta = self._line.twin.theta
         if self._root is None:
-            return theta
-        return theta + self._root @ rng.standard_normal(len(theta))
+            return theta, np.zeros(len(NUMBERS))
+        moved = self._root @ rng.standard_normal(len(self._root))
+        numbers = self._numbers @ moved
+        if not self._numbers.any():
+            numbers = rng.standard_normal(len(NUMBERS))
+        return theta + moved[self._kept], numbers
 
     def _draw_drift(self, gained: float, rng) -> np.ndarray:
         """Drift (D,) of the line; an orifice is set anew, so that the load pressure is held."""

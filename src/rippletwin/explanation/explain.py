@@ -38,6 +38,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from threadpoolctl import threadpool_limits
+
 from rippletwin.case.model import Case, Rig
 from rippletwin.errors import InputError
 from rippletwin.explanation.checks.alarms import fit_each_observation, read_alarms
@@ -98,11 +100,13 @@ def explain(
             "none has state: healthy",
             "explaining needs at least one healthy recording",
         )
-    observations, early, late = observe_all(case, processes)
-    contradiction = find_contradictions(case.rig, case.healthy, observations, early, late)
-    explanation = explain_observations(
-        case.rig, observations, early, late, processes, progress, contradiction, draws
-    )
+    # Two threads round products of matrices otherwise than one, and so the verdict's last digits.
+    with threadpool_limits(1):
+        observations, early, late = observe_all(case, processes)
+        contradiction = find_contradictions(case.rig, case.healthy, observations, early, late)
+        explanation = explain_observations(
+            case.rig, observations, early, late, processes, progress, contradiction, draws
+        )
     return replace(explanation, warnings=case.warnings)
 
 

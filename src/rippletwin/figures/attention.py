@@ -156,7 +156,7 @@ def plot_claims(groups: Mapping[str, tuple[Sequence[str], np.ndarray]]) -> Figur
         ax.set_yticks(rows, labels, fontsize=6)
         ax.set_ylim(max(1, len(rows)) - 0.5, -0.5)
     fig.suptitle("Do these networks support the paper's claims?")
-    axes[-1].set_xlabel("difference of accuracy / % of the windows, 95 % interval over seeds")
+    axes[-1].set_xlabel("difference of accuracy / % of the windows, 95 % interval over recordings")
     style.legend_below(fig, axes[0])
     return fig
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
 
@@ -16,6 +17,7 @@ from rippletwin.learning.architectures import ARCHITECTURES, CLASSES
 from rippletwin.learning.markdown import markdown_table
 
 CELL = ["architecture", "dataset"]
+MOST_SUBSETS = 2**14  # of differences whose means are taken
 
 
 def recording_rows(answers: pd.DataFrame) -> pd.DataFrame:
@@ -65,6 +67,36 @@ def recording_cells(rows: pd.DataFrame) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(table)
+
+
+def recording_shares(rows: pd.DataFrame) -> pd.DataFrame:
+    """Share of the windows that are right, per cent, the mean over seeds: a row a recording, a
+    column a cell (architecture, dataset), NaN where the cell lacks the recording.
+
+    rows : ``recording_rows`` with columns architecture and dataset.
+    """
+    shares = rows.groupby(["recording", *CELL], sort=False).share.mean()
+    return 100.0 * shares.unstack(CELL)
+
+
+def paired_interval(differences: np.ndarray) -> tuple[float, float]:
+    """95 % interval of the mean of recordings of which these (R,) were drawn; NaN for five or less.
+
+    The means of all subsets of the differences part the line, and the mean lies in each part with
+    equal probability where differences are symmetric about it (Hartigan 1969, J. Am. Stat. Assoc.
+    64, 1303). So no spread of a few equal differences is taken for certainty.
+    """
+    count = len(differences)
+    if 2**count <= MOST_SUBSETS:
+        chosen = np.arange(1, 2**count)[:, None] >> np.arange(count) & 1
+    else:
+        chosen = np.random.default_rng(0).integers(0, 2, (MOST_SUBSETS - 1, count))
+    means = np.sort((chosen @ differences) / np.maximum(chosen.sum(axis=1), 1))
+    tail = int(0.025 * (len(means) + 1))
+    if not tail:
+        return float("nan"), float("nan")
+    low, high = means[[tail - 1, -tail]].round(9) + 0.0  # equal differences add up to zero
+    return float(low), float(high)
 
 
 def recording_table(rows: pd.DataFrame, datasets: Sequence[str]) -> str:
