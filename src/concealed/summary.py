@@ -44,8 +44,11 @@ class Rate:
 
 
 def percent(share: float) -> str:
-    """A share as a number of per cent: two digits, without any where it is 0 or 1."""
-    return f"{100 * share:.1f}" if 0 < share < 0.0995 else f"{100 * share:.0f}"
+    """A share as a number of per cent, with one decimal unless that is 0.
+
+    Without the decimal 97.6 % would reach a target of 98 %.
+    """
+    return f"{100 * share:.1f}".removesuffix(".0")
 
 
 def rate_of(outcomes: Iterable[bool]) -> Rate:

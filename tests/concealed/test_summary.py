@@ -52,7 +52,8 @@ def test_intervals_of_rates_are_exact():
     assert binom.sf(6, 20, low) == pytest.approx(0.025)
     assert binom.cdf(7, 20, high) == pytest.approx(0.025)
     assert rate_of([]).interval == (0.0, 1.0) and str(rate_of([])) == "no case"
-    assert str(rate_of([True, True])) == "100 % (16 to 100 %), 2 of 2"
+    assert str(rate_of([True, True])) == "100 % (15.8 to 100 %), 2 of 2"
+    assert str(Rate(82, 84)).startswith("97.6 % (")
     assert str(Rate(0, 104)) == "0 % (0 to 3.5 %), 0 of 104"
 
 
