@@ -16,20 +16,20 @@ POSITION_TOLERANCE = 0.01
 ACCEPTABLE_MISFIT = 0.05
 """Relative misfit above which calibration alone raises the alarm."""
 
+NO_ORACLE = {"log_evidence": None, "held_out": None, "usual": []}
 
-def score_case(
-    truth: dict, verdict: dict, baselines: dict, oracle_log_evidence: float | None = None
-) -> dict:
+
+def score_case(truth: dict, verdict: dict, baselines: dict, oracle: dict = NO_ORACLE) -> dict:
     """A flat row of one case.
 
     Arguments: `truth` is the content of the seal, `verdict` that of verdict.json, `baselines` the
-    result of `concealed.tool`, `oracle_log_evidence` that of `concealed.oracle`.
+    result of `concealed.tool`, `oracle` that of `concealed.oracle`.
 
     Keys of the row:
         kind, effects, change, noise, points, sensors, floor   from the truth; `effects` as text
         plain            change >= PLAIN_CHANGE
         mesh             estimated error of the recording's numerics, None for a linear line
-        oracle_log_evidence
+        oracle_log_evidence, oracle_held_out   of the fit begun from the truth, None without one
         verdict, named, sentence   from the verdict; `named` are its effects as text
         alarm            the verdict is not one of SILENT_VERDICTS
         effects_found    number of true effects that are named
@@ -73,7 +73,8 @@ def score_case(
         "floor": truth["floor"],
         "plain": truth["change"] >= PLAIN_CHANGE,
         "mesh": truth["mesh"],
-        "oracle_log_evidence": oracle_log_evidence,
+        "oracle_log_evidence": oracle["log_evidence"],
+        "oracle_held_out": oracle["held_out"],
         "verdict": verdict["verdict"],
         "named": " + ".join(f"{claim['name']} ({claim['element']})" for claim in named),
         "sentence": verdict["sentence"],

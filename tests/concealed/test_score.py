@@ -201,7 +201,7 @@ def test_what_a_row_takes_from_the_truth():
     assert not score_example(truth(change=0.99 * PLAIN_CHANGE), verdict("consistent"))["plain"]
     said = verdict("consistent")
     said["fit"]["before"]["in_sample"] = 0.6  # nominal 0.5
-    row = score_example(truth(), said, oracle_log_evidence=7.0)
+    row = score_example(truth(), said, log_evidence=7.0)
     assert row["absorbed"] == 0.0 and row["oracle_log_evidence"] == 7.0
     assert not row["alarm"] and row["seconds"] == 1.0
     assert score_example(truth(), verdict("unexplained"))["alarm"]

@@ -34,10 +34,10 @@ def rows():
     outside["effects"][0]["name"] = "resonator"
     right = verdict("named", claim("leak", conductance=(1.5, 2.5)))
     scored = [
-        score_example(none, verdict("consistent")),
+        score_example(none, verdict("consistent"), held_out=0.0166),
         score_example(none | {"kind": "off"}, verdict("named", claim("leak"))),
         score_example(truth(), verdict("consistent"), 2.0),
-        score_example(truth(sensors=3), right, 30.0),
+        score_example(truth(sensors=3), right, 30.0, 0.0168),
         score_example(pair_truth(), right, 40.0),
         score_example(outside, verdict("named", claim("leak"))),
         score_example(truth(kind="indistinguishable"), right, 30.0),
@@ -87,6 +87,15 @@ def test_established_effects_are_counted_over_all_kinds(rows):
     assert rates["Established effects: truly there"] == Rate(3, 5)
     large = "Single effects that change the ripple by 10 % or more: effect or its class named"
     assert rates[large] == Rate(1, 2)
+
+
+def test_scores_of_the_twin_are_against_the_truth_and_against_calibration(rows):
+    """The verdicts' 2 % of held-out data are 1.205 and 1.19 times those of the two fits begun from
+    the truth."""
+    rates = {score.what: score.rate for score in score_table(rows)}
+    like_truth = "Held-out misfit at most 1.2 times that of the fit begun from the truth"
+    assert rates[like_truth] == Rate(1, 2)
+    assert "above that" in circumstance(rows[0]) and "like that" in circumstance(rows[3])
 
 
 def test_bins_hold_every_case_once(rows):
