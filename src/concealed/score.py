@@ -34,6 +34,7 @@ def score_case(truth: dict, verdict: dict, baselines: dict, oracle: dict = NO_OR
         alarm            the verdict is not one of SILENT_VERDICTS
         effects_found    number of true effects that are named
         right            every true effect is named, and there is one
+        named_first      whether the first of `rank_effects` counts for a true effect
         wrong            named effects that count for no true effect, nor for nuisance physics that
                          is there, as text
         places_right     for each found effect, whether its place is right
@@ -60,6 +61,7 @@ def score_case(truth: dict, verdict: dict, baselines: dict, oracle: dict = NO_OR
         if claim is not None and is_place_right(effect, claim, truth["length"])
     ]
     right = [any(claim is each for each in [*claims, *there]) for claim in named]
+    ranked = rank_effects(verdict, oracle["usual"], true)
     wrong = [claim["name"] for claim, ok in zip(named, right) if not ok]
     fit = verdict["fit"]
     nominal, calibrated = baselines["nominal"], fit["before"]["in_sample"]
@@ -81,6 +83,7 @@ def score_case(truth: dict, verdict: dict, baselines: dict, oracle: dict = NO_OR
         "alarm": verdict["verdict"] not in SILENT_VERDICTS,
         "effects_found": len(found),
         "right": bool(true) and len(found) == len(true),
+        "named_first": bool(ranked) and any(ranked[0] is claim for claim in claims),
         "wrong": " + ".join(wrong),
         "places_right": [is_place_right(*pair, truth["length"]) for pair in found],
         "intervals_hold": [inside for pair in found for inside in intervals_hold(*pair)],
@@ -115,6 +118,40 @@ def named_effects(verdict: dict) -> list[dict]:
     if verdict["verdict"] not in ("named", "ambiguous"):
         return []
     return [e for e in verdict["effects"] if e.get("support", "established") == "established"]
+
+
+def rank_effects(verdict: dict, usual: Sequence[Sequence[str]], true: Sequence[dict]) -> list[dict]:
+    """The established effects of a verdict, most log evidence first.
+
+    Those of `usual`, pairs (name, place), are left out: nearly every line has them, so that they
+    are beside whatever is missing. They stay where one of the `true` effects is such. The evidence
+    is what is lost without the effect (`without[].evidence`), infinite where nothing fits without
+    it. Effects at shaft orders have none and come last.
+    """
+    expected = [
+        (name, place)
+        for name, place in usual
+        if not any(name == each["name"] and _is_at(place, each["element"]) for each in true)
+    ]
+    rows, evidence = list(verdict["without"]), {}
+    for k, effect in enumerate(verdict["effects"]):
+        own = [r for r in rows if r["effect"] == effect["name"]]
+        row = next((r for r in own if _is_at(r["place"], effect["element"])), None)
+        if row is None:
+            evidence[k] = -np.inf
+            continue
+        rows.remove(row)  # several of one name are in the same order in both lists
+        if (row["effect"], row["place"]) not in expected:
+            evidence[k] = np.inf if row["evidence"] is None else row["evidence"]
+    order = sorted(evidence, key=lambda k: -evidence[k])
+    established = named_effects(verdict)
+    ranked = [verdict["effects"][k] for k in order]
+    return [effect for effect in ranked if any(effect is each for each in established)]
+
+
+def _is_at(place: str, element: str) -> bool:
+    """Whether a place, as "source (volume)" or "position 2", is at an element."""
+    return f"{place} ".startswith(f"{element} ")
 
 
 def same_or_equivalent(name: str, other: str, classes: Sequence[set]) -> bool:

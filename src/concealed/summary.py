@@ -101,6 +101,8 @@ def score_table(rows: list[dict]) -> list[Score]:
               rate_of(row["right"] for row in singles if data_support_effects(row))),
         Score("Single effects that change the ripple by 10 % or more: effect or its class named",
               "at least 90 %", rate_of(row["right"] for row in large)),
+        Score("Single effects that change the ripple by 10 % or more: effect or its class named "
+              "first", "at least 90 %", rate_of(row["named_first"] for row in large)),
         Score("Plain single effects rightly named, two sensors: right place", "at least 80 %",
               places_right(2)),
         Score("Plain single effects rightly named, three sensors: right place", "at least 95 %",
