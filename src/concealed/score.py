@@ -16,6 +16,8 @@ POSITION_TOLERANCE = 0.01
 ACCEPTABLE_MISFIT = 0.05
 """Relative misfit above which calibration alone raises the alarm."""
 
+REMAINDER_TOLERANCE = 0.05  # of the line's length, between what remains and what is concealed
+
 NO_ORACLE = {"log_evidence": None, "held_out": None, "usual": []}
 
 
@@ -38,6 +40,8 @@ def score_case(truth: dict, verdict: dict, baselines: dict, oracle: dict = NO_OR
         wrong            named effects that count for no true effect, nor for nuisance physics that
                          is there, as text
         places_right     for each found effect, whether its place is right
+        remainder_right  for each true effect outside the library that has a place, whether what
+                         remains is there (`is_remainder_at`)
         intervals_hold   for each interval of a right effect, whether it holds the true value
         probabilities    pairs (stated probability, right) of the named effects that state one
         established      of each named effect, whether it is there
@@ -86,6 +90,11 @@ def score_case(truth: dict, verdict: dict, baselines: dict, oracle: dict = NO_OR
         "named_first": bool(ranked) and any(ranked[0] is claim for claim in claims),
         "wrong": " + ".join(wrong),
         "places_right": [is_place_right(*pair, truth["length"]) for pair in found],
+        "remainder_right": [
+            is_remainder_at(effect, verdict.get("remainder"), truth["length"])
+            for effect in true
+            if truth["kind"] == "outside" and effect["position"] is not None
+        ],
         "intervals_hold": [inside for pair in found for inside in intervals_hold(*pair)],
         "probabilities": [
             (claim["probability"], ok)
@@ -152,6 +161,23 @@ def rank_effects(verdict: dict, usual: Sequence[Sequence[str]], true: Sequence[d
 def _is_at(place: str, element: str) -> bool:
     """Whether a place, as "source (volume)" or "position 2", is at an element."""
     return f"{place} ".startswith(f"{element} ")
+
+
+def is_remainder_at(effect: dict, remainder: dict | None, length: float) -> bool:
+    """Whether what remains is within REMAINDER_TOLERANCE of an effect's actual or nominal position.
+
+    What remains is at the position of the network that stands in for it, or in the middle of its
+    interval. `length` is the line's, m.
+    """
+    if remainder is None or remainder["position_m"] is None:
+        return False
+    network = remainder["stand_in"]
+    if network is None:
+        place = float(np.mean(remainder["position_m"]))
+    else:
+        place = network["parameters"]["position"]["value"]
+    distances = [abs(place - effect[key]) for key in ("position", "position_nominal")]
+    return min(distances) <= REMAINDER_TOLERANCE * length
 
 
 def same_or_equivalent(name: str, other: str, classes: Sequence[set]) -> bool:

@@ -286,3 +286,33 @@ def test_named_first_needs_an_established_name():
     assert not score_example(truth(effects=[spread]), with_evidence(both, sensor_gain=9.0))[
         "named_first"
     ]
+
+
+@pytest.mark.parametrize(
+    ("interval", "network", "right"),
+    [
+        ((2.0, 4.2), None, True),  # middle 3.1, drawn there
+        ((2.0, 3.4), None, False),  # middle 2.7: 5 % of 5 m are 0.25
+        ((2.0, 4.2), 3.4, False),  # 0.3 from the drawing
+        ((0.0, 1.0), 2.8, True),
+        (None, None, False),  # of no single element
+    ],
+)
+def test_place_of_a_remainder(interval, network, right):
+    """What the library does not have is at 3.0 m, drawn at 3.1 m. A network that stands in says
+    where the remainder is, else the middle of its interval."""
+    stand_in = network and {"parameters": {"position": {"value": network}}}
+    remainder = {"position_m": interval, "stand_in": stand_in}
+    hidden = truth(kind="outside", effects=[effect("resonator")])
+    row = score_example(hidden, verdict("unexplained") | {"remainder": remainder})
+    assert row["remainder_right"] == [right]
+
+
+def test_a_remainder_counts_only_for_what_the_library_has_not_and_has_a_place():
+    """A leak is in the library; a liquid is everywhere; where nothing remains nothing is right."""
+    liquid = effect("stiffening_liquid") | {"position": None}
+    said = verdict("named") | {"remainder": None}
+    assert score_example(truth(), said)["remainder_right"] == []
+    assert score_example(truth(kind="outside", effects=[liquid]), said)["remainder_right"] == []
+    hidden = truth(kind="outside", effects=[effect("resonator")])
+    assert score_example(hidden, said)["remainder_right"] == [False]
