@@ -46,6 +46,18 @@ CONSTANTS = {
         "explanation.thresholds",
         "MUCH_MODEL_ERROR",
     ),
+    "values of a parameter from a part of the data and from all": (
+        "explanation.thresholds",
+        "MAX_DISAGREEMENT",
+    ),
+    "gain of a step above which a fit has not converged": (
+        "calibration.laplace",
+        "UNCONVERGED_GAIN",
+    ),
+    "error of the ripple up to which a fit leaves nothing": (
+        "explanation.thresholds",
+        "GOOD_RIPPLE_ERROR",
+    ),
     "gain of a sensor": ("explanation.checks.sensor_tolerance", "GAIN_SD"),
     "lag of a sensor": ("explanation.checks.sensor_tolerance", "LAG_SD"),
     "priors of the free data sheet": ("explanation.checks.prior_sensitivity", "WIDENING"),

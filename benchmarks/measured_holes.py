@@ -1,9 +1,10 @@
 """Missing physics of a measured air tube with side holes, and its error on a run not fitted.
 
-    python benchmarks/measured_holes.py MEASURED FOLDER
+    python benchmarks/measured_holes.py MEASURED FOLDER [--without EFFECT ...]
 
 MEASURED holds three runs of each state, STATE_1.txt to STATE_3.txt, of which two are fitted. FOLDER
-gets a case of each state, and verdict.json, twin.json and figures of it.
+gets a case of each state, and verdict.json, twin.json and figures of it. An effect that the library
+lacks must turn up in what remains: its place and law are printed.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from rippletwin.explanation.explain import explain
 from rippletwin.explanation.verdict.verdict_file import write_verdict
 from rippletwin.figures.explanation import draw
 from rippletwin.spectra.observation import observe
+from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.forward_model import reflection
 
 DATA_SHEET = Path(__file__).resolve().parent.parent / "resources" / "hole_tube" / "rig.yaml"
@@ -44,13 +46,44 @@ def unseen_run(measured: Path, state: str, run: int, seen: Case, folder: Path):
     return observe(recording, seen.rig)
 
 
+def describe_remainder(remainder: dict | None) -> str:
+    """What remains beside a verdict: its element and place, its law, and what stands in for it."""
+    if remainder is None:
+        return "nothing remains"
+    networks = []
+    if (first := remainder["stand_in"]) is not None:
+        law = {"element": remainder["element"], "follows": remainder["law"]}
+        networks = [first | law, *first["beside"]]
+    stand_ins = [
+        f"{each['form']} at {1e3 * each['parameters']['position']['value']:.1f} mm, "
+        f"{each['element']}, like {each['follows']}"
+        for each in networks
+    ]
+    extent = remainder["position_m"] or []
+    return (
+        f"{remainder['model_error']:.1%} of the reading remains; {remainder['element']}, "
+        f"{' to '.join(f'{1e3 * x:.1f}' for x in extent)} mm, like {remainder['law']}; in the twin "
+        + ("; ".join(stand_ins) or "nothing stands in for it")
+    )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("measured", type=Path)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--states", nargs="*", default=STATES, metavar="STATE")
+    parser.add_argument(
+        "--without",
+        nargs="*",
+        default=(),
+        choices=list(EFFECTS),
+        metavar="EFFECT",
+        help="effects to take out of the library",
+    )
     parser.add_argument("--processes", type=int, default=2)
     arguments = parser.parse_args()
+    for name in arguments.without:
+        EFFECTS.pop(name, None)
     print("| state | runs differ by | calibrated | explained | error on run 3 | effects |")
     print("|---|---|---|---|---|---|")
     sentences = []
@@ -80,7 +113,10 @@ def main() -> None:
         print("| " + " | ".join(cells) + " |", flush=True)
         result = write_verdict(explanation, folder / "explained")
         draw(explanation, folder / "explained", processes=arguments.processes)
-        sentences.append(f"{state}: {result['verdict']}: {result['sentence']}")
+        sentences.append(
+            f"{state}: {result['verdict']}: {result['sentence']}\n"
+            f"{state}: {describe_remainder(result['remainder'])}"
+        )
     print("\n" + "\n\n".join(sentences))
 
 

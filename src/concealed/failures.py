@@ -1,6 +1,6 @@
 """Cases in which the tool falls short: in what, and what the data say of the cause."""
 
-from concealed.summary import at_floor, data_support_effects
+from concealed.summary import data_support_effects, predicts_like_truth
 
 
 def failure(row: dict) -> str | None:
@@ -33,8 +33,11 @@ def circumstance(row: dict) -> str:
     """
     if row["verdict"] == "crashed":
         return "the tool ended with an error"
-    fit = "held-out misfit at the floor" if at_floor(row) else "held-out misfit above the floor"
-    if row["oracle_log_evidence"] is None:
-        return fit
-    support = "support" if data_support_effects(row) else "do not support"
-    return f"data {support} the true effects; {fit}"
+    said = []
+    if row["oracle_log_evidence"] is not None:
+        support = "support" if data_support_effects(row) else "do not support"
+        said.append(f"data {support} the true effects")
+    if row["oracle_held_out"] is not None:
+        far = "like that" if predicts_like_truth(row) else "above that"
+        said.append(f"held-out misfit {far} of the fit begun from the truth")
+    return "; ".join(said) or "-"

@@ -1,6 +1,7 @@
-"""Log evidence of the true effects, fitted from their true values: an upper reference for a search.
+"""A fit begun from the truth, after all verdicts are committed: an upper reference for a search.
 
-It separates cases in which the search failed from cases in which the data do not hold the effect.
+It separates cases in which the search failed from cases in which the data do not hold the effect,
+and says how well data that are left out can be predicted.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,50 +12,58 @@ from rippletwin.calibration.fit import Fit, Hypothesis
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.shaft_angles import align_shaft_angles
 from rippletwin.case.load import load_case
+from rippletwin.explanation.checks.cross_validation import Halves, score_held_out
 from rippletwin.explanation.fit_jobs import Continuation, FitJob, FromTheta, Workers
 from rippletwin.explanation.fit_starts import transfer_theta
 from rippletwin.explanation.search.stepwise_search import SHAFT_ORDER_EFFECTS
-from rippletwin.explanation.stages.preparation import observe_whole_and_halves, prepare_base
-from rippletwin.twin.effects.library import candidates
+from rippletwin.explanation.stages.preparation import observe_all, select_fitted_as
+from rippletwin.explanation.stages.staged_search import prepare_stage
+from rippletwin.twin.effects.base import Effect, Place
+from rippletwin.twin.effects.library import candidates, next_instance
 from rippletwin.twin.parameters import coordinates
+from rippletwin.twin.pump_line_coupling import couple_pump_to_line
 from rippletwin.twin.twin import Twin
 
 
-def oracle_log_evidence(case_folder: str | Path, truth: dict) -> float | None:
-    """Log evidence that the true effects add in a case; None without an effect, and as stated by
-    `log_evidence_of_effects`. `truth` is the content of the case's seal.
+def fit_from_truth(case_folder: str | Path, truth: dict) -> dict:
+    """What a fit begun from the truth reaches in a case. `truth` is the content of its seal.
+
+    log_evidence  that the true effects add, see `log_evidence_of`
+    held_out      misfit of data that were left out, as verdict.json states it of the explanation:
+                  `held_out_misfit`
+    usual         [name, place] of the library's effects that are usual in the rig (`Effect.usual`)
+
+    Without an effect `log_evidence` is None; both are, where `fit_effects` is.
     """
-    if not truth["effects"]:
-        return None
     case = load_case(case_folder, states={"healthy"})
-    base, observations = prepare_base(
-        case.rig, [observe_whole_and_halves(each, case.rig)[0] for each in case.healthy]
-    )
+    whole, early, late = observe_all(case, processes=1)
+    stage = prepare_stage(case.rig, whole)
+    workers = Workers(stage.base, stage.observations)
+    usual = [[e.name, str(p)] for e, p in candidates(case.rig) if e.usual(case.rig, p)]
     rig = truth["seal"]
     line = {"viscosity": rig["fluid"]["kinematic_viscosity"]}
     for k, segment in enumerate(rig["line"]["segments"], 1):
         line |= {f"{name}[{k}]": segment[name] for name in ("wave_speed", "diameter", "length")}
-    return log_evidence_of_effects(base, observations, truth["effects"], line)
+    fit = fit_effects(workers, truth["effects"], line)
+    if fit is None:
+        return {"log_evidence": None, "held_out": None, "usual": usual}
+    fit_all = add_nuisance(workers, fit, truth.get("nuisance", []))
+    return {
+        "log_evidence": log_evidence_of(workers, fit) if truth["effects"] else None,
+        "held_out": held_out_misfit(workers, fit_all, early, late),
+        "usual": usual,
+    }
 
 
-def log_evidence_of_effects(
-    base: Twin, observations: Sequence, effects: list[dict], line: Mapping[str, float]
-) -> float | None:
-    """Log evidence that the true `effects` add to the twin `base` of the observations.
+def fit_effects(workers: Workers, effects: Sequence[dict], line: Mapping[str, float]) -> Fit | None:
+    """The fit with the true `effects`; None where one is not in the library or acts at shaft orders
+    alone.
 
-    Both twins are fitted as `explain` fits them. The fit with the effects starts from their true
-    strengths and places, once on the nominal line and once on the true `line` (parameter name ->
-    value, SI units). The fit without effects also starts from the line of the better of these.
-    Below `MIN_LOG_BAYES_FACTOR` a search cannot distinguish the effects from chance; above it, a
-    search that finds nothing has failed. None where an effect is not in the library or acts at
-    shaft orders alone.
+    It starts from their true strengths and places, once on the nominal line and once on the true
+    `line` (parameter name -> value, SI units). The greater evidence wins.
     """
-    pool = Workers(base, observations)
-    library = [c for c in candidates(base.rig) if c[0].name not in SHAFT_ORDER_EFFECTS]
-    choices = [
-        [c for c in library if (c[0].name, c[1].element) == (true["name"], true["element"])]
-        for true in effects
-    ]
+    base = workers.base
+    choices = [_forms(base.rig, true) for true in effects]
     if not all(choices):
         return None
     jobs = []
@@ -62,16 +71,76 @@ def log_evidence_of_effects(
         twin, values = base.with_(effects=hypothesis), _true_values(base.rig, hypothesis, effects)
         theta = coordinates(twin.parameters, {**line, **values})
         start = {name: theta[twin.index[name]] for name in values}
-        aligned = align_shaft_angles(Posterior(twin, observations), theta)[1]
+        aligned = align_shaft_angles(Posterior(twin, workers.observations), theta)[1]
         jobs.append(FitJob(hypothesis, Continuation((start,))))
         jobs.append(FitJob(hypothesis, FromTheta(aligned)))
-    with_effects = _best(pool.fit(jobs))
-    from_same_line = FitJob((), FromTheta(transfer_theta(with_effects, (), base)))
-    without = _best(pool.fit([FitJob(()), from_same_line]))
-    return with_effects.evidence - without.evidence
+    return _best(workers.fit(jobs))
 
 
-def _true_values(rig, hypothesis: Hypothesis, effects: list[dict]) -> dict[str, float]:
+def log_evidence_of(workers: Workers, with_effects: Fit) -> float:
+    """Log evidence that the effects of a fit add to the line.
+
+    The fit without them starts from nominal values and from the line of the fit with them. Below
+    `MIN_LOG_BAYES_FACTOR` a search cannot distinguish the effects from chance; above it, a search
+    that finds nothing has failed.
+    """
+    from_same_line = FitJob((), FromTheta(transfer_theta(with_effects, (), workers.base)))
+    without = _best(workers.fit([FitJob(()), from_same_line]))
+    return float(with_effects.evidence - without.evidence)
+
+
+def add_nuisance(workers: Workers, fit: Fit, nuisance: Sequence[dict]) -> Fit:
+    """The fit begun from another one with the nuisance physics that the library has beside its
+    effects.
+
+    The truth states no numbers of it but places: its parameters start from their prior medians.
+    """
+    rig, hypothesis, values = workers.base.rig, fit.hypothesis, {}
+    for true in nuisance:
+        forms = _forms(rig, true)
+        added = next_instance(forms[0], hypothesis) if forms else None
+        if added is not None:
+            hypothesis = (*hypothesis, added)
+            values |= _true_values(rig, [added], [true])
+    twin = workers.base.with_(effects=hypothesis)
+    theta = transfer_theta(fit, hypothesis, workers.base)
+    stated = coordinates(twin.parameters, values)
+    for name in values:
+        theta[twin.index[name]] = stated[twin.index[name]]
+    return workers.fit([FitJob(hypothesis, FromTheta(theta))])[0]
+
+
+def held_out_misfit(workers: Workers, fit: Fit, early: Sequence, late: Sequence) -> float:
+    """Misfit of data that were left out, relative, by the folds of `explain`.
+
+    A simulated pump responds to the line first, as in `explain`. `early` and `late` are the
+    observations of the halves of periodic recordings.
+    """
+    coupled = couple_pump_to_line(fit.twin, workers.observations)
+    if coupled is not None:
+        rig = workers.base.rig
+        workers = Workers(Twin(rig, coupled, uncertain_pump=True, changing_state=True), coupled)
+        theta = transfer_theta(fit, fit.hypothesis, workers.base)
+        (fit,) = workers.fit([FitJob(fit.hypothesis, FromTheta(theta))])
+    data = workers.observations
+    halves: Halves | None = None
+    if len(data) == 1 and late:
+        (first,), (second,) = (select_fitted_as(h, fit.twin.rig, data) for h in (early, late))
+        halves = first, second
+    return float(score_held_out(workers, fit, halves).misfit)
+
+
+def _forms(rig, true: dict) -> list[tuple[Effect, Place]]:
+    """The forms in which the library has a true effect, at its element; none at shaft orders."""
+    return [
+        (effect, place)
+        for effect, place in candidates(rig)
+        if effect.name not in SHAFT_ORDER_EFFECTS
+        and (effect.name, place.element) == (true["name"], true["element"])
+    ]
+
+
+def _true_values(rig, hypothesis: Hypothesis, effects: Sequence[dict]) -> dict[str, float]:
     """True parameters of the effects by name; positions are those on the drawing, m."""
     values = {}
     for (effect, place), true in zip(hypothesis, effects, strict=True):

@@ -110,12 +110,15 @@ def _terms() -> list[str]:
         f"*Plain*: a change of {100 * PLAIN_CHANGE:.0f} % or more.",
         "* *Oracle log evidence*: of the true effects, fitted from their true values. The data "
         f"*support* an effect if it is {MIN_LOG_BAYES_FACTOR:.0f} or more, the threshold of the "
-        "tool.",
+        "tool. *Held out, from the truth*: misfit of data left out of the fit that begins from the "
+        "truth.",
+        "* *Named first*: of the established effects that are not usual, the one whose loss costs "
+        "most log evidence.",
         "* *Misfit*: relative, of the whole data, if not held out. *Calibrated*: the least that "
         "calibration reaches without an effect. *Absorbed*: 1 - calibrated/nominal. *Corrected*: "
         "with the effects of the verdict.",
-        "* *Floor*: misfit that the error of the nominal flow ripple makes. A misfit is *at the "
-        f"floor* up to {summary.FLOOR_FACTOR} times it.",
+        "* *Floor*: misfit that the true line has with the nominal flow ripple. The corrected twin "
+        "corrects the ripple and may misfit less.",
         "",
     ]
 
@@ -144,13 +147,14 @@ def _probabilities(rows: list[dict]) -> list[str]:
 
 def _misfits(rows: list[dict]) -> list[str]:
     def median(name: str, kinds: tuple[str, ...]) -> str:
-        values = [row[name] for row in rows if row["kind"] in kinds]
+        values = [row[name] for row in rows if row["kind"] in kinds and row[name] is not None]
         return _percent(np.nanmedian(values), 2) if np.any(np.isfinite(values)) else "-"
 
     columns = {
         "misfit_nominal": "nominal", "misfit_calibrated": "calibrated", "absorbed": "absorbed",
         "misfit_corrected": "corrected", "held_out_calibrated": "held out, calibrated",
-        "held_out_corrected": "held out, corrected", "floor": "floor",
+        "held_out_corrected": "held out, corrected", "oracle_held_out": "held out, from the truth",
+        "floor": "floor",
     }  # fmt: skip
     return [
         "Medians over the cases.",
@@ -170,13 +174,13 @@ def _failures(rows: list[dict]) -> list[str]:
     return [
         *_table(
             ("case", "failure", "true effects", "named", "change", "oracle log evidence",
-             "cause by the data", "held out, corrected", "floor", "points", "sensors",
-             "noise, Pa"),
+             "cause by the data", "held out, corrected", "held out, from the truth", "points",
+             "sensors", "noise, Pa"),
             [
                 (
                     str(row["case"]), what, row["effects"] or "-", row["named"] or "-",
                     _percent(row['change'], 1), _log_evidence(row), circumstance(row),
-                    _percent(row['held_out_corrected'], 2), _percent(row['floor'], 2),
+                    _percent(row['held_out_corrected'], 2), _percent(row['oracle_held_out'], 2),
                     str(row["points"]), str(row["sensors"]), f"{row['noise']:.0f}",
                 )
                 for row, what in failed
@@ -196,14 +200,14 @@ def _cases(rows: list[dict]) -> list[str]:
     return _table(
         ("case", "kind", "true effects", "change", "oracle log evidence", "verdict", "named",
          "failure", "nominal", "calibrated", "absorbed", "corrected", "held out, corrected",
-         "floor"),
+         "held out, from the truth"),
         [
             (
                 str(row["case"]), row["kind"], row["effects"] or "-", _percent(row['change'], 1),
                 _log_evidence(row), row["verdict"], row["named"] or "-", failure(row) or "-",
                 _percent(row['misfit_nominal'], 1), _percent(row['misfit_calibrated'], 2),
                 _percent(row['absorbed'], 0), _percent(row['misfit_corrected'], 2),
-                _percent(row['held_out_corrected'], 2), _percent(row['floor'], 2),
+                _percent(row['held_out_corrected'], 2), _percent(row['oracle_held_out'], 2),
             )
             for row in rows
         ],
@@ -227,8 +231,8 @@ def _log_evidence(row: dict) -> str:
     return "-" if value is None else f"{value:.0f}"
 
 
-def _percent(share: float, digits: int) -> str:
-    return f"{100 * share:.{digits}f} %"
+def _percent(share: float | None, digits: int) -> str:
+    return "-" if share is None else f"{100 * share:.{digits}f} %"
 
 
 def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> list[str]:

@@ -16,27 +16,32 @@ POSITION_TOLERANCE = 0.01
 ACCEPTABLE_MISFIT = 0.05
 """Relative misfit above which calibration alone raises the alarm."""
 
+REMAINDER_TOLERANCE = 0.05  # of the line's length, between what remains and what is concealed
 
-def score_case(
-    truth: dict, verdict: dict, baselines: dict, oracle_log_evidence: float | None = None
-) -> dict:
+NO_ORACLE = {"log_evidence": None, "held_out": None, "usual": []}
+
+
+def score_case(truth: dict, verdict: dict, baselines: dict, oracle: dict = NO_ORACLE) -> dict:
     """A flat row of one case.
 
     Arguments: `truth` is the content of the seal, `verdict` that of verdict.json, `baselines` the
-    result of `concealed.tool`, `oracle_log_evidence` that of `concealed.oracle`.
+    result of `concealed.tool`, `oracle` that of `concealed.oracle`.
 
     Keys of the row:
         kind, effects, change, noise, points, sensors, floor   from the truth; `effects` as text
         plain            change >= PLAIN_CHANGE
         mesh             estimated error of the recording's numerics, None for a linear line
-        oracle_log_evidence
+        oracle_log_evidence, oracle_held_out   of the fit begun from the truth, None without one
         verdict, named, sentence   from the verdict; `named` are its effects as text
         alarm            the verdict is not one of SILENT_VERDICTS
         effects_found    number of true effects that are named
         right            every true effect is named, and there is one
+        named_first      whether the first of `rank_effects` counts for a true effect
         wrong            named effects that count for no true effect, nor for nuisance physics that
                          is there, as text
         places_right     for each found effect, whether its place is right
+        remainder_right  for each true effect outside the library that has a place, whether what
+                         remains is there (`is_remainder_at`)
         intervals_hold   for each interval of a right effect, whether it holds the true value
         probabilities    pairs (stated probability, right) of the named effects that state one
         established      of each named effect, whether it is there
@@ -60,6 +65,7 @@ def score_case(
         if claim is not None and is_place_right(effect, claim, truth["length"])
     ]
     right = [any(claim is each for each in [*claims, *there]) for claim in named]
+    ranked = rank_effects(verdict, oracle["usual"], true)
     wrong = [claim["name"] for claim, ok in zip(named, right) if not ok]
     fit = verdict["fit"]
     nominal, calibrated = baselines["nominal"], fit["before"]["in_sample"]
@@ -73,15 +79,22 @@ def score_case(
         "floor": truth["floor"],
         "plain": truth["change"] >= PLAIN_CHANGE,
         "mesh": truth["mesh"],
-        "oracle_log_evidence": oracle_log_evidence,
+        "oracle_log_evidence": oracle["log_evidence"],
+        "oracle_held_out": oracle["held_out"],
         "verdict": verdict["verdict"],
         "named": " + ".join(f"{claim['name']} ({claim['element']})" for claim in named),
         "sentence": verdict["sentence"],
         "alarm": verdict["verdict"] not in SILENT_VERDICTS,
         "effects_found": len(found),
         "right": bool(true) and len(found) == len(true),
+        "named_first": bool(ranked) and any(ranked[0] is claim for claim in claims),
         "wrong": " + ".join(wrong),
         "places_right": [is_place_right(*pair, truth["length"]) for pair in found],
+        "remainder_right": [
+            is_remainder_at(effect, verdict.get("remainder"), truth["length"])
+            for effect in true
+            if truth["kind"] == "outside" and effect["position"] is not None
+        ],
         "intervals_hold": [inside for pair in found for inside in intervals_hold(*pair)],
         "probabilities": [
             (claim["probability"], ok)
@@ -114,6 +127,57 @@ def named_effects(verdict: dict) -> list[dict]:
     if verdict["verdict"] not in ("named", "ambiguous"):
         return []
     return [e for e in verdict["effects"] if e.get("support", "established") == "established"]
+
+
+def rank_effects(verdict: dict, usual: Sequence[Sequence[str]], true: Sequence[dict]) -> list[dict]:
+    """The established effects of a verdict, most log evidence first.
+
+    Those of `usual`, pairs (name, place), are left out: nearly every line has them, so that they
+    are beside whatever is missing. They stay where one of the `true` effects is such. The evidence
+    is what is lost without the effect (`without[].evidence`), infinite where nothing fits without
+    it. Effects at shaft orders have none and come last.
+    """
+    expected = [
+        (name, place)
+        for name, place in usual
+        if not any(name == each["name"] and _is_at(place, each["element"]) for each in true)
+    ]
+    rows, evidence = list(verdict["without"]), {}
+    for k, effect in enumerate(verdict["effects"]):
+        own = [r for r in rows if r["effect"] == effect["name"]]
+        row = next((r for r in own if _is_at(r["place"], effect["element"])), None)
+        if row is None:
+            evidence[k] = -np.inf
+            continue
+        rows.remove(row)  # several of one name are in the same order in both lists
+        if (row["effect"], row["place"]) not in expected:
+            evidence[k] = np.inf if row["evidence"] is None else row["evidence"]
+    order = sorted(evidence, key=lambda k: -evidence[k])
+    established = named_effects(verdict)
+    ranked = [verdict["effects"][k] for k in order]
+    return [effect for effect in ranked if any(effect is each for each in established)]
+
+
+def _is_at(place: str, element: str) -> bool:
+    """Whether a place, as "source (volume)" or "position 2", is at an element."""
+    return f"{place} ".startswith(f"{element} ")
+
+
+def is_remainder_at(effect: dict, remainder: dict | None, length: float) -> bool:
+    """Whether what remains is within REMAINDER_TOLERANCE of an effect's actual or nominal position.
+
+    What remains is at the position of the network that stands in for it, or in the middle of its
+    interval. `length` is the line's, m.
+    """
+    if remainder is None or remainder["position_m"] is None:
+        return False
+    network = remainder["stand_in"]
+    if network is None:
+        place = float(np.mean(remainder["position_m"]))
+    else:
+        place = network["parameters"]["position"]["value"]
+    distances = [abs(place - effect[key]) for key in ("position", "position_nominal")]
+    return min(distances) <= REMAINDER_TOLERANCE * length
 
 
 def same_or_equivalent(name: str, other: str, classes: Sequence[set]) -> bool:

@@ -98,6 +98,18 @@ def test_state_space_is_the_twins_line(exported):
     assert max(data["relative_error"]) < 2e-3
 
 
+def test_a_band_limits_spectrum_and_ripple(tmp_path):
+    """Only shaft orders between 400 and 1000 Hz are written, and the ripple is made of them: a tone
+    of 150 Hz is not in it."""
+    write_case(tmp_path, sheet())
+    band = ["--min-frequency", "400", "--max-frequency", "1000"]
+    assert main(["export", str(tmp_path), "--out", str(tmp_path / "out"), *band]) == 0
+    orders = columns(tmp_path / "out/healthy_0_spectrum.csv")["order"]
+    assert orders[0] in (24, 25) and orders[-1] in (59, 60)
+    ripple = columns(tmp_path / "out/healthy_0_ripple.csv")["p1"]
+    assert abs(np.fft.rfft(ripple)[9]) < 1e-6 * abs(np.fft.rfft(ripple)[27])
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

@@ -16,6 +16,7 @@ from paths import ROOT
 from rippletwin.cli import main
 from rippletwin.cli.program import COMMANDS
 from rippletwin.cli.progress import progress_bars
+from rippletwin.errors import InputError
 
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT / "src"), "OMP_NUM_THREADS": "1"}
 
@@ -82,13 +83,29 @@ def test_folder_that_may_not_be_written(capsys, command):
     assert "not allowed to write" in capsys.readouterr().err
 
 
-def test_frequency_below_the_first_piston_harmonic(tmp_path, capsys):
-    """10 Hz leaves nothing of a pump at 150 Hz; told before the fit."""
+@pytest.mark.parametrize("band", [["--max-frequency", "10"], ["--min-frequency", "4990"]])
+def test_a_band_without_a_piston_harmonic(tmp_path, capsys, band):
+    """Of a pump at 150 Hz nothing is left below 10 Hz, nor between 4990 Hz and the usual end of
+    5 kHz; told before the fit."""
     write_case(tmp_path, sheet())
-    command = ["calibrate", str(tmp_path), "--out", str(tmp_path / "out"), "--max-frequency", "10"]
-    assert main(command) == 2
+    assert main(["calibrate", str(tmp_path), "--out", str(tmp_path / "out"), *band]) == 2
     told = capsys.readouterr()
-    assert "lowest frequency is 150" in told.err and told.out == ""
+    assert "no frequency of the recording is between them" in told.err and told.out == ""
+
+
+def test_the_band_of_the_command_line_is_what_calibrate_fits(tmp_path, monkeypatch):
+    """Of harmonics 150 Hz apart those between 400 and 1000 Hz reach the fit, and no other."""
+    write_case(tmp_path, sheet())
+    fitted = []
+
+    def stop(twin, observations, **options):
+        fitted.extend(observations)
+        raise InputError("stub", "fit", "not made", "None")
+
+    monkeypatch.setattr("rippletwin.calibration.calibrate_case.calibrate", stop)
+    band = ["--min-frequency", "400", "--max-frequency", "1000"]
+    assert main(["calibrate", str(tmp_path), "--out", str(tmp_path / "out"), *band]) == 2
+    assert fitted[0].orders.tolist() == [27, 36, 45, 54]
 
 
 def test_every_fault_is_a_line(tmp_path, capsys):

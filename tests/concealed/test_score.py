@@ -201,7 +201,7 @@ def test_what_a_row_takes_from_the_truth():
     assert not score_example(truth(change=0.99 * PLAIN_CHANGE), verdict("consistent"))["plain"]
     said = verdict("consistent")
     said["fit"]["before"]["in_sample"] = 0.6  # nominal 0.5
-    row = score_example(truth(), said, oracle_log_evidence=7.0)
+    row = score_example(truth(), said, log_evidence=7.0)
     assert row["absorbed"] == 0.0 and row["oracle_log_evidence"] == 7.0
     assert not row["alarm"] and row["seconds"] == 1.0
     assert score_example(truth(), verdict("unexplained"))["alarm"]
@@ -241,3 +241,78 @@ def test_an_interval_at_another_element_is_not_compared():
         said = claim("sensor_gain", gain_error=(0.05, 0.2)) | {"element": element}
         said["parameters"].pop("position", None)
         assert intervals_hold(true, said) == held
+
+
+FRICTION = claim("unsteady_friction", "line", None)
+GAIN = claim("sensor_gain", "sensor p1", None)
+
+
+def with_evidence(said, **evidence):
+    """The verdict `said`; without an effect of `evidence` so much log evidence is lost."""
+    places = {"unsteady_friction": "line", "sensor_gain": "sensor p1", "leak": "position 2"}
+    rows = [{"effect": e, "place": places[e], "evidence": x} for e, x in evidence.items()]
+    return said | {"without": rows}
+
+
+@pytest.mark.parametrize(
+    ("evidence", "first"),
+    [
+        ({"unsteady_friction": 90.0, "sensor_gain": 9.0, "leak": 20.0}, True),
+        ({"unsteady_friction": 90.0, "sensor_gain": 21.0, "leak": 20.0}, False),
+        ({"unsteady_friction": 90.0, "sensor_gain": 21.0, "leak": None}, True),
+    ],
+)
+def test_named_first_is_what_has_most_evidence_beside_usual_effects(evidence, first):
+    """A leak is concealed. Usual friction may have more evidence, a sensor's gain may not; a leak
+    without which nothing fits has most. It is named, at its place, in all three."""
+    said = with_evidence(verdict("named", FRICTION, GAIN, claim("leak")), **evidence)
+    row = score_example(truth(), said, usual=[["unsteady_friction", "line"]])
+    assert row["right"] and row["named_first"] is first
+
+
+def test_named_first_needs_an_established_name():
+    """A leak that is supported only is not named, whatever its evidence; where the usual effect is
+    the concealed one it is ranked; an effect at a shaft order, without evidence, comes last."""
+    usual = [["unsteady_friction", "line"]]
+    supported = with_evidence(
+        verdict("named", GAIN, claim("leak") | {"support": "supported"}), leak=20.0, sensor_gain=9.0
+    )
+    assert not score_example(truth(), supported, usual=usual)["named_first"]
+    friction = effect("unsteady_friction") | {"element": "line", "position": None}
+    said = with_evidence(verdict("named", GAIN, FRICTION), unsteady_friction=30.0, sensor_gain=9.0)
+    assert score_example(truth(effects=[friction]), said, usual=usual)["named_first"]
+    spread = effect("piston_spread") | {"element": "source", "position": None}
+    both = verdict("named", claim("piston_spread", "source", None), GAIN)
+    assert not score_example(truth(effects=[spread]), with_evidence(both, sensor_gain=9.0))[
+        "named_first"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("interval", "network", "right"),
+    [
+        ((2.0, 4.2), None, True),  # middle 3.1, drawn there
+        ((2.0, 3.4), None, False),  # middle 2.7: 5 % of 5 m are 0.25
+        ((2.0, 4.2), 3.4, False),  # 0.3 from the drawing
+        ((0.0, 1.0), 2.8, True),
+        (None, None, False),  # of no single element
+    ],
+)
+def test_place_of_a_remainder(interval, network, right):
+    """What the library does not have is at 3.0 m, drawn at 3.1 m. A network that stands in says
+    where the remainder is, else the middle of its interval."""
+    stand_in = network and {"parameters": {"position": {"value": network}}}
+    remainder = {"position_m": interval, "stand_in": stand_in}
+    hidden = truth(kind="outside", effects=[effect("resonator")])
+    row = score_example(hidden, verdict("unexplained") | {"remainder": remainder})
+    assert row["remainder_right"] == [right]
+
+
+def test_a_remainder_counts_only_for_what_the_library_has_not_and_has_a_place():
+    """A leak is in the library; a liquid is everywhere; where nothing remains nothing is right."""
+    liquid = effect("stiffening_liquid") | {"position": None}
+    said = verdict("named") | {"remainder": None}
+    assert score_example(truth(), said)["remainder_right"] == []
+    assert score_example(truth(kind="outside", effects=[liquid]), said)["remainder_right"] == []
+    hidden = truth(kind="outside", effects=[effect("resonator")])
+    assert score_example(hidden, said)["remainder_right"] == [False]

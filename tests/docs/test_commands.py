@@ -92,6 +92,11 @@ NOT_RUN = {
         "the measurements are not part of the project",
         "python benchmarks/measured_holes.py --help",
     ),
+    "python benchmarks/measured_holes.py MEASURED holes_unlisted --states first_open"
+    " --without side_hole": (
+        "the measurements are not part of the project",
+        "python benchmarks/measured_holes.py --help",
+    ),
     "python benchmarks/measured_duct.py MEASURED duct": (
         "the measurements are not part of the project",
         "python benchmarks/measured_duct.py --help",

@@ -1,6 +1,6 @@
 """Truths, verdicts and rows of concealed cases, written by hand, for tests of their scoring."""
 
-from concealed.score import score_case
+from concealed.score import NO_ORACLE, score_case
 
 
 def truth(**changes):
@@ -35,22 +35,25 @@ def claim(name, element="position", position=(2.9, 3.2), **intervals):
 
 
 def verdict(kind, *claims, equivalents=()):
-    """A verdict of a misfit of 10 % before and 1 % after."""
+    """A verdict of a misfit of 10 % before and 1 % after, 2 % of data left out; a leak in it has a
+    log evidence of 20."""
     where = {"element": "between p1 and p2", "position_m": [2.9, 3.2]} if claims else None
     return {
         "verdict": kind, "effects": list(claims), "equivalents": [list(e) for e in equivalents],
         "mismatch": {"present": bool(claims), "where": where}, "sentence": "The sentence.",
         "fit": {"before": {"in_sample": 0.1, "held_out": 0.11},
                 "after": {"in_sample": 0.01, "held_out": 0.02}},
-        "without": [{"effect": "leak", "evidence": 20.0}],
+        "without": [{"effect": "leak", "place": "position", "evidence": 20.0}],
     }  # fmt: skip
 
 
-def score_example(truth_, verdict_, oracle_log_evidence=None):
-    """The row of a truth and a verdict, with baselines that pick nothing."""
+def score_example(truth_, verdict_, log_evidence=None, held_out=None, usual=()):
+    """The row of a truth and a verdict, with baselines that pick nothing; the other arguments are
+    what the oracle says."""
     segments = [{"delay": 1.1, "delay_sd": 0.05, "impedance": 4.0, "impedance_sd": 1.0}]
     baselines = {
         "nominal": 0.5, "bic": None, "sparse": None, "seconds": 1.0,
         "segments": {"calibrated": segments, "corrected": segments},
     }  # fmt: skip
-    return score_case(truth_, verdict_, baselines, oracle_log_evidence)
+    oracle = NO_ORACLE | {"log_evidence": log_evidence, "held_out": held_out, "usual": usual}
+    return score_case(truth_, verdict_, baselines, oracle)

@@ -22,7 +22,7 @@ for case, (seal, key, *results) in enumerate(
     zip(paths.seals, paths.seal_keys, paths.verdicts, paths.baselines, paths.oracles, strict=True)
 ):
     verdict, baselines, oracle = (json.loads(Path(path).read_text()) for path in results)
-    row = score_case(open_seal_file(seal, key), verdict, baselines, oracle["oracle_log_evidence"])
+    row = score_case(open_seal_file(seal, key), verdict, baselines, oracle)
     rows.append({"case": case} | row)
 store.write_text(snakemake.output.rows, json.dumps(rows, indent=1) + "\n")
 report_progress(f"{len(rows)} cases scored")

@@ -22,6 +22,7 @@ from rippletwin.cli.progress import warn
     show_default=True,
     help="The line's friction law; steady is the paper's.",
 )
+@options.frequency("--min-frequency", "Use nothing below it.")
 @options.frequency("--max-frequency", "Use nothing above it.")
 @options.fail_on(("warning",), "A parameter is not determined, or another warning is told.")
 @options.json_output
@@ -29,6 +30,7 @@ def command(
     case: Path,
     out: str,
     friction: str,
+    min_frequency: float | None,
     max_frequency: float | None,
     fail_on: tuple[str, ...],
     as_json: bool,
@@ -38,10 +40,10 @@ def command(
     from rippletwin.calibration.calibrate_case import calibrate_case
     from rippletwin.case.load import load_case
 
-    read = load_case(case, states={"healthy"})
+    read = load_case(case, states={"healthy"}, band_hz=(min_frequency, max_frequency))
     warn(read.warnings)
     progress = None if as_json else print
-    calibration = calibrate_case(read, friction, max_frequency, progress)
+    calibration = calibrate_case(read, friction, progress)
     report.save(calibration, out)
     if as_json:
         left_out = ("twin", "covariance")

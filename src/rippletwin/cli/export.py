@@ -34,6 +34,7 @@ from rippletwin.cli.progress import progress_bars, warn
     "point.",
 )
 @options.effects("An effect of the twin that a Python file defines as EFFECT, again for more.")
+@options.frequency("--min-frequency", "Export nothing below it.")
 @options.frequency("--max-frequency", "Export nothing above it; by default 5 kHz of a recording.")
 @options.json_output
 def command(
@@ -43,6 +44,7 @@ def command(
     twin_file: str | None,
     state_space: bool,
     effects: tuple[str, ...],
+    min_frequency: float | None,
     max_frequency: float | None,
     as_json: bool,
 ) -> None:
@@ -57,6 +59,7 @@ def command(
         export_state_space,
         export_twin,
     )
+    from rippletwin.spectra.frequency_selection import select_frequencies
     from rippletwin.spectra.observation import observe
     from rippletwin.twin.twin_file import load_covariance, load_twin
 
@@ -65,7 +68,7 @@ def command(
             "command line", "--state-space", "whose line?", "Give --twin TWIN.json beside it"
         )
     twin = None if twin_file is None else load_twin(twin_file, effects)
-    read = load_case(case, band_hz=(None, max_frequency))
+    read = load_case(case, band_hz=(min_frequency, max_frequency))
     known = {recording.label: recording for recording in read.recordings}
     for label in set(labels) - set(known):
         raise InputError(
@@ -77,6 +80,9 @@ def command(
     with progress_bars(as_json) as progress:
         for done, recording in enumerate(chosen, 1):
             observation = observe(recording, read.rig)
+            # A fit needs the shaft orders below the band too; here they are left out.
+            in_band = observation.frequency_hz >= observation.min_frequency_hz
+            observation = select_frequencies(observation, in_band)
             written += export_observation(observation, out)
             if state_space and observation.kind == "periodic":
                 written += export_state_space(twin, observation, out)

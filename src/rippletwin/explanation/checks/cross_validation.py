@@ -97,6 +97,14 @@ def cross_validate(
     )
 
 
+def score_held_out(workers: Workers, fit: Fit, halves: Halves | None = None) -> Score:
+    """Score of refits of one fit to the folds on what those leave out, as `Validation.after` has
+    it: the pump's flow ripple is corrected."""
+    folds = make_folds(workers, halves)
+    refitted = [fold.workers.fit([job_from(fit, observations=fold.indices)])[0] for fold in folds]
+    return _score(fit, refitted, folds, workers.observations, corrects_ripple=True)["held_out"]
+
+
 def _score(
     fit: Fit,
     refitted: Sequence[Fit],
