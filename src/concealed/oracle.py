@@ -31,7 +31,6 @@ def fit_from_truth(case_folder: str | Path, truth: dict) -> dict:
     log_evidence  that the true effects add, see `log_evidence_of`
     held_out      misfit of data that were left out, as verdict.json states it of the explanation:
                   `held_out_misfit`
-    usual         [name, place] of the library's effects that are usual in the rig (`Effect.usual`)
 
     Without an effect `log_evidence` is None; both are, where `fit_effects` is.
     """
@@ -39,19 +38,17 @@ def fit_from_truth(case_folder: str | Path, truth: dict) -> dict:
     whole, early, late = observe_all(case, processes=1)
     stage = prepare_stage(case.rig, whole)
     workers = Workers(stage.base, stage.observations)
-    usual = [[e.name, str(p)] for e, p in candidates(case.rig) if e.usual(case.rig, p)]
     rig = truth["seal"]
     line = {"viscosity": rig["fluid"]["kinematic_viscosity"]}
     for k, segment in enumerate(rig["line"]["segments"], 1):
         line |= {f"{name}[{k}]": segment[name] for name in ("wave_speed", "diameter", "length")}
     fit = fit_effects(workers, truth["effects"], line)
     if fit is None:
-        return {"log_evidence": None, "held_out": None, "usual": usual}
+        return {"log_evidence": None, "held_out": None}
     fit_all = add_nuisance(workers, fit, truth.get("nuisance", []))
     return {
         "log_evidence": log_evidence_of(workers, fit) if truth["effects"] else None,
         "held_out": held_out_misfit(workers, fit_all, early, late),
-        "usual": usual,
     }
 
 

@@ -112,8 +112,8 @@ def _terms() -> list[str]:
         f"*support* an effect if it is {MIN_LOG_BAYES_FACTOR:.0f} or more, the threshold of the "
         "tool. *Held out, from the truth*: misfit of data left out of the fit that begins from the "
         "truth.",
-        "* *Named first*: of the established effects that are not usual, the one whose loss costs "
-        "most log evidence.",
+        "* *Named first*: of the established effects that are no nuisance physics, the one whose "
+        "loss costs most log evidence.",
         "* *Misfit*: relative, of the whole data, if not held out. *Calibrated*: the least that "
         "calibration reaches without an effect. *Absorbed*: 1 - calibrated/nominal. *Corrected*: "
         "with the effects of the verdict.",

@@ -18,7 +18,7 @@ ACCEPTABLE_MISFIT = 0.05
 
 REMAINDER_TOLERANCE = 0.05  # of the line's length, between what remains and what is concealed
 
-NO_ORACLE = {"log_evidence": None, "held_out": None, "usual": []}
+NO_ORACLE = {"log_evidence": None, "held_out": None}
 
 
 def score_case(truth: dict, verdict: dict, baselines: dict, oracle: dict = NO_ORACLE) -> dict:
@@ -65,7 +65,7 @@ def score_case(truth: dict, verdict: dict, baselines: dict, oracle: dict = NO_OR
         if claim is not None and is_place_right(effect, claim, truth["length"])
     ]
     right = [any(claim is each for each in [*claims, *there]) for claim in named]
-    ranked = rank_effects(verdict, oracle["usual"], true)
+    ranked = rank_effects(verdict, there)
     wrong = [claim["name"] for claim, ok in zip(named, right) if not ok]
     fit = verdict["fit"]
     nominal, calibrated = baselines["nominal"], fit["before"]["in_sample"]
@@ -129,33 +129,26 @@ def named_effects(verdict: dict) -> list[dict]:
     return [e for e in verdict["effects"] if e.get("support", "established") == "established"]
 
 
-def rank_effects(verdict: dict, usual: Sequence[Sequence[str]], true: Sequence[dict]) -> list[dict]:
-    """The established effects of a verdict, most log evidence first.
+def rank_effects(verdict: dict, nuisance: Sequence[dict] = ()) -> list[dict]:
+    """The established effects of a verdict, most log evidence first, without those of `nuisance`:
+    physics that is there besides what is concealed.
 
-    Those of `usual`, pairs (name, place), are left out: nearly every line has them, so that they
-    are beside whatever is missing. They stay where one of the `true` effects is such. The evidence
-    is what is lost without the effect (`without[].evidence`), infinite where nothing fits without
-    it. Effects at shaft orders have none and come last.
+    The evidence is what is lost without the effect (`without[].evidence`), infinite where nothing
+    fits without it. Effects at shaft orders have none and come last.
     """
-    expected = [
-        (name, place)
-        for name, place in usual
-        if not any(name == each["name"] and _is_at(place, each["element"]) for each in true)
-    ]
-    rows, evidence = list(verdict["without"]), {}
-    for k, effect in enumerate(verdict["effects"]):
+    rows, ranked = list(verdict["without"]), []
+    established = named_effects(verdict)
+    for effect in verdict["effects"]:
         own = [r for r in rows if r["effect"] == effect["name"]]
         row = next((r for r in own if _is_at(r["place"], effect["element"])), None)
-        if row is None:
-            evidence[k] = -np.inf
-            continue
-        rows.remove(row)  # several of one name are in the same order in both lists
-        if (row["effect"], row["place"]) not in expected:
-            evidence[k] = np.inf if row["evidence"] is None else row["evidence"]
-    order = sorted(evidence, key=lambda k: -evidence[k])
-    established = named_effects(verdict)
-    ranked = [verdict["effects"][k] for k in order]
-    return [effect for effect in ranked if any(effect is each for each in established)]
+        evidence = -np.inf
+        if row is not None:
+            rows.remove(row)  # several of one name are in the same order in both lists
+            evidence = np.inf if row["evidence"] is None else row["evidence"]
+        counts = any(effect is each for each in established)
+        if counts and not any(effect is each for each in nuisance):
+            ranked.append((evidence, effect))
+    return [effect for _, effect in sorted(ranked, key=lambda pair: -pair[0])]
 
 
 def _is_at(place: str, element: str) -> bool:

@@ -244,6 +244,7 @@ def test_an_interval_at_another_element_is_not_compared():
 
 
 FRICTION = claim("unsteady_friction", "line", None)
+TRUE_FRICTION = effect("unsteady_friction") | {"element": "line", "position": None}
 GAIN = claim("sensor_gain", "sensor p1", None)
 
 
@@ -262,25 +263,21 @@ def with_evidence(said, **evidence):
         ({"unsteady_friction": 90.0, "sensor_gain": 21.0, "leak": None}, True),
     ],
 )
-def test_named_first_is_what_has_most_evidence_beside_usual_effects(evidence, first):
-    """A leak is concealed. Usual friction may have more evidence, a sensor's gain may not; a leak
-    without which nothing fits has most. It is named, at its place, in all three."""
+def test_named_first_is_what_has_most_evidence_beside_nuisance(evidence, first):
+    """A leak is concealed. Friction, nuisance that is there, may have more evidence, a gain that is
+    not there may not; a leak without which nothing fits has most. It is named in all three."""
     said = with_evidence(verdict("named", FRICTION, GAIN, claim("leak")), **evidence)
-    row = score_example(truth(), said, usual=[["unsteady_friction", "line"]])
+    row = score_example(truth(nuisance=[TRUE_FRICTION]), said)
     assert row["right"] and row["named_first"] is first
 
 
 def test_named_first_needs_an_established_name():
-    """A leak that is supported only is not named, whatever its evidence; where the usual effect is
-    the concealed one it is ranked; an effect at a shaft order, without evidence, comes last."""
-    usual = [["unsteady_friction", "line"]]
+    """A leak that is supported only is not named, whatever its evidence; an effect at a shaft
+    order has none and comes last."""
     supported = with_evidence(
         verdict("named", GAIN, claim("leak") | {"support": "supported"}), leak=20.0, sensor_gain=9.0
     )
-    assert not score_example(truth(), supported, usual=usual)["named_first"]
-    friction = effect("unsteady_friction") | {"element": "line", "position": None}
-    said = with_evidence(verdict("named", GAIN, FRICTION), unsteady_friction=30.0, sensor_gain=9.0)
-    assert score_example(truth(effects=[friction]), said, usual=usual)["named_first"]
+    assert not score_example(truth(), supported)["named_first"]
     spread = effect("piston_spread") | {"element": "source", "position": None}
     both = verdict("named", claim("piston_spread", "source", None), GAIN)
     assert not score_example(truth(effects=[spread]), with_evidence(both, sensor_gain=9.0))[

@@ -47,7 +47,7 @@ def verdict(kind, *claims, equivalents=()):
     }  # fmt: skip
 
 
-def score_example(truth_, verdict_, log_evidence=None, held_out=None, usual=()):
+def score_example(truth_, verdict_, log_evidence=None, held_out=None):
     """The row of a truth and a verdict, with baselines that pick nothing; the other arguments are
     what the oracle says."""
     segments = [{"delay": 1.1, "delay_sd": 0.05, "impedance": 4.0, "impedance_sd": 1.0}]
@@ -55,5 +55,5 @@ def score_example(truth_, verdict_, log_evidence=None, held_out=None, usual=()):
         "nominal": 0.5, "bic": None, "sparse": None, "seconds": 1.0,
         "segments": {"calibrated": segments, "corrected": segments},
     }  # fmt: skip
-    oracle = NO_ORACLE | {"log_evidence": log_evidence, "held_out": held_out, "usual": usual}
+    oracle = NO_ORACLE | {"log_evidence": log_evidence, "held_out": held_out}
     return score_case(truth_, verdict_, baselines, oracle)
