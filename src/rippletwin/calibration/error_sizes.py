@@ -23,8 +23,9 @@ truth would make the likeliest prediction too small."""
 SMOOTH_SDS = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 0.6])
 """Values of tau. Relief grooves and free air that a data sheet does not state halve the ripple
 above 2 kHz (docs/explanation/pump.md): 0.3."""
-REACH, VALUES_ALONG = 3.0, 9
+REACH, VALUES_ALONG = 3.0, 7
 """Factor to either side of a size within which it is sought, and values that are tried there."""
+CLOSE = 1.1  # ratio of three more values about the least
 
 Costs = Callable[[Sequence[np.ndarray]], np.ndarray]
 """Costs (T, G, D) of values (T,), (G,) and (D,) of tau, sigma and delta."""
@@ -65,13 +66,23 @@ def most_likely_sizes(
 
 
 def _least_along(costs: Costs, sizes: Sequence[float], axis: int, low: float, high: float) -> float:
-    """The value of least cost of one of `sizes`, the others as they are, between its bounds: the
-    vertex of the parabola through the least of several costs and its neighbours."""
+    """The value of least cost of one of `sizes`, the others as they are, between its bounds."""
+
+    def vertex(values: np.ndarray) -> float:
+        along = [np.array([value]) for value in sizes]
+        along[axis] = values
+        return _vertex(values, costs(along).ravel())
+
     size = sizes[axis]
-    values = np.geomspace(max(low, size / REACH), min(high, size * REACH), VALUES_ALONG)
-    along = [np.array([value]) for value in sizes]
-    along[axis] = values
-    cost = costs(along).ravel()
+    found = vertex(np.geomspace(max(low, size / REACH), min(high, size * REACH), VALUES_ALONG))
+    if low < found < high:
+        found = vertex(found * CLOSE ** np.arange(-1.0, 2.0))
+    return float(np.clip(found, low, high))
+
+
+def _vertex(values: np.ndarray, cost: np.ndarray) -> float:
+    """Where the parabola through the least of several costs and its neighbours is least, `values`
+    being in a geometric series; the first or the last value where that has the least cost."""
     k = int(np.argmin(cost))
     if not 0 < k < len(values) - 1:
         return float(values[k])
