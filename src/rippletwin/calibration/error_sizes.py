@@ -1,9 +1,12 @@
-"""The most likely sizes of model error and source errors of `posterior`, on grids."""
+"""The most likely sizes of model error and source errors of `posterior`.
+
+They move without steps as the residual does. On a grid they would jump between two of its values,
+and a descent that estimates them anew after each of its steps would follow them to and fro.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +23,9 @@ truth would make the likeliest prediction too small."""
 SMOOTH_SDS = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 0.6])
 """Values of tau. Relief grooves and free air that a data sheet does not state halve the ripple
 above 2 kHz (docs/explanation/pump.md): 0.3."""
-FINER_ERRORS = 7  # values between two neighbours of a grid
+REACH, VALUES_ALONG = 3.0, 7
+"""Factor to either side of a size within which it is sought, and values that are tried there."""
+CLOSE = 1.1  # ratio of three more values about the least
 
 Costs = Callable[[Sequence[np.ndarray]], np.ndarray]
 """Costs (T, G, D) of values (T,), (G,) and (D,) of tau, sigma and delta."""
@@ -40,8 +45,8 @@ def most_likely_sizes(
     """The sizes of least cost.
 
     any_nominal   whether any source is nominal; without one tau is 0
-    near          whether only values next to the `present` ones are tried: on the way of a descent
-                  they move little from step to step
+    near          whether they are sought about the `present` ones: on the way of a descent they
+                  move little from step to step
     """
     grids = [
         SMOOTH_SDS if any_nominal else np.zeros(1),
@@ -49,36 +54,39 @@ def most_likely_sizes(
         MODEL_ERRORS,
     ]
     if near:
-        grids = [_neighbours(grid, value) for grid, value in zip(grids, present)]
-    best = _least(costs, grids)
-    sizes = [float(grid[k]) for grid, k in zip(grids, best)]
-    for axis in (2, 1, 0):  # then each alone, between its neighbours on the grid
-        finer = [np.array([value]) for value in sizes]
-        finer[axis] = _between_neighbours(grids[axis], best[axis])
-        sizes[axis] = float(finer[axis][_least(costs, finer)[axis]])
+        sizes = [float(np.clip(x, grid[0], grid[-1])) for grid, x in zip(grids, present)]
+    else:
+        cost = costs(grids)
+        best = np.unravel_index(np.argmin(cost), cost.shape)
+        sizes = [float(grid[k]) for grid, k in zip(grids, best)]
+    for axis in (2, 1, 0):
+        if len(grids[axis]) > 1:
+            sizes[axis] = _least_along(costs, sizes, axis, grids[axis][0], grids[axis][-1])
     return ErrorSizes(*sizes)
 
 
-def _least(costs: Costs, grids: Sequence[np.ndarray]) -> tuple[int, ...]:
-    """Indices of the values of least cost."""
-    cost = costs(grids)
-    return tuple(int(k) for k in np.unravel_index(np.argmin(cost), cost.shape))
+def _least_along(costs: Costs, sizes: Sequence[float], axis: int, low: float, high: float) -> float:
+    """The value of least cost of one of `sizes`, the others as they are, between its bounds."""
+
+    def vertex(values: np.ndarray) -> float:
+        along = [np.array([value]) for value in sizes]
+        along[axis] = values
+        return _vertex(values, costs(along).ravel())
+
+    size = sizes[axis]
+    found = vertex(np.geomspace(max(low, size / REACH), min(high, size * REACH), VALUES_ALONG))
+    if low < found < high:
+        found = vertex(found * CLOSE ** np.arange(-1.0, 2.0))
+    return float(np.clip(found, low, high))
 
 
-def _neighbours(grid: np.ndarray, value: float) -> np.ndarray:
-    """The values of an ascending grid next to `value`: the nearest, one below and one above."""
-    distances = np.abs(np.log(np.maximum(grid, 1e-9) / max(value, 1e-9)))
-    nearest = int(np.argmin(np.round(distances, 9)))  # rounding does not decide half way
-    return grid[max(nearest - 1, 0) : nearest + 2]
-
-
-def _between_neighbours(grid: np.ndarray, k: int) -> np.ndarray:
-    """Finer values of an ascending grid between the neighbours of its entry `k`."""
-    if len(grid) == 1:
-        return grid
-    return _finer_values(float(grid[max(k - 1, 0)]), float(grid[min(k + 1, len(grid) - 1)]))
-
-
-@lru_cache(maxsize=256)
-def _finer_values(low: float, high: float) -> np.ndarray:
-    return np.geomspace(low, high, FINER_ERRORS)
+def _vertex(values: np.ndarray, cost: np.ndarray) -> float:
+    """Where the parabola through the least of several costs and its neighbours is least, `values`
+    being in a geometric series; the first or the last value where that has the least cost."""
+    k = int(np.argmin(cost))
+    if not 0 < k < len(values) - 1:
+        return float(values[k])
+    before, least, after = cost[k - 1 : k + 2]
+    rise = before + after - 2.0 * least
+    shift = 0.5 * (before - after) / rise if rise > 0.0 else 0.0
+    return float(values[k] * (values[1] / values[0]) ** shift)

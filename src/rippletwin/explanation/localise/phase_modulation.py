@@ -21,6 +21,7 @@ from rippletwin.explanation.localise.shaft_orders import (
 )
 from rippletwin.explanation.thresholds import MIN_SHAFT_ORDER_LEVEL
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
+from rippletwin.twin.effects import library
 from rippletwin.twin.twin import Twin
 
 MIN_AMPLITUDE_CHANGE = 0.01
@@ -29,7 +30,7 @@ ignored: no nominal ripple is as accurate."""
 
 
 def estimate_phase_modulation(rig, observations: Sequence, highest_hz: float) -> ShaftOrders | None:
-    """The shaft orders by a line that is calibrated without effects.
+    """The shaft orders by a line that is calibrated with the usual effects.
 
     None where their level is too low to matter. The explained line gives a better estimate.
     """
@@ -39,16 +40,18 @@ def estimate_phase_modulation(rig, observations: Sequence, highest_hz: float) ->
     if level_and_p is None or level_and_p[0] < MIN_SHAFT_ORDER_LEVEL:
         return None
     shaft_orders, fit = None, None
-    for uncertain_pump in (False, True):
+    usual = tuple(c for c in library.candidates(rig) if c[0].usual(rig, c[1]))
+    for uncertain_pump, effects in ((False, ()), (True, ()), (True, usual)):
         # The pump's parameters come second: before the ripple is modulated, they would absorb what
         # the modulation takes from the piston orders.
         modulated = with_phase_modulation(observations, shaft_orders)
         data = select_fitted_frequencies(modulated, rig, highest_hz)
         base = Twin(rig, data, uncertain_pump=uncertain_pump)
         if fit is None:
-            fit = fit_hypothesis(base, (), data)
+            fit = fit_hypothesis(base, effects, data)
         else:
-            fit = refine(base, (), data, [transfer_theta(fit, (), base)], exact=False)
+            start = transfer_theta(fit, effects, base)
+            fit = refine(base, effects, data, [start], exact=False)
         shaft_orders = analyse_shaft_orders(fit.twin, observations, highest_hz)
     return shaft_orders
 

@@ -45,7 +45,7 @@ POSITIONS_SOLVED = 3  # of each kind of element, those that promise most
 STEP_SHARES = (1.0, 0.5, 0.25)
 """Of the way to the most likely correction, besides none of it. A linear step may overshoot: near a
 sharp resonance a small correction changes the prediction by much."""
-NEGLIGIBLE = 10.0  # log likelihood below the best at which an amplitude no longer counts
+NEGLIGIBLE = 3.0  # log likelihood below the best at which an amplitude no longer counts
 KEPT_PROMISE = 0.5  # log likelihood: a step that falls short by less is not shortened
 FLAT_SD = 1e3  # of a coordinate without a prior
 
