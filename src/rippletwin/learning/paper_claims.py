@@ -23,6 +23,7 @@ from scipy.stats import t as student
 
 from rippletwin.learning.accuracy import summarise
 from rippletwin.learning.architectures import ARCHITECTURES
+from rippletwin.learning.markdown import mark_unconverged, with_footnote
 
 EXPERIMENTAL = "experimental"  # the dataset of recordings, which no zero-shot claim concerns
 STRICT, EITHER, PAPER = "strict", "either severity", "the paper's table"
@@ -63,15 +64,16 @@ def cells_of(results: pd.DataFrame, paper: pd.DataFrame) -> pd.DataFrame:
     """Mean, standard deviation and number of seeds of every trained cell by three scores.
 
     results : tidy accuracies in per cent (``accuracy.result_row``); paper : columns architecture,
-    dataset, mean, std. Columns score, architecture, dataset, mean, std, count.
+    dataset, mean, std. Columns score, architecture, dataset, mean, std, count, converged (whether
+    all trainings did).
     """
     scores = {
         STRICT: summarise(results),
         EITHER: summarise(results, "accuracy_either"),
-        PAPER: paper.assign(count=PAPER_SEEDS),
+        PAPER: paper.assign(count=PAPER_SEEDS, converged=True),
     }
     cells = pd.concat([table.assign(score=score) for score, table in scores.items()])
-    names = ["score", "architecture", "dataset", "mean", "std", "count"]
+    names = ["score", "architecture", "dataset", "mean", "std", "count", "converged"]
     return cells.dropna(subset=["mean"]).reset_index(drop=True)[names]
 
 
@@ -112,11 +114,12 @@ def comparisons(cells: pd.DataFrame) -> pd.DataFrame:
     """Every comparison that the cells (``cells_of``) allow.
 
     Columns claim, score, dataset, better, worse (labels), difference, low, high (per cent of the
-    windows), verdict.
+    windows), verdict, converged (whether all trainings of both did).
     """
     rows = []
     for score, table in cells.groupby("score", sort=False):
         runs = {(c.architecture, c.dataset): (c.mean, c.std, c.count) for c in table.itertuples()}
+        converged = {(c.architecture, c.dataset): c.converged for c in table.itertuples()}
         datasets = [name for name in dict.fromkeys(table.dataset) if name != EXPERIMENTAL]
         wanted = [
             (claim.text, (better, dataset), (worse, dataset))
@@ -130,8 +133,9 @@ def comparisons(cells: pd.DataFrame) -> pd.DataFrame:
                 rows.append(
                     (claim, score, better[1], _label(better), _label(worse, beside=better))
                     + (mean, low, high, verdict_of_difference(low, high))
+                    + (converged[better] and converged[worse],)
                 )
-    names = "claim score dataset better worse difference low high verdict"
+    names = "claim score dataset better worse difference low high verdict converged"
     return pd.DataFrame(rows, columns=names.split())
 
 
@@ -150,11 +154,14 @@ def judge_claims(compared: pd.DataFrame, cells: pd.DataFrame, period: float) -> 
             counts = found.verdict.value_counts()
             evidence = "no comparison"
             if len(found):
+                open_ended = int((~found.converged.astype(bool)).sum())
                 evidence = (
                     f"{len(found)} comparisons: {counts.get('supports', 0)} support, "
                     f"{counts.get('opposes', 0)} oppose; differences {found.difference.min():+.1f} "
                     f"to {found.difference.max():+.1f}, median {found.difference.median():+.1f}"
                 )
+                if open_ended:
+                    evidence += f"; {open_ended} with trainings that did not converge"
             rows.append((claim, score, judge_claim(list(found.verdict)), evidence))
     for score in scores:
         learnt = cells[(cells.score == score) & (cells.dataset == EXPERIMENTAL)]["mean"]
@@ -194,11 +201,12 @@ def claims_markdown(judged: pd.DataFrame, compared: pd.DataFrame) -> str:
             "|---|---|---|---|---|---|---|",
         ]
         for row in rows.itertuples():
+            difference = mark_unconverged(f"{row.difference:+.1f}", row.converged)
             lines.append(
                 f"| {row.score} | {row.dataset} | {row.better} | {row.worse} "
-                f"| {row.difference:+.1f} | {row.low:+.1f} to {row.high:+.1f} | {row.verdict} |"
+                f"| {difference} | {row.low:+.1f} to {row.high:+.1f} | {row.verdict} |"
             )
-    return "\n".join(lines) + "\n"
+    return with_footnote("\n".join(lines) + "\n")
 
 
 def _label(cell: tuple[str, str], beside: tuple[str, str] | None = None) -> str:
