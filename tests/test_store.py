@@ -2,9 +2,11 @@
 
 import ast
 import errno
+import os
 import resource
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -93,6 +95,54 @@ def test_a_disk_without_room_loses_nothing(tmp_path):
     )
     assert done.returncode == 1 and "OSError: [Errno 27]" in done.stderr
     assert path.read_text() == "old" and [e.name for e in tmp_path.iterdir()] == ["verdict.json"]
+
+
+FULL_STORE = """
+import resource, sys
+import numpy as np, xarray as xr
+from rippletwin import store
+resource.setrlimit(resource.RLIMIT_FSIZE, (4096, resource.RLIM_INFINITY))
+values = np.random.default_rng(0).normal(size=100_000)  # nothing to compress
+try:
+    store.save(xr.Dataset({"a": ("x", values)}), sys.argv[1])
+except OSError as error:
+    print(error.errno, error.filename)
+"""
+
+
+@pytest.mark.skipif(not hasattr(resource, "RLIMIT_FSIZE"), reason="no limit of a file's size here")
+def test_a_store_without_room_loses_nothing(tmp_path):
+    """The array does not fit: an error of the system names the store, the old one is whole, and
+    nothing is beside it."""
+    path = tmp_path / "a.zarr"
+    store.save(dataset(1.0), path)
+    done = subprocess.run(
+        [sys.executable, "-c", FULL_STORE, path], capture_output=True, text=True, check=False
+    )
+    assert done.stdout == f"{errno.EFBIG} {path}\n", done.stderr
+    xr.testing.assert_identical(store.load(path).load(), dataset(1.0))
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.zarr"]
+
+
+def test_a_store_that_cannot_be_moved_into_place_loses_nothing(tmp_path, monkeypatch):
+    """The disk has no room for the new name, when the old store has already been moved away: it is
+    moved back."""
+    path = tmp_path / "a.zarr"
+    store.save(dataset(1.0), path)
+    move = os.replace
+
+    def full(source, target):
+        if Path(source).name == "new":
+            raise OSError(errno.ENOSPC, "No space left on device", str(source))
+        move(source, target)
+
+    with monkeypatch.context() as disk:
+        disk.setattr(os, "replace", full)
+        with pytest.raises(OSError, match="No space left") as caught:
+            store.save(dataset(2.0), path)
+    assert caught.value.filename == str(path)
+    xr.testing.assert_identical(store.load(path).load(), dataset(1.0))
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.zarr"]
 
 
 @pytest.mark.parametrize("code", [errno.ENOSPC, errno.EROFS])

@@ -35,7 +35,12 @@ def save(dataset: xr.Dataset, path: str | Path, compressed: bool = True) -> None
         if path.exists():
             os.replace(path, scratch / "old")
         os.replace(scratch / "new", path)
+    except OSError as error:
+        _name(error, path, scratch)
+        raise
     finally:
+        if (scratch / "old").exists() and not path.exists():
+            os.replace(scratch / "old", path)
         shutil.rmtree(scratch, ignore_errors=True)
 
 
@@ -62,8 +67,18 @@ def whole(path: str | Path) -> Iterator[Path]:
     try:
         yield scratch
         os.replace(scratch, path)
+    except OSError as error:
+        _name(error, path, scratch)
+        raise
     finally:
         scratch.unlink(missing_ok=True)
+
+
+def _name(error: OSError, path: Path, scratch: Path) -> None:
+    """Have the error name `path`, if it names no file or one of the temporary ones: a write without
+    room names none."""
+    if error.filename is None or str(error.filename).startswith(str(scratch)):
+        error.filename = str(path)
 
 
 def write_text(path: str | Path, text: str) -> Path:

@@ -10,7 +10,9 @@ import pytest
 
 from paper_rig import paper_rig
 from rippletwin import cli
-from rippletwin.calibration.calibrate import calibrate
+from rippletwin.calibration.calibrate import calibrate, conclude
+from rippletwin.calibration.laplace import UNCONVERGED_GAIN, laplace
+from rippletwin.calibration.likelihood import EVENNESS, Likelihood
 from rippletwin.calibration.pareto import calibrate_pareto
 from rippletwin.case.model import Load
 from rippletwin.harmonics import flow_harmonics
@@ -132,6 +134,24 @@ def test_what_the_data_do_not_determine_is_said():
     rig = paper_rig(sensors=1, segments=1)
     result = calibrated(rig, [point(rig, highest_hz=700.0)], seed=1)[2]
     assert any("length[1] is not determined by the data" in w for w in result.warnings)
+
+
+def test_a_fit_that_has_not_converged_says_so(monkeypatch):
+    """At the mode nothing is said. Ten posterior standard deviations beside it the warning states
+    what a step promises; where no steady state is found, a warning says that instead."""
+    rig = paper_rig(segments=1, sensors=2)
+    _, data, result, _ = calibrated(rig, [point(rig, highest_hz=1500.0)], seed=6)
+    assert not any("converged" in w or "steady state" in w for w in result.warnings)
+    model = Likelihood(Twin(rig, data), data, evenness=EVENNESS)
+    beside = result.twin.theta.copy()
+    beside[0] += 10.0 * result.sd[0]
+    (told,) = [w for w in conclude(model, beside).warnings if w.startswith("not converged")]
+    gain = laplace(model, beside).expected_gain
+    assert gain > UNCONVERGED_GAIN and f"promises {gain:.1f} of log posterior" in told
+    monkeypatch.setattr(Likelihood, "is_valid", lambda *_: False)
+    told = conclude(model, beside).warnings
+    assert any("no steady state of the line was found" in w for w in told)
+    assert not any("not converged" in w for w in told)
 
 
 def test_missing_physics_is_a_bad_fit_and_says_so():

@@ -73,14 +73,32 @@ def another_user():
             os.seteuid(0)
 
 
-@pytest.mark.parametrize("command", ["calibrate", "explain"])
-def test_folder_that_may_not_be_written(capsys, command):
-    """Results that could not be written are told before the fit."""
+SHEET = "--pistons 9 --viscosity 32 --segment 5950,19.7,2.5 --sensor p1,420 --no-ask".split()
+POINT = "--speed 1000 --pressure 95".split()
+READ_ONLY = {
+    "new": ["new", "{}", *SHEET],
+    "calibrate": ["calibrate", "{}", "--out", "{}/out"],
+    "explain": ["explain", "{}", "--out", "{}/out"],
+    "diagnose": ["diagnose", "{}", "--out", "{}/out"],
+    "simulate": ["simulate", "healthy", "--twin", "{}/t.json", *POINT, "--out", "{}/run.csv"],
+    "export": ["export", "{}", "--out", "{}/out"],
+    "report": ["report", "{}", "--out", "{}/report.html"],
+}
+"""Every command that writes, into the folder {}."""
+
+
+@pytest.mark.parametrize("name", [c for c in COMMANDS if c not in ("check", "completion")])
+def test_folder_that_may_not_be_written(capsys, name):
+    """Results that could not be written are told before anything is read or fitted: a line, exit
+    code 2, and nothing is left there."""
     with tempfile.TemporaryDirectory() as folder:
         Path(folder).chmod(0o555)
         with another_user():
-            assert main([command, folder, "--out", f"{folder}/out"]) == 2
-    assert "not allowed to write" in capsys.readouterr().err
+            assert main([word.format(folder) for word in READ_ONLY[name]]) == 2
+        assert not list(Path(folder).iterdir())
+    (said,) = capsys.readouterr().err.splitlines()
+    assert said.startswith("rippletwin: ") and folder in said
+    assert "not allowed to write" in said or "cannot be written (Permission denied)" in said
 
 
 @pytest.mark.parametrize("band", [["--max-frequency", "10"], ["--min-frequency", "4990"]])

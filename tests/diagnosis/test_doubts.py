@@ -7,17 +7,19 @@ import numpy as np
 import pytest
 
 import leaking_pump
+from rippletwin.calibration.laplace import UNCONVERGED_GAIN
 from rippletwin.diagnosis import pump_flow
 from rippletwin.diagnosis.doubts import doubts
 from rippletwin.diagnosis.faults.library import FAULTS
 from rippletwin.diagnosis.integration import Density
 
 
-def diagnosis(log_density, periodic=True):
+def diagnosis(log_density, periodic=True, expected_gain=0.0):
     """Of one slipper, with the log density of its leak area on a grid."""
     return SimpleNamespace(
         model=SimpleNamespace(flows={"slipper": SimpleNamespace(periodic=periodic)}),
         severities={"slipper": None},
+        expected_gain=expected_gain,
         best=SimpleNamespace(cut_off={"slipper": Density(GRID, log_density).cut_off}),
     )
 
@@ -40,6 +42,14 @@ def test_a_leak_at_the_end_of_what_was_tried(middle, width, words):
     found = doubts(diagnosis(-0.5 * ((GRID - middle) / width) ** 2))
     assert len(found) == len(words)
     assert all(word in text for word, text in zip(words, found))
+
+
+def test_a_fit_of_the_pump_that_did_not_converge():
+    """A step that promises more than decides between explanations is a doubt, with its size."""
+    inside = -8.0 * GRID**2
+    assert not doubts(diagnosis(inside, expected_gain=0.9 * UNCONVERGED_GAIN))
+    (told,) = doubts(diagnosis(inside, expected_gain=7.24))
+    assert "did not converge" in told and "promises 7.2 of log posterior" in told
 
 
 def test_a_pump_that_does_not_become_periodic(monkeypatch):

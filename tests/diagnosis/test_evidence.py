@@ -130,7 +130,7 @@ def test_readings_have_the_names_of_the_case_s_sensors(recordings):
 def test_a_twin_stays_where_nothing_healthy_is_left(recordings):
     """Where all healthy recordings are to be diagnosed, none is left to fit the twin to."""
     twin = twin_of(recordings[0])
-    assert recalibrate_twin(twin, [], None) is twin
+    assert recalibrate_twin(twin, [], None).twin is twin
 
 
 def test_a_twin_of_another_pump_is_refused(recordings, tmp_path):

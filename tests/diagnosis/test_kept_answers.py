@@ -18,6 +18,7 @@ from rippletwin.diagnosis import kept_answers
 from rippletwin.diagnosis.diagnose import select_recordings
 from rippletwin.diagnosis.faults.library import select_faults
 from rippletwin.diagnosis.kept_answers import diagnose_changed, digest
+from rippletwin.diagnosis.pump_calibration import FittedTwin
 from rippletwin.twin.twin import Twin
 from run_script import run_script
 
@@ -47,7 +48,7 @@ def asked(monkeypatch):
 
     def refit(twin, healthy, read):
         done.append("twin")
-        return twin
+        return FittedTwin(twin)
 
     def diagnose(diagnoser, recording, anchors, read):
         done.append(recording.label)
@@ -78,6 +79,24 @@ def test_a_second_call_calculates_nothing(case, asked):
     """The same answers in the same order."""
     assert run(case) == run(case) == list(UNKNOWN)
     assert asked == ["twin", *UNKNOWN]
+
+
+def test_how_far_the_fit_of_the_pump_converged_is_kept_with_the_twin(case, asked, monkeypatch):
+    """A recording that is diagnosed later, by the twin that was kept, is doubted as the first."""
+    gains = []
+    monkeypatch.setattr(
+        kept_answers, "recalibrate_twin", lambda twin, *_: FittedTwin(twin, expected_gain=5.0)
+    )
+
+    def diagnose(diagnoser, recording, *_):
+        gains.append(diagnoser.expected_gain)
+        return recording.label
+
+    monkeypatch.setattr(kept_answers, "diagnose_one", diagnose)
+    run(case, labels=UNKNOWN[:1])
+    monkeypatch.setattr(kept_answers, "recalibrate_twin", None)
+    run(case, labels=UNKNOWN[:1] + UNKNOWN[1:])
+    assert gains == [5.0, 5.0]
 
 
 def test_a_recording_that_is_added_is_the_only_one_that_is_diagnosed(case, asked):

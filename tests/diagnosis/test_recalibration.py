@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import leaking_pump
+from rippletwin.calibration.laplace import UNCONVERGED_GAIN
+from rippletwin.diagnosis import pump_calibration
 from rippletwin.diagnosis.diagnose import healthy_misfit
 from rippletwin.diagnosis.line_calibration import calibrate_line
 from rippletwin.diagnosis.pump_calibration import calibrate_pump, one_each_point
@@ -46,7 +48,7 @@ def test_the_pump_s_flow_comes_nearer_to_the_true_one(healthy):
     rig = replace(rig, pump=rig.pump | {"port_opening_deg": 10.0, "air_fraction": 1e-4})
     unstated = [replace(o, load_pressure=None) for o in healthy]
     line = calibrate_line(Twin(rig, unstated), unstated)
-    fitted = calibrate_pump(line, one_each_point(unstated)).rig.pump
+    fitted = calibrate_pump(line, one_each_point(unstated)).twin.rig.pump
     point = leaking_pump.OIL, leaking_pump.SPEED, leaking_pump.LOAD
     orders = leaking_pump.PISTONS * np.arange(1, 13)
     true, sheet, found = (
@@ -54,6 +56,19 @@ def test_the_pump_s_flow_comes_nearer_to_the_true_one(healthy):
         for pump in (leaking_pump.TRUE, line.rig.pump, fitted)
     )
     assert np.linalg.norm(found - true) < 0.5 * np.linalg.norm(sheet - true)
+
+
+def test_a_fit_of_the_pump_that_is_cut_short_promises_more(healthy, monkeypatch):
+    """Through the true line the usual number of evaluations ends where a step gains nothing that
+    decides; one evaluation does not."""
+    rig = leaking_pump.rig()
+    twin = Twin(replace(rig, pump=rig.pump | {"port_opening_deg": 10.0}), healthy)
+    theta, k = twin.theta.copy(), twin.index["wave_speed[1]"]
+    theta[k] = twin.parameters[k].prior.coordinate(0.98 * leaking_pump.WAVE_SPEED)
+    points = one_each_point(healthy)
+    assert calibrate_pump(twin.with_(theta=theta), points).expected_gain < UNCONVERGED_GAIN
+    monkeypatch.setattr(pump_calibration, "EVALUATIONS", 1)
+    assert calibrate_pump(twin.with_(theta=theta), points).expected_gain > UNCONVERGED_GAIN
 
 
 def test_an_operating_point_set_twice_is_fitted_once(healthy):

@@ -8,6 +8,7 @@ from scipy.special import jv
 
 from rippletwin.case.model import FlowRipple, Load
 from rippletwin.explanation.explain import explain_observations
+from rippletwin.explanation.localise import modulation_fit
 from rippletwin.explanation.localise.modulation_fit import fit_modulation
 from rippletwin.explanation.localise.order_flow import OrderFlow
 from rippletwin.explanation.localise.phase_modulation import with_phase_modulation
@@ -15,6 +16,7 @@ from rippletwin.explanation.localise.shaft_orders import (
     analyse_shaft_orders,
     probability_of_share,
 )
+from rippletwin.explanation.verdict.remainder_text import shaft_order_sentences
 from rippletwin.harmonics import flow_harmonics, modulate_ripple
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
@@ -43,6 +45,20 @@ def test_modulation_spreads_an_order_like_bessel_functions():
     assert flow_harmonics(modulate_ripple(even, b), np.zeros(1))[0].real == pytest.approx(
         1e-4, rel=1e-6
     )
+
+
+def test_a_fit_of_the_modulation_that_is_cut_short_is_told(monkeypatch):
+    """The usual fit converges; one of a single evaluation does not, and the sentence says so."""
+    twin, even, _ = recorded(lambda ripple: modulate_ripple(ripple, 4e-3))
+    found = analyse_shaft_orders(twin, [even], 4000.0)
+    assert found.converged and "converge" not in shaft_order_sentences(found)[0]
+    whole = modulation_fit.least_squares
+    monkeypatch.setattr(
+        modulation_fit, "least_squares", lambda *a, **k: whole(*a, **k | {"max_nfev": 1})
+    )
+    found = analyse_shaft_orders(twin, [even], 4000.0)
+    assert found.names == ("speed_fluctuation",) and not found.converged
+    assert "did not converge" in shaft_order_sentences(found)[0]
 
 
 def test_no_modulation_leaves_the_ripple_unchanged():

@@ -62,6 +62,15 @@ def test_a_speed_fluctuation_is_named_with_its_own_interval(explanation, verdict
     assert "probability" not in effect
 
 
+def test_a_modulation_whose_fit_did_not_converge_is_not_established(explanation):
+    """The same fluctuation is supported only, and the sentence says why."""
+    rough = replace(explanation, shaft_orders=replace(MODULATION, converged=False))
+    for each, support in ((explanation, "established"), (rough, "supported")):
+        result = verdict_dict(each)
+        assert [effect["support"] for effect in result["effects"]] == [support]
+        assert ("did not converge" in result["sentence"]) is (each is rough)
+
+
 def test_warnings_of_the_case_are_told(explanation):
     """What `check` warns of, as a generic pump, is in the verdict too."""
     warned = replace(explanation, warnings=("pump: only pistons is given",))

@@ -1,9 +1,12 @@
 """The flow sensor by its method's name, and the noise of what it estimates."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from rippletwin.flow_sensor.methods import estimate_flow_by, noise_of_flow
+from rippletwin.flow_sensor import pinn
+from rippletwin.flow_sensor.methods import estimate_flow_by, last_gain, noise_of_flow
 
 
 def test_noise_is_that_of_healthy_recordings():
@@ -17,6 +20,23 @@ def test_noise_is_that_of_healthy_recordings():
     assert noise_of_flow(flow, recording, healthy) == pytest.approx([1.5], rel=0.02)
     nobody = np.zeros(600, dtype=bool)
     assert noise_of_flow(flow, recording, nobody) == pytest.approx([4.0], rel=0.02)
+
+
+@pytest.mark.parametrize(("last", "warned"), [(0.5, True), (0.99, False)])
+def test_a_training_that_still_gains_at_its_end_is_told(monkeypatch, last, warned):
+    """Of a hundred steps the last ten halve the loss, or lower it by a hundredth: the log warns of
+    the first only, with the gain and the remedy."""
+    losses = np.concatenate([np.geomspace(1.0, 1e-4, 90), last * np.full(10, 1e-4)])
+    assert last_gain(losses) == pytest.approx(1.0 - last)
+    monkeypatch.setattr(pinn, "train", lambda *_: (SimpleNamespace(residual=0.01), losses))
+    monkeypatch.setattr(pinn, "estimate_flow", lambda *_: None)
+    said = []
+    estimate_flow_by(
+        "pinn", np.zeros((1, 1, 8)), 10.0, None, np.ones(1), 100.0,
+        width=4, steps=100, threads=1, progress=said.append,
+    )  # fmt: skip
+    assert said[0].startswith("equations hold to 0.01")
+    assert any("not converged" in x and "50%" in x and "steps" in x for x in said) is warned
 
 
 def test_an_unknown_method_is_an_error():

@@ -1,10 +1,14 @@
 """What fuzzing has found: each damaged file that once ended in a traceback or in gigabytes."""
 
 import json
+import time
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from fuzzing import edited, little_memory, refused
+import fuzzing
+from fuzzing import edited, little_memory, refused, tried
 from good_recordings import WRITE, Good
 from made_results import write_results
 from rippletwin.case.load import load_case
@@ -47,3 +51,27 @@ def test_a_verdict_that_is_other_json(tmp_path, content):
     with pytest.raises(InputError, match="not as the commands write them"):
         report_case(tmp_path, tmp_path / "report.html")
     assert not (tmp_path / "report.html").exists()
+
+
+def test_an_input_that_hangs_is_found(monkeypatch):
+    """A reader that waits for ever, and catches every exception, is ended at the limit of time; an
+    input within it is no finding."""
+    monkeypatch.setattr(fuzzing, "SECONDS", 0.2)
+
+    @tried(0.01)
+    @given(st.just(30.0))
+    def hang(seconds):
+        try:
+            time.sleep(seconds)
+        except Exception:
+            pass
+
+    with pytest.raises(fuzzing.Hung):
+        hang()
+
+    @tried(0.01)
+    @given(st.just(0.0))
+    def answer(seconds):
+        time.sleep(seconds)
+
+    answer()

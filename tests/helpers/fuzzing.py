@@ -1,4 +1,4 @@
-"""Inputs that nobody would write: good ones, damaged at random, within a limit of memory.
+"""Inputs that nobody would write: good ones, damaged at random, within limits of memory and time.
 
 The environment variable RIPPLETWIN_FUZZ states how many inputs each test tries; without it there
 are few, and always the same.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import resource
+import signal
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -19,11 +20,33 @@ from hypothesis import strategies as st
 ASKED = os.environ.get("RIPPLETWIN_FUZZ")
 FEW = 424
 MORE_MEMORY = 1 << 30  # bytes that reading any input may take
+SECONDS = 60.0  # that an input may take
 
 
-def tried(share: float = 1.0) -> settings:
-    """Settings of a test that tries `share` of the usual number of inputs."""
-    return settings(
+class Hung(BaseException):
+    """An input took too long. No reader that catches exceptions makes a refusal of it."""
+
+
+@contextmanager
+def time_limit(seconds: float):
+    """Raises `Hung` after so many seconds."""
+
+    def end(*_):
+        raise Hung
+
+    before = signal.signal(signal.SIGALRM, end)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def tried(share: float = 1.0):
+    """Decorator of a `given` test: it tries `share` of the usual number of inputs, each within
+    SECONDS."""
+    chosen = settings(
         max_examples=max(int(share * int(ASKED or FEW)), 1),
         derandomize=ASKED is None,
         database=None,
@@ -31,6 +54,12 @@ def tried(share: float = 1.0) -> settings:
         phases=[Phase.explicit, Phase.generate],  # to shrink an input takes longer than to find it
         suppress_health_check=list(HealthCheck),
     )
+
+    def decorate(test):
+        test.hypothesis.inner_test = time_limit(SECONDS)(test.hypothesis.inner_test)
+        return chosen(test)
+
+    return decorate
 
 
 @contextmanager

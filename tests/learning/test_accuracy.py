@@ -13,6 +13,7 @@ from rippletwin.learning.accuracy import confusion, confusion_of, result_row, sc
 from rippletwin.learning.architectures import ARCHITECTURES, CLASSES
 from rippletwin.learning.tables import accuracy_table, answer_table, cost_table
 from rippletwin.learning.training import History
+from rippletwin.report.workflow_tables import accuracy_table as page_table
 
 PAPER = pd.read_csv(ROOT / "resources" / "paper_accuracy.csv")
 H, S, C1, C2 = range(4)
@@ -102,6 +103,32 @@ def tidy():
         scored = score(["H", "S"], said, "pressure")
         rows.append(result_row("cnn1d_3_1", dataset, seed, scored, history))
     return pd.DataFrame(rows)
+
+
+def test_cells_whose_trainings_did_not_all_converge_are_marked():
+    """One of two seeds stopped too soon: that cell has a mark and the table a footnote, here and in
+    the table of costs, and the page of a run says it in words. Where all converged there is
+    neither."""
+    rows = tidy()
+    assert summarise(rows)["converged"].all()
+    for table in (
+        accuracy_table(rows, PAPER, ["CFD-P", "CFD-P+"]),
+        cost_table(rows, [("CFD-P", "CFD-P+")]),
+    ):
+        assert "†" not in table
+    rows.loc[1, "converged"] = False
+    assert summarise(rows)["converged"].tolist() == [False, True]
+    for table in (
+        accuracy_table(rows, PAPER, ["CFD-P", "CFD-P+"]),
+        cost_table(rows, [("CFD-P", "CFD-P+")]),
+    ):
+        assert "75.0 ± 35.4 †" in table and "| 50.0 ± 0.0 |" in table
+        assert table.endswith(
+            "\n\n† Not every training behind this number met the convergence rule.\n"
+        )
+    cells = summarise(rows).assign(title="CNN1D").to_dict("records")
+    shown = [row[2].text for row in page_table(cells, {}, {}).rows]
+    assert shown == ["75.0 ± 35.4, not all converged", "50.0 ± 0.0"]
 
 
 def test_rows_carry_what_the_report_needs():

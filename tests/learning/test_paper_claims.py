@@ -172,6 +172,24 @@ def test_the_papers_own_table():
     assert list(own.verdict) == ["open", "supports", "supports"]
 
 
+def test_comparisons_with_trainings_that_did_not_converge_are_marked():
+    """One seed of the better network stopped too soon: its comparison has a mark on the page, and
+    the claim's evidence counts it; the other has none."""
+    made = results({"cnn1d_341_100": [95, 96], "cnn1d_150_50": [60, 61], "cnn1d_3_1": [30, 31]})
+    made["converged"] = [True, True, True, False, True, True]
+    cells = cells_of(made, NONE, UNSEEN)
+    compared = comparisons(cells, UNSEEN)
+    own = compared[compared.score == "strict"]
+    assert dict(zip(own.worse, own.converged)) == {"CNN1D (3@1)": True, "CNN1D (150@50)": False}
+    judged = judge_claims(compared, cells, 3072 / 9)
+    page = claims_markdown(judged, compared)
+    assert "| CNN1D (150@50) | +35.0 † |" in page and "| CNN1D (3@1) | +65.0 |" in page
+    assert "; 1 with trainings that did not converge" in page and "convergence rule" in page
+    made["converged"] = True
+    compared = comparisons(cells_of(made, NONE, UNSEEN), UNSEEN)
+    assert "converge" not in claims_markdown(judge_claims(compared, cells, 3072 / 9), compared)
+
+
 def test_page_names_every_verdict():
     made = results({"cnn1d_341_100": [95, 96], "cnn1d_3_1": [60, 61]})
     cells = cells_of(made, PAPER, UNSEEN)

@@ -112,8 +112,17 @@ def test_pages_show_recordings_and_severities(rows):
     """Each recording by its name with the share of right windows, and of C2 for a cylinder."""
     table = recording_table(rows, ["CFD-MOC-PR", "CFD-Q"])
     assert "| CNN1D (3@1) | 67 ± 0 (2 of 3, 9 to 99) | – |" in table
+    assert "†" not in table
     page = severity_table(rows, ["CFD-MOC-PR"], ["h", "c", "s"])
     assert "| c | C | 88 (50) |" in page and "| h | H | 38 |" in page
+
+
+def test_a_cell_whose_trainings_did_not_all_converge_is_marked(rows):
+    """The mark is in that cell alone, and a footnote says what it means."""
+    rows = pd.concat([rows, rows.assign(dataset="CFD-Q")])
+    table = recording_table(rows, ["CFD-MOC-PR", "CFD-Q"], {("cnn1d_3_1", "CFD-Q")})
+    assert "| 67 ± 0 (2 of 3, 9 to 99) | 67 ± 0 (2 of 3, 9 to 99) † |" in table
+    assert "convergence rule" in table.splitlines()[-1]
 
 
 def test_unknown_recordings_are_not_scored():

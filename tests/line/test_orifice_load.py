@@ -51,3 +51,37 @@ def test_the_answer_obeys_line_and_law(orders, valve):
         assert np.abs(q[part] - expected).max() < 1e-5 * np.abs(expected).max()
         linear = admittance[part] * p[part]
         assert np.abs(linear - expected).max() > 1e-3 * np.abs(expected).max()  # it bends
+
+
+def load_of_line(size, resistance):
+    """(`OrificeLoad`, its arguments): a line of `resistance` over the load's, whose linear load
+    pressure is `size` of the drop at the first harmonic and falls as 1/k."""
+    orders = 9 * np.arange(1, 20)
+    admittance = np.full(19, COEFFICIENT / (2 * np.sqrt(DROP)), complex)
+    a, b = np.ones(19, complex), resistance / admittance
+    c = (a + b * admittance) * size * DROP / np.arange(1, 20) * np.exp(1j * np.arange(19))
+    load = OrificeLoad([slice(0, 19)], orders, np.array([DROP]), np.array([COEFFICIENT]))
+    return load, (a, b, c, admittance, 1.0)
+
+
+def test_a_drop_that_nearly_vanishes_is_solved_by_short_passes():
+    """Whole passes alone swing for ever here; the answer obeys the line and the law."""
+    load, (a, b, c, admittance, _) = load_of_line(1.0, 30.0)
+    p, q = load.solve(a, b, c, admittance, 1.0)
+    assert load.solved
+    assert np.abs(a * p + b * q - c).max() < 1e-9 * np.abs(c).max()
+    waves = np.exp(9j * np.outer(np.arange(1, 20), 2 * np.pi * np.arange(4096) / 4096))
+    drop = DROP + (p @ waves).real
+    assert 0.01 < drop.min() / DROP < 0.2
+    expected = 2 / 4096 * ((COEFFICIENT * np.sqrt(drop)) @ waves.conj().T)
+    assert np.abs(q - expected).max() < 1e-2 * np.abs(expected).max()
+
+
+def test_an_iteration_that_does_not_settle_is_not_claimed_solved():
+    """Four times the drop, where the law has no real root: the last iterate is flagged; the next
+    problem is solved all the same."""
+    load, arguments = load_of_line(4.0, 30.0)
+    load.solve(*arguments)
+    assert not load.solved
+    load.solve(*load_of_line(0.05, 30.0)[1])
+    assert load.solved

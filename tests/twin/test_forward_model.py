@@ -1,11 +1,15 @@
-"""The forward model's response to a ripple so small that load and line are linear."""
+"""The forward model: its response to a ripple so small that load and line are linear, and what it
+says where no steady state is found."""
 
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from paper_rig import paper_rig
+from rippletwin.calibration.posterior import Posterior
 from rippletwin.harmonics import flow_harmonics
+from rippletwin.line.frequency_domain.orifice_load import OrificeLoad
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.forward_model import ForwardModel
@@ -25,3 +29,33 @@ def test_unit_response_is_that_to_a_small_ripple():
     forward = ForwardModel(twin, [o])
     expected = forward(theta)[0] / flow_harmonics(small, o.orders)
     np.testing.assert_allclose(forward.unit_response(theta)[0], expected, rtol=1e-4)
+
+
+AIR = ((EFFECTS["entrained_air"], Place("line")),)
+NEVER_REACHED = -1.0  # tolerance of an orifice that iterates in vain
+
+
+@pytest.mark.parametrize(("effects", "frozen"), [((), False), (AIR, False), (AIR, True)])
+def test_an_orifice_that_does_not_settle_is_told(monkeypatch, effects, frozen):
+    """The orifice alone, beside air, and beside air that is frozen: the prediction is finite but no
+    steady state, so that a descent refuses it and `Twin.predict` warns. Without the obstacle the
+    same models find one."""
+    rig = paper_rig()
+    o = point(rig)
+    twin = Twin(rig, [o], effects=effects)
+    posterior = Posterior(twin, [o])
+    posterior.values = posterior.values + 1e5
+
+    def objective():
+        posterior.forward.freeze_compliance = frozen
+        prediction = posterior.predict(twin.theta)
+        assert np.all(np.isfinite(prediction))
+        return posterior.objective(twin.theta, prediction)
+
+    whole = OrificeLoad.solve
+    with monkeypatch.context() as obstacle:
+        obstacle.setattr(OrificeLoad, "solve", lambda *a, **_: whole(*a, tolerance=NEVER_REACHED))
+        assert objective() == np.inf
+        with pytest.warns(RuntimeWarning, match="a: no steady state"):
+            twin.predict([o])
+    assert np.isfinite(objective())

@@ -131,12 +131,15 @@ def test_networks_of_a_range_of_severities_are_kept_and_used(tmp_path):
 
 def test_all_recordings_are_in_the_table_and_unknown_ones_are_not(tmp_path):
     """Two slippers of one state are two recordings, called by their labels, in which a comma
-    separates nothing; an unknown recording is not scored."""
+    separates nothing; an unknown recording is not scored. The training did not converge, and the
+    page says so."""
     said = {"seed": 0, "window": range(6), "recording": [0, 0, 1, 1, 2, 2]}
     said |= {"truth": list("SSSS??"), "predicted": ["S", "S", "H", "H", "S", "S"]}
     pd.DataFrame(said).to_csv(tmp_path / "said.csv", index=False)
     names = {"labels": ["run 1, hot", "run 2", "found"]}
     store.save(xr.Dataset({"signal": ("window", [0.0])}, attrs=names), tmp_path / "w.zarr")
+    ended = {"architecture": NETWORK, "dataset": DATASET, "accuracy": [50.0], "converged": False}
+    pd.DataFrame(ended).to_csv(tmp_path / "accuracy.csv", index=False)
     table, page = tmp_path / "recordings.csv", tmp_path / "recordings.md"
     run_script(
         "recording_table",
@@ -146,9 +149,10 @@ def test_all_recordings_are_in_the_table_and_unknown_ones_are_not(tmp_path):
         {"cells": [(DATASET, NETWORK)], "datasets": [DATASET]},
         predictions=[tmp_path / "said.csv"],
         recorded=tmp_path / "w.zarr",
+        accuracy=tmp_path / "accuracy.csv",
     )
     rows = pd.read_csv(table)
     assert rows.recording.tolist() == ["run 1, hot", "run 2"]
     assert rows.right.tolist() == [True, False]
     text = page.read_text()
-    assert "All 2 recordings" in text and "| 50 ± 0 (1 of 2, 1 to 99) |" in text
+    assert "All 2 recordings" in text and "| 50 ± 0 (1 of 2, 1 to 99) † |" in text

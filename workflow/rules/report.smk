@@ -45,6 +45,7 @@ rule recording_table:
             architecture=config["architectures"],
         ),
         recorded=rules.cut_windows.output.windows,
+        accuracy=rules.accuracy_table.output.table,
         source=scripts_sources("recording_table.py"),
     output:
         table=report(

@@ -145,7 +145,12 @@ def _warnings(twin: Twin, mode: Mode, after: Misfit) -> tuple[str, ...]:
             f"bad fit: {100 * after.relative:.0f} % of what was measured is left over after "
             "calibration; the model lacks physics, or the data sheet is wrong"
         )
-    if mode.expected_gain > UNCONVERGED_GAIN:
+    if not np.isfinite(mode.expected_gain):
+        out.append(
+            "no steady state of the line was found at the fitted values, and nothing of the fit "
+            "holds; check load pressure and flow ripple in rig.yaml"
+        )
+    elif mode.expected_gain > UNCONVERGED_GAIN:
         out.append(
             f"not converged: one more step promises {mode.expected_gain:.1f} of log posterior"
         )

@@ -36,10 +36,18 @@ class Diagnoser:
     """A twin and the faults to try; called with observations of all shaft orders.
 
     Where it is not `anchored`, recordings are compared with the twin's own healthy ripple.
+    `expected_gain` is that of the pump's fit (`FittedTwin`).
     """
 
-    def __init__(self, twin: Twin, faults: Sequence[Fault], anchored: bool = True):
+    def __init__(
+        self,
+        twin: Twin,
+        faults: Sequence[Fault],
+        anchored: bool = True,
+        expected_gain: float = 0.0,
+    ):
         self.twin, self.faults, self.anchored = twin, tuple(faults), anchored
+        self.expected_gain = expected_gain
         self._learned: dict[tuple[str, ...], tuple[ErrorPrior, list[np.ndarray]]] = {}
 
     def __call__(self, observation, healthy: Sequence, start: float = 0.0) -> Diagnosis:
@@ -61,6 +69,7 @@ class Diagnoser:
             unlikeness=judge_residual(model, best, prior),
             anchor=model.anchor,
             model=model,
+            expected_gain=self.expected_gain,
         )
 
     def model(

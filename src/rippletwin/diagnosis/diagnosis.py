@@ -32,6 +32,7 @@ class Diagnosis:
     probabilities   of each state by its name; that the recording is like none of them is another
                     question, which `unlikeness` answers
     best            evidence of the most probable state
+    expected_gain   what one more step of the pump's fit promises to add to the log posterior
     """
 
     label: str
@@ -40,6 +41,7 @@ class Diagnosis:
     unlikeness: Unlikeness
     anchor: Anchor = field(repr=False)
     model: ObservationModel = field(repr=False)
+    expected_gain: float = 0.0
 
     @property
     def state(self) -> str:

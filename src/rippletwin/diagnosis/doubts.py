@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rippletwin.calibration.laplace import UNCONVERGED_GAIN
 from rippletwin.diagnosis.diagnosis import Diagnosis
 
 
@@ -10,6 +11,11 @@ def doubts(d: Diagnosis) -> list[str]:
     found = []
     if not all(flow.periodic for flow in d.model.flows.values()):
         found.append("the simulated pump did not settle into a periodic ripple")
+    if d.expected_gain > UNCONVERGED_GAIN:
+        found.append(
+            "the fit of the pump's numbers did not converge: one more step promises "
+            f"{d.expected_gain:.1f} of log posterior"
+        )
     for name in d.severities:
         low, high = d.best.cut_off[name]
         if low:

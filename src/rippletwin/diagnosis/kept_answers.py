@@ -36,6 +36,7 @@ from rippletwin.diagnosis.diagnosed_numbers import DiagnosedNumbers, from_plain,
 from rippletwin.diagnosis.diagnoser import Diagnoser
 from rippletwin.diagnosis.diagnosis_file import entry_of
 from rippletwin.diagnosis.faults.base import Fault
+from rippletwin.diagnosis.pump_calibration import FittedTwin
 from rippletwin.twin.twin import Twin
 from rippletwin.twin.twin_file import from_dict, to_dict
 
@@ -85,7 +86,8 @@ def diagnose_changed(
             answer = _read_answer(path, key)
             if answer is None:
                 if diagnoser is None:
-                    diagnoser = Diagnoser(_recalibrated(twin, beside, read, kept, of_twin), faults)
+                    fitted = _recalibrated(twin, beside, read, kept, of_twin)
+                    diagnoser = Diagnoser(fitted.twin, faults, expected_gain=fitted.expected_gain)
                 found = diagnose_one(diagnoser, recording, anchors[recording.label], read)
                 answer = Answer(entry_of(found), gather(found), False)
                 _write_answer(path, key, answer)
@@ -102,13 +104,15 @@ def warnings_of(case: Case, twin: Twin) -> list[str]:
 
 def _recalibrated(
     twin: Twin, healthy: Sequence[Recording], read: ReadOnce, kept: Path, key: str
-) -> Twin:
+) -> FittedTwin:
     """`recalibrate_twin`, or the twin that was kept of it."""
     data = _read_json(kept / TWIN, key)
     if data is None:
-        data = {"key": key, "twin": to_dict(recalibrate_twin(twin, healthy, read))}
+        found = recalibrate_twin(twin, healthy, read)
+        data = {"key": key, "twin": to_dict(found.twin), "expected_gain": found.expected_gain}
         store.write_text(kept / TWIN, json.dumps(data) + "\n")
-    return from_dict(data["twin"])  # one way for both: the same answers to the last digit
+    # one way for both: the same answers to the last digit
+    return FittedTwin(from_dict(data["twin"]), data["expected_gain"])
 
 
 def _read_answer(path: Path, key: str) -> Answer | None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -62,7 +62,15 @@ class _Flow:
     error: np.ndarray
 
 
-def calibrate_pump(twin: Twin, healthy: Sequence) -> Twin:
+class FittedTwin(NamedTuple):
+    """A twin, and what one more step of its pump's fit promises to add to the log posterior (as in
+    `laplace.Mode`); 0 where the pump was not fitted."""
+
+    twin: Twin
+    expected_gain: float = 0.0
+
+
+def calibrate_pump(twin: Twin, healthy: Sequence) -> FittedTwin:
     """The twin with its pump fitted to the flow of healthy periodic observations.
 
     Its line must be known; the pump's numbers are no parameters (`with_fitted_pump`). It is
@@ -71,17 +79,18 @@ def calibrate_pump(twin: Twin, healthy: Sequence) -> Twin:
     twin = with_fitted_pump(twin)
     pump = dict(twin.rig.pump)
     if set(pump) == {"pistons"}:
-        return twin
-    fitted = twin
+        return FittedTwin(twin)
+    fitted, gain = twin, 0.0
     for _ in range(ROUNDS):  # the flow is told beside the chambers of the pump that was fitted
         flows = [_measured_flow(fitted, observation) for observation in healthy]
-        numbers = pump | _fit_numbers(pump, twin.rig.fluid, flows)
-        fitted = rebuild(twin, replace(twin.rig, pump=numbers), theta=twin.theta)
-    return fitted
+        numbers, gain = _fit_numbers(pump, twin.rig.fluid, flows)
+        fitted = rebuild(twin, replace(twin.rig, pump=pump | numbers), theta=twin.theta)
+    return FittedTwin(fitted, gain)
 
 
-def _fit_numbers(pump: dict, fluid: Fluid, flows: Sequence[_Flow]) -> dict:
-    """The numbers that come nearest to the flows, about those of `pump`."""
+def _fit_numbers(pump: dict, fluid: Fluid, flows: Sequence[_Flow]) -> tuple[dict, float]:
+    """The numbers that come nearest to the flows, about those of `pump`, and the gain that one more
+    step promises."""
 
     def residuals(x: np.ndarray) -> np.ndarray:
         numbers, scale = pump | _numbers(pump, x), np.exp(SCALE_SD * x[-1])
@@ -94,7 +103,10 @@ def _fit_numbers(pump: dict, fluid: Fluid, flows: Sequence[_Flow]) -> dict:
     start = np.zeros(len(PRIOR_SD) + 2)
     ends = -MOST_SDS, MOST_SDS
     found = least_squares(residuals, start, bounds=ends, max_nfev=EVALUATIONS)
-    return _numbers(pump, found.x)
+    slopes = found.jac[:, found.active_mask == 0]  # a number at its end goes no further
+    gradient = slopes.T @ found.fun
+    gain = 0.5 * float(gradient @ np.linalg.solve(slopes.T @ slopes, gradient))
+    return _numbers(pump, found.x), gain
 
 
 def one_each_point(observations: Sequence) -> list:

@@ -13,6 +13,8 @@ from rippletwin.spectra.noise import noise_cycle_scatter
 
 METHODS = ("spectral", "pinn")
 STEPS_BETWEEN_REPORTS = 50  # of the physics-informed network's training
+LAST_SHARE = 0.1  # of that training's steps, in which a converged one gains no more
+UNCONVERGED_GAIN = 0.2  # share of the loss
 
 
 def estimate_flow_by(
@@ -51,9 +53,21 @@ def estimate_flow_by(
             progress(f"step {step}: loss {loss:.2g}")
 
     settings = pinn.Settings(width=width, steps=steps)
-    trunk, _ = pinn.train(line_at, speed_hz, bandwidth_hz, settings, report)
+    trunk, losses = pinn.train(line_at, speed_hz, bandwidth_hz, settings, report)
     progress(f"equations hold to {float(trunk.residual):.2g} of the waves")
+    gain = last_gain(losses)
+    if not gain <= UNCONVERGED_GAIN:
+        progress(
+            f"warning: not converged: the last {LAST_SHARE:.0%} of the training lowered its loss "
+            f"by {gain:.0%}; raise flow_sensor.steps"
+        )
     return pinn.estimate_flow(windows, speed_hz, line_at, trunk, noise, bandwidth_hz)
+
+
+def last_gain(losses: np.ndarray) -> float:
+    """Share by which the last LAST_SHARE of the steps lowered the least loss; losses (n,)."""
+    before = losses[: max(int((1.0 - LAST_SHARE) * len(losses)), 1)]
+    return float(1.0 - np.min(losses) / np.min(before))
 
 
 def noise_of_flow(flow: np.ndarray, recording: np.ndarray, healthy: np.ndarray) -> np.ndarray:

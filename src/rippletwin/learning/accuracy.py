@@ -103,10 +103,14 @@ def confusion_of(rows: pd.DataFrame) -> np.ndarray:
 
 
 def summarise(rows: pd.DataFrame, column: str = "accuracy") -> pd.DataFrame:
-    """Mean, standard deviation (of the sample; 0 for one run) and runs of each table cell.
+    """Mean, standard deviation (of the sample; 0 for one run) and runs of each table cell, and
+    whether all its trainings ``converged``.
 
-    A cell whose windows are all of unknown state has a mean of NaN and no runs.
+    A cell whose windows are all of unknown state has a mean of NaN and no runs. Rows that do not
+    say how their training ended count as converged.
     """
-    cells = rows.groupby(["architecture", "dataset"], sort=False)[column]
-    table = cells.agg(["mean", "std", "count"]).reset_index()
-    return table.fillna({"std": 0.0})
+    rows = rows if "converged" in rows else rows.assign(converged=True)
+    cells = rows.groupby(["architecture", "dataset"], sort=False)
+    table = cells[column].agg(["mean", "std", "count"])
+    table["converged"] = cells["converged"].agg(lambda ended: ended.ne(False).all())
+    return table.reset_index().fillna({"std": 0.0})

@@ -28,6 +28,7 @@ from scipy.stats import t as student
 
 from rippletwin.learning.accuracy import summarise
 from rippletwin.learning.architectures import ARCHITECTURES
+from rippletwin.learning.markdown import mark_unconverged, with_footnote
 from rippletwin.learning.recording_accuracy import paired_interval
 
 EXPERIMENTAL = "experimental"  # the dataset of recordings, which no zero-shot claim concerns
@@ -71,17 +72,19 @@ def cells_of(results: pd.DataFrame, paper: pd.DataFrame, shares: pd.DataFrame) -
 
     results : tidy accuracies in per cent (``accuracy.result_row``); paper : columns architecture,
     dataset, mean, std; shares : ``recording_shares``. Columns score, architecture, dataset, mean,
-    std, count (of recordings, else of seeds).
+    std, count (of recordings, else of seeds), converged (whether all trainings did).
     """
+    strict = summarise(results)
     by_recording = shares.agg(["mean", "std", "count"]).T.reset_index()
+    ended = strict[["architecture", "dataset", "converged"]]
     scores = {
-        RECORDINGS: by_recording,
-        STRICT: summarise(results),
+        RECORDINGS: by_recording.merge(ended, how="left") if len(by_recording) else by_recording,
+        STRICT: strict,
         EITHER: summarise(results, "accuracy_either"),
-        PAPER: paper.assign(count=PAPER_SEEDS),
+        PAPER: paper.assign(count=PAPER_SEEDS, converged=True),
     }
     cells = pd.concat([table.assign(score=score) for score, table in scores.items() if len(table)])
-    names = ["score", "architecture", "dataset", "mean", "std", "count"]
+    names = ["score", "architecture", "dataset", "mean", "std", "count", "converged"]
     return cells.dropna(subset=["mean"]).reset_index(drop=True)[names]
 
 
@@ -132,11 +135,12 @@ def comparisons(cells: pd.DataFrame, shares: pd.DataFrame) -> pd.DataFrame:
     """Every comparison that the cells (``cells_of``) allow; shares : ``recording_shares``.
 
     Columns claim, score, dataset, better, worse (labels), difference, low, high (per cent of the
-    windows), verdict.
+    windows), verdict, converged (whether all trainings of both did).
     """
     rows = []
     for score, table in cells.groupby("score", sort=False):
         runs = {(c.architecture, c.dataset): (c.mean, c.std, c.count) for c in table.itertuples()}
+        converged = {(c.architecture, c.dataset): c.converged for c in table.itertuples()}
         compare = paired_difference
         if score == RECORDINGS:
             runs = {cell: shares[cell] for cell in runs}
@@ -154,8 +158,9 @@ def comparisons(cells: pd.DataFrame, shares: pd.DataFrame) -> pd.DataFrame:
                 rows.append(
                     (claim, score, better[1], _label(better), _label(worse, beside=better))
                     + (mean, low, high, verdict_of_difference(low, high))
+                    + (converged[better] and converged[worse],)
                 )
-    names = "claim score dataset better worse difference low high verdict"
+    names = "claim score dataset better worse difference low high verdict converged"
     return pd.DataFrame(rows, columns=names.split())
 
 
@@ -174,11 +179,14 @@ def judge_claims(compared: pd.DataFrame, cells: pd.DataFrame, period: float) -> 
             counts = found.verdict.value_counts()
             evidence = "no comparison"
             if len(found):
+                open_ended = int((~found.converged.astype(bool)).sum())
                 evidence = (
                     f"{len(found)} comparisons: {counts.get('supports', 0)} support, "
                     f"{counts.get('opposes', 0)} oppose; differences {found.difference.min():+.1f} "
                     f"to {found.difference.max():+.1f}, median {found.difference.median():+.1f}"
                 )
+                if open_ended:
+                    evidence += f"; {open_ended} with trainings that did not converge"
             rows.append((claim, score, judge_claim(list(found.verdict)), evidence))
     for score in scores:
         learnt = cells[(cells.score == score) & (cells.dataset == EXPERIMENTAL)]["mean"]
@@ -223,11 +231,12 @@ def claims_markdown(judged: pd.DataFrame, compared: pd.DataFrame) -> str:
             "|---|---|---|---|---|---|---|",
         ]
         for row in rows.itertuples():
+            difference = mark_unconverged(f"{row.difference:+.1f}", row.converged)
             lines.append(
                 f"| {row.score} | {row.dataset} | {row.better} | {row.worse} "
-                f"| {row.difference:+.1f} | {row.low:+.1f} to {row.high:+.1f} | {row.verdict} |"
+                f"| {difference} | {row.low:+.1f} to {row.high:+.1f} | {row.verdict} |"
             )
-    return "\n".join(lines) + "\n"
+    return with_footnote("\n".join(lines) + "\n")
 
 
 def _label(cell: tuple[str, str], beside: tuple[str, str] | None = None) -> str:

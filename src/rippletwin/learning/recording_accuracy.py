@@ -6,7 +6,7 @@ right. The interval of a share of recordings is exact (Clopper & Pearson 1934, B
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 import pandas as pd
@@ -14,7 +14,7 @@ from scipy.stats import binomtest
 
 from rippletwin.learning.accuracy import UNKNOWN
 from rippletwin.learning.architectures import ARCHITECTURES, CLASSES
-from rippletwin.learning.markdown import markdown_table
+from rippletwin.learning.markdown import mark_unconverged, markdown_table, with_footnote
 
 CELL = ["architecture", "dataset"]
 MOST_SUBSETS = 2**14  # of differences whose means are taken
@@ -99,17 +99,26 @@ def paired_interval(differences: np.ndarray) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def recording_table(rows: pd.DataFrame, datasets: Sequence[str]) -> str:
-    """Markdown of ``recording_cells``, a row a network and a column for each of `datasets`."""
+def recording_table(
+    rows: pd.DataFrame, datasets: Sequence[str], unconverged: Collection[tuple[str, str]] = ()
+) -> str:
+    """Markdown of ``recording_cells``, a row a network and a column for each of `datasets`.
+
+    unconverged : (architecture, dataset) of cells to mark, with a footnote: not all of their
+    trainings converged.
+    """
     cells = {
-        (c.architecture, c.dataset): f"{c.mean:.0f} ± {c.std:.0f} ({c.right} of {c.recordings}, "
-        f"{c.low:.0f} to {c.high:.0f})"
+        (c.architecture, c.dataset): mark_unconverged(
+            f"{c.mean:.0f} ± {c.std:.0f} ({c.right} of {c.recordings}, "
+            f"{c.low:.0f} to {c.high:.0f})",
+            (c.architecture, c.dataset) not in unconverged,
+        )
         for c in recording_cells(rows).itertuples()
     }
     named = [name for name in ARCHITECTURES if name in set(rows.architecture)]
     lines = [[ARCHITECTURES[name].title, *(cells.get((name, d), "–") for d in datasets)]
              for name in named]  # fmt: skip
-    return markdown_table(["Architecture", *datasets], lines)
+    return with_footnote(markdown_table(["Architecture", *datasets], lines))
 
 
 def severity_table(rows: pd.DataFrame, datasets: Sequence[str], names: Sequence[str]) -> str:

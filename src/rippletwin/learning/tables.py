@@ -9,7 +9,7 @@ import pandas as pd
 
 from rippletwin.learning.accuracy import summarise
 from rippletwin.learning.architectures import ARCHITECTURES, CLASSES
-from rippletwin.learning.markdown import markdown_table
+from rippletwin.learning.markdown import mark_unconverged, markdown_table, with_footnote
 
 DOMAIN_TITLES = {"time": "Time domain", "image": "Time-frequency domain"}
 
@@ -24,7 +24,8 @@ def accuracy_table(
 
     rows : tidy results (``result_row``); paper : columns architecture, dataset, mean, std;
     datasets : names of the columns from left to right, of which those are shown that either has.
-    A cell that was not run, or cannot be scored, is a dash.
+    A cell that was not run, or cannot be scored, is a dash; one whose trainings did not all
+    converge is marked, with a footnote.
     """
     ours, theirs = _cells(summarise(rows, column)), _cells(paper)
     known = {*paper["dataset"], *rows["dataset"]}
@@ -45,7 +46,7 @@ def accuracy_table(
                 cell += f" ({theirs[name, dataset]})"
             cells.append(cell)
         lines.append(f"| {first} | {architecture.title} | " + " | ".join(cells) + " |")
-    return "\n".join(lines) + "\n"
+    return with_footnote("\n".join(lines) + "\n")
 
 
 def cost_table(
@@ -56,7 +57,7 @@ def cost_table(
     rows : tidy results (``result_row``); pairs : (dataset of the calibrated twin, the same of the
     corrected one). A line a network, and one for the mean of those networks that ran on both; the
     cost is accuracy with the corrected twin less that with the calibrated, in per cent of all
-    windows. A cell that was not run is a dash.
+    windows. A cell that was not run is a dash; one that did not converge is marked.
     """
     table = summarise(rows, column)
     cells, means = _cells(table), table.set_index(["architecture", "dataset"])["mean"]
@@ -77,7 +78,7 @@ def cost_table(
         numbers = f"{without:.1f}", f"{plus:.1f}", f"{plus - without:+.1f}"
         line += numbers if len(both) else ["–"] * 3
     lines.append("| mean of networks | " + " | ".join(line) + " |")
-    return "\n".join(lines) + "\n"
+    return with_footnote("\n".join(lines) + "\n")
 
 
 def answer_table(answers: pd.DataFrame) -> str:
@@ -96,6 +97,10 @@ def answer_table(answers: pd.DataFrame) -> str:
 
 
 def _cells(table: pd.DataFrame) -> dict[tuple[str, str], str]:
-    keys = zip(table["architecture"], table["dataset"])
-    cells = {key: f"{m:.1f} ± {s:.1f}" for key, m, s in zip(keys, table["mean"], table["std"])}
-    return {key: text for key, text in cells.items() if not text.startswith("nan")}
+    return {
+        (cell.architecture, cell.dataset): mark_unconverged(
+            f"{cell.mean:.1f} ± {cell.std:.1f}", getattr(cell, "converged", True)
+        )
+        for cell in table.itertuples()
+        if not np.isnan(cell.mean)
+    }

@@ -28,7 +28,7 @@ def accuracy_table(
 ) -> Table:
     """Accuracy of every network and dataset in per cent, beside the paper's.
 
-    rows      each with architecture, title, dataset, mean and std
+    rows      each with architecture, title, dataset, mean, std, and whether all trainings converged
     paper     mean and standard deviation by (architecture, dataset)
     datasets  the row of config/datasets.tsv of each dataset
     """
@@ -37,6 +37,8 @@ def accuracy_table(
         theirs = paper.get((row["architecture"], row["dataset"]))
         beside = Cell("", -1.0) if theirs is None else _mean(*theirs)
         ours = _mean(row["mean"], row["std"])
+        if not row.get("converged", True):
+            ours = ours._replace(text=f"{ours.text}, not all converged")
         cells.append(
             [text(row["title"]), text(describe_dataset(row["dataset"], datasets)), ours, beside]
         )

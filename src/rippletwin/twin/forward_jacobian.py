@@ -157,7 +157,6 @@ class DifferentiableForward(ForwardModel):
             return
         linear = network.load_state()
         if self.freeze_compliance:
-            self.solved = True
             self._set_frozen_outflows(network)
             self._balance_load(network, theta)
         else:

@@ -40,7 +40,7 @@ class ForwardModel:
     reflection coefficient (1, F), see `reflection`.
 
     observations may be `OperatingCondition`s. `slices` has each one's columns among all F; `solved`
-    says whether the nonlinear compliance of the last prediction is a steady state.
+    says whether orifice and nonlinear compliance of the last prediction are in a steady state.
     """
 
     def __init__(self, twin: Twin, observations: Sequence):
@@ -263,7 +263,7 @@ class ForwardModel:
             tolerance = min(COUPLED_ORIFICE_TOLERANCE, solver.tolerance)
             solve_load = wide._load_solver(whole, theta, tolerance=tolerance)
             state = [x[seen] for x in solver.solve(whole, solve_load)]
-            self.solved = solver.solved
+            self.solved = solver.solved and wide._orifice_is_solved
             positions, outflow = whole.outflows
             network.outflows = positions, outflow[:, seen]
             if self._orifice is not None:
@@ -271,6 +271,7 @@ class ForwardModel:
         else:
             wide, seen = self._extended_for_orifice
             state = wide._load_solver(whole, theta)(*whole.load_relation())
+            self.solved = wide._orifice_is_solved
             network.load = "state", tuple(x[seen] for x in state)
 
     def _balance_load(self, network: FrequencyDomainLine, theta: np.ndarray) -> None:
@@ -278,6 +279,11 @@ class ForwardModel:
         if self._orifice is not None:
             state = self._load_solver(network, theta)(*network.load_relation())
             network.load = "state", tuple(state)
+        self.solved = self._orifice_is_solved
+
+    @property
+    def _orifice_is_solved(self) -> bool:
+        return self._orifice is None or self._orifice.solved
 
     def _load_solver(self, network: FrequencyDomainLine, theta: np.ndarray, **accuracy: float):
         """The function (a, b, c) -> (p, q) at the load of `network`, where a p + b q = c.

@@ -22,6 +22,7 @@ An effect at its place is a pair (effect, place) of `rippletwin.twin.effects`; i
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -212,9 +213,16 @@ class Twin:
     def predict(self, observations: Sequence, theta: np.ndarray | None = None) -> list[np.ndarray]:
         """What the sensors read in each observation: list of (S, F) complex, see `ForwardModel`.
 
-        For many calls with the same observations make one `ForwardModel` and keep it.
+        For many calls with the same observations make one `ForwardModel` and keep it. Warns where
+        no steady state was found.
         """
-        return ForwardModel(self, observations)(self.theta if theta is None else np.asarray(theta))
+        forward = ForwardModel(self, observations)
+        predicted = forward(self.theta if theta is None else np.asarray(theta))
+        if not forward.solved:
+            labels = ", ".join(o.label or "an operating point" for o in forward.observations)
+            text = f"{labels}: no steady state was found; the last iterate is returned"
+            warnings.warn(text, RuntimeWarning, stacklevel=2)
+        return predicted
 
     def operating_point(self, observation) -> OperatingPoint:
         """Mean pressure and flow, orifice coefficient and source of an observation or an

@@ -34,12 +34,15 @@ class Modulation(NamedTuple):
     sidebands   (F,) flow that it makes at the orders of an `OrderFlow`, m3/s; 0 at piston orders
     energy      of the flow at shaft orders, each order relative to its neighbourhood, without noise
     left        of that, what the modulation does not account for
+    converged   whether the search for b ended where no step gains; one step from a given estimate
+                is not meant to
     """
 
     amplitude: complex
     sidebands: np.ndarray
     energy: float
     left: float
+    converged: bool = True
 
     def error_by_spread(self, pistons: int) -> float:
         """Relative standard deviation of b, in either part, by pistons of unequal angles.
@@ -95,7 +98,8 @@ def fit_modulation(flow: OrderFlow, pistons: int, start: complex | None = None) 
     noise = float(np.sum((weight**2 * flow.variance[used])[is_shaft_order]))
     energy = float(np.sum(np.abs(target[is_shaft_order]) ** 2)) - noise
     left = 2.0 * float(best.cost) - noise
-    return Modulation(b, sidebands, max(energy, 0.0), max(left, 0.0))
+    converged = start is not None or best.status > 0
+    return Modulation(b, sidebands, max(energy, 0.0), max(left, 0.0), converged)
 
 
 def spread_by_modulation(orders: np.ndarray, carriers: np.ndarray, b: complex) -> np.ndarray:

@@ -61,6 +61,7 @@ class ShaftOrders:
     effects     what makes it, the stronger first; empty where that is not known
     modulation  complex amplitude b of each recording by its label, where a speed fluctuation is
                 among the effects: the shaft leads an even rotation by Re(b exp(j t)) rad at angle t
+    converged   whether the fits of the modulation did
     """
 
     level: float
@@ -68,6 +69,7 @@ class ShaftOrders:
     coherence: float
     effects: tuple[ShaftEffect, ...] = ()
     modulation: Mapping[str, complex] = field(default_factory=dict)
+    converged: bool = True
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -118,11 +120,12 @@ def analyse_shaft_orders(
     ):
         return found
     modulations = {label: fit_modulation(flow, pistons) for label, flow in flows.items()}
+    converged = all(m.converged for m in modulations.values())
     effects = _name_effects(list(flows.values()), list(modulations.values()), pistons)
     if "speed_fluctuation" not in [effect.name for effect in effects]:
         modulations = {}
     amplitudes = {label: m.amplitude for label, m in modulations.items()}
-    return ShaftOrders(level, p_value, coherence, effects, amplitudes)
+    return ShaftOrders(level, p_value, coherence, effects, amplitudes, converged)
 
 
 def _name_effects(

@@ -67,6 +67,8 @@ def shaft_order_sentences(shaft_orders: ShaftOrders | None) -> list[str]:
     ]
     if "piston_spread" in shaft_orders.names:
         sentences.append("Unequal pistons resemble a fault of a single piston.")
+    if not shaft_orders.converged:
+        sentences.append("The fit of the modulation did not converge, so these numbers are rough.")
     return [" ".join(sentences)]
 
 

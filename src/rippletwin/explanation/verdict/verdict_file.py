@@ -114,12 +114,14 @@ def _shaft_effects(e: Explanation) -> list[dict]:
     """The effects at shaft orders.
 
     Data that contradict themselves show no effect. While something else is unexplained, shaft
-    orders establish none: the twin that interprets them is incomplete.
+    orders establish none: the twin that interprets them is incomplete. Nor does a fit of them that
+    did not converge.
     """
     shaft_orders = e.shaft_orders
     if shaft_orders is None or e.decision.verdict == "bad_data":
         return []
-    support = "supported" if e.decision.verdict == "unexplained" else "established"
+    is_doubtful = e.decision.verdict == "unexplained" or not shaft_orders.converged
+    support = "supported" if is_doubtful else "established"
     return [_shaft_effect(effect, support) for effect in shaft_orders.effects]
 
 

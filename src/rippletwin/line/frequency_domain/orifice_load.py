@@ -12,7 +12,9 @@ admittance, the valve's with it, and n(p) what the orifice's harmonics have beyo
     q = Y p + n(p),   a p + b (Y p + n(p)) = c,
 
 which couples the harmonics of one recording. It is solved by repeated substitution: |n|/|Y p| is
-about |p|/(4 P), a per cent or so, so that each pass gains about two digits.
+about |p|/(4 P), a per cent or so, so that each pass gains about two digits. Where the drop nearly
+vanishes in a period, whole passes overshoot; short ones follow, which settle unless there is no
+such state.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ import numpy as np
 from numba import njit
 
 MAX_PASSES = 50
+MAX_SHORT_PASSES, SHORT_PASS = 200, 0.3  # after those, and the share of the way that each goes
 PRESSURE_TOLERANCE = 1e-10  # change in a pass over a recording's largest harmonic
 MIN_RELATIVE_DROP = 1e-3  # of the mean drop: the law is clipped there, to stay real
 
@@ -34,6 +37,7 @@ class OrificeLoad:
     orders  (F,) shaft orders
     drop, coefficient   of each recording: P in Pa and K in m3/s/sqrt(Pa) without a ripple
     passes_flow         whether K is scaled so that the mean flow with a ripple is K sqrt(P)
+    solved              whether the last solution is one; else it is the last iterate
     """
 
     def __init__(
@@ -53,7 +57,7 @@ class OrificeLoad:
         phase = 2 * np.pi * np.arange(samples) / samples
         self._cos, self._sin = np.cos(phase), np.sin(phase)
         self._drop, self._coefficient = drop, coefficient
-        self._passes_flow = passes_flow
+        self._passes_flow, self.solved = passes_flow, True
 
     def solve(
         self,
@@ -75,7 +79,7 @@ class OrificeLoad:
         coefficient = factor * self._coefficient
         if opening is None:
             opening = np.zeros(0, complex)
-        p, n = _substitute(
+        p, n, self.solved = _substitute(
             b / total, c / total, np.asarray(opening, complex), self._edges, self._harmonic,
             self._cos, self._sin, self._drop, coefficient, self._passes_flow, tolerance,
         )  # fmt: skip
@@ -86,8 +90,8 @@ class OrificeLoad:
 def _substitute(
     b, c, opening, edges, harmonic, cos, sin, drop, coefficient, passes_flow, tolerance
 ):
-    """p = c - b n(p) by repeated substitution, and n, both (F,)."""
-    p, n = c.copy(), np.zeros_like(c)
+    """p = c - b n(p) by repeated substitution, and n, both (F,); whether it converged."""
+    p, n, solved = c.copy(), np.zeros_like(c), True
     samples = len(cos)
     # real and imaginary part of a transform, and room for its work
     re, im, more_re, more_im = np.empty((4, samples))
@@ -95,14 +99,16 @@ def _substitute(
         start, stop = edges[r]
         root = np.sqrt(drop[r])
         slope = coefficient[r] / (2.0 * root)
-        for _ in range(MAX_PASSES):
-            # two real signals as one complex: the pressure, and what the valve opens
+        for done in range(MAX_PASSES + MAX_SHORT_PASSES):
+            share = 1.0 if done < MAX_PASSES else SHORT_PASS
+            # two real signals as one complex, both in Pa lest one's rounding drown the other: the
+            # pressure, and 2 P times what the valve opens
             re[:] = 0.0
             im[:] = 0.0
             for k in range(start, stop):
                 m, y = harmonic[k], 0j
                 if len(opening) > 0:
-                    y = opening[k] * p[k] / (2.0 * drop[r])
+                    y = opening[k] * p[k]
                 below, above = 0.5 * (p[k].conjugate() + 1j * y.conjugate()), 0.5 * (p[k] + 1j * y)
                 re[m] += below.real
                 im[m] += below.imag
@@ -112,12 +118,12 @@ def _substitute(
             passed, flow = 0.0, more_re
             for i in range(samples):
                 root_drop = np.sqrt(max(drop[r] + re[i], MIN_RELATIVE_DROP * drop[r]))
-                flow[i] = (1.0 + im[i]) * root_drop
+                flow[i] = (1.0 + 0.5 / drop[r] * im[i]) * root_drop
             for i in range(samples):
                 passed += flow[i]
             scale = coefficient[r] * (root / (passed / samples) if passes_flow else 1.0)
             for i in range(samples):
-                re[i] = scale * flow[i] - slope * re[i] - coefficient[r] * root * im[i]
+                re[i] = scale * flow[i] - slope * (re[i] + im[i])
                 im[i] = 0.0
             _transform(re, im, more_re, more_im, cos, sin)
             change = largest = 0.0
@@ -126,10 +132,12 @@ def _substitute(
                 new = c[k] - b[k] * n[k]
                 change = max(change, abs(new - p[k]))
                 largest = max(largest, abs(new))
-                p[k] = new
+                p[k] = (1.0 - share) * p[k] + share * new
             if change <= tolerance * largest:
                 break
-    return p, n
+        else:
+            solved = False
+    return p, n, solved and np.all(np.isfinite(p))
 
 
 @njit(cache=True, error_model="numpy")
