@@ -18,11 +18,8 @@ from scipy.special import chdtrc
 from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit
 from rippletwin.explanation.fit_jobs import FitJob, FromTheta, Workers
-from rippletwin.explanation.localise.smooth_corrections import (
-    NONE,
-    SmoothCorrections,
-    elements_of,
-)
+from rippletwin.explanation.localise.elements import NONE, elements_of
+from rippletwin.explanation.localise.smooth_corrections import SmoothCorrections
 from rippletwin.explanation.thresholds import (
     DISAGREEMENT_ALARM,
     DRIFT_SIGNIFICANCE,

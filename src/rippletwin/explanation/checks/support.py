@@ -31,13 +31,13 @@ from rippletwin.explanation.checks.prior_sensitivity import WithoutEffect, fit_w
 from rippletwin.explanation.checks.robustness import Robustness, compare_beside_corrections
 from rippletwin.explanation.fit_jobs import FitJob, FromTheta, Workers, job_without_effect
 from rippletwin.explanation.fit_starts import transfer_theta
-from rippletwin.explanation.localise.smooth_corrections import (
+from rippletwin.explanation.localise.elements import (
     NONE,
-    SmoothCorrections,
     elements_of,
     own_element,
     position_spacing,
 )
+from rippletwin.explanation.localise.smooth_corrections import SmoothCorrections
 from rippletwin.explanation.search.stepwise_moves import extension_job
 from rippletwin.explanation.thresholds import (
     MAX_DISAGREEMENT,

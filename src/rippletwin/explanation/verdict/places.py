@@ -28,7 +28,7 @@ def element_and_extent(rig, place, parameters: dict) -> tuple[str, list[float]]:
 
 
 def element_in_words(rig, element: tuple, interval) -> tuple[str, list[float]]:
-    """Element and interval along the line (m) of an element of `localise.smooth_corrections`."""
+    """Element and interval along the line (m) of an element as in `localise.elements`."""
     kind, where = element
     length = float(rig.length)
     if kind == "source":
