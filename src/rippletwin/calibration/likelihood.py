@@ -36,7 +36,7 @@ from rippletwin.calibration.whitening import (
 )
 from rippletwin.spectra.frequency_selection import select_below
 from rippletwin.twin.forward_jacobian import STEP, DifferentiableForward
-from rippletwin.twin.forward_model import characteristic_impedance, reflection
+from rippletwin.twin.reflection import stated_unit, to_reflection
 
 EVENNESS = 0.5
 """Evenness g with which `calibrate` works. Where physics is missing, the weak upper harmonics are
@@ -272,16 +272,16 @@ class _Group:
 def to_predicted_quantity(observation, rig):
     """The observation in the quantity that `ForwardModel` predicts.
 
-    An input impedance becomes a reflection coefficient (see `reflection`), its
+    An input impedance becomes a reflection coefficient (see `twin.reflection`), its
     covariance with it: dR = 2 dz/(z + 1)^2 with z over the data sheet's rho a/A. The rest stays.
     """
     if observation.kind != "input_impedance":
         return observation
-    unit = 1.0 if observation.normalised else characteristic_impedance(rig.fluid, rig.line[0])
+    unit = stated_unit(observation, rig)
     z = observation.values / unit
     slope = np.abs(2.0 / (z[0] + 1.0) ** 2) ** 2 / unit**2
     return replace(
         observation,
-        values=reflection(z),
+        values=to_reflection(z),
         covariance=observation.covariance * slope[:, None, None],
     )

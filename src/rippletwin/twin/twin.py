@@ -28,11 +28,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rippletwin.case.model import FlowRipple, Rig, Segment, Sensor
+from rippletwin.case.model import FlowRipple, Rig, Sensor
 from rippletwin.line.frequency_domain.pipe_immittance import FRICTION_LAWS
 from rippletwin.twin import parameters as coordinates
 from rippletwin.twin.corrected_ripple import CorrectedRipple
-from rippletwin.twin.forward_model import ForwardModel, characteristic_impedance
+from rippletwin.twin.forward_model import ForwardModel
 from rippletwin.twin.nominal_ripples import NominalRipples
 from rippletwin.twin.operating_point import (
     OperatingCondition,
@@ -238,18 +238,6 @@ class Twin:
         """
         condition = OperatingCondition.at_orders(orders, speed_hz, load_pressure, ripple)
         return self.predict([condition])[0]
-
-    def reference_impedance(self, theta: np.ndarray, observation) -> float:
-        """Reference of an input impedance, Pa s/m3: rho a/A of the first segment.
-
-        A measurement given as a ratio remains one whatever the true bore, so its reference is the
-        model's own; one given in Pa s/m3 is divided by the data sheet's, as the data are.
-        """
-        first = self.rig.line[0]
-        if observation.normalised:
-            v = self.arrays(theta)
-            first = Segment(first.length, v.diameters[0], v.wave_speeds[0])
-        return characteristic_impedance(self.rig.fluid, first)
 
     # copies
 

@@ -20,7 +20,8 @@ from rippletwin.calibration.posterior import Posterior
 from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.line.frequency_domain.pipe_immittance import shunt_admittance
 from rippletwin.twin.effects.base import LineState
-from rippletwin.twin.forward_model import ForwardModel, reflection
+from rippletwin.twin.forward_model import ForwardModel
+from rippletwin.twin.reflection import reference_impedance, to_reflection
 
 PROBE_SHARE = 1e-4  # of the change by an effect, for finite differences
 RETARDATION_TIMES = np.geomspace(2e-5, 5e-3, 9)  # s, of a relaxing compliance
@@ -71,11 +72,11 @@ def observable_of(
     impedance = network.input_impedance()
     scale = np.concatenate(
         [
-            np.full(len(o.frequency_hz), twin.reference_impedance(theta, o))
+            np.full(len(o.frequency_hz), reference_impedance(twin, theta, o))
             for o in posterior.observations
         ]
     )
-    return reflection(impedance / scale)[None]
+    return to_reflection(impedance / scale)[None]
 
 
 def whitened_columns(
