@@ -12,7 +12,7 @@ import leaking_pump
 from rippletwin.diagnosis.diagnose import healthy_misfit
 from rippletwin.diagnosis.line_calibration import calibrate_line
 from rippletwin.diagnosis.pump_calibration import calibrate_pump, one_each_point
-from rippletwin.diagnosis.pump_flow import healthy_flow
+from rippletwin.diagnosis.pump_flow import simulate_healthy_pump
 from rippletwin.harmonics import peak_amplitudes
 from rippletwin.twin.twin import Twin
 
@@ -50,7 +50,7 @@ def test_the_pump_s_flow_comes_nearer_to_the_true_one(healthy):
     point = leaking_pump.OIL, leaking_pump.SPEED, leaking_pump.LOAD
     orders = leaking_pump.PISTONS * np.arange(1, 13)
     true, sheet, found = (
-        np.abs(peak_amplitudes(healthy_flow(pump, *point).flow)[orders])
+        np.abs(peak_amplitudes(simulate_healthy_pump(pump, *point).flow)[orders])
         for pump in (leaking_pump.TRUE, line.rig.pump, fitted)
     )
     assert np.linalg.norm(found - true) < 0.5 * np.linalg.norm(sheet - true)

@@ -12,7 +12,7 @@ from rippletwin.learning import paper_claims
 from rippletwin.learning.paper_claims import (
     cells_of,
     claims_markdown,
-    comparisons,
+    compare_cells,
     judge_claim,
     judge_claims,
     paired_difference,
@@ -81,7 +81,7 @@ def test_made_results_are_judged_as_made():
         }
     )
     cells = cells_of(made, NONE)
-    compared = comparisons(cells)
+    compared = compare_cells(cells)
     table = judge_claims(compared, cells, 3072 / 9).set_index(["claim", "score"]).verdict
     assert table[paper_claims.KERNELS_IN_TIME.text, "strict"] == "reproduced"
     assert table[paper_claims.KERNELS_IN_IMAGES.text, "strict"] == "not"
@@ -97,7 +97,7 @@ def test_calibration_compares_a_network_with_itself():
     made = pd.concat(
         [results({"cnn1d_3_1": [90, 90]}), results({"cnn1d_3_1": [40, 40]}, dataset="CFD-P")]
     )
-    (row,) = comparisons(cells_of(made, NONE)).query("score == 'strict'").itertuples()
+    (row,) = compare_cells(cells_of(made, NONE)).query("score == 'strict'").itertuples()
     assert (row.claim, row.difference, row.worse) == (paper_claims.CALIBRATION, 50, "CFD-P")
 
 
@@ -106,7 +106,7 @@ def test_the_papers_own_table():
     recordings; kernels in time are not a clean sweep, since 3@1 beats 150@50 on CFD-P, but 341@100
     beats 3@1 on two of three datasets with certainty."""
     cells = cells_of(results({"cnn1d_3_1": [1, 2]}), PAPER)
-    compared = comparisons(cells)
+    compared = compare_cells(cells)
     table = judge_claims(compared, cells, 3072 / 9).set_index(["claim", "score"]).verdict
     assert table[paper_claims.CALIBRATION, paper_claims.PAPER] == "reproduced"
     assert table[paper_claims.LEARNABLE, paper_claims.PAPER] == "reproduced"
@@ -116,7 +116,7 @@ def test_the_papers_own_table():
 
 def test_page_names_every_verdict():
     cells = cells_of(results({"cnn1d_341_100": [95, 96], "cnn1d_3_1": [60, 61]}), PAPER)
-    compared = comparisons(cells)
+    compared = compare_cells(cells)
     page = claims_markdown(judge_claims(compared, cells, 3072 / 9), compared)
     assert "**reproduced**" in page and "**untested**" in page
     assert "| CNN1D (341@100) | CNN1D (3@1) | +35.0 |" in page

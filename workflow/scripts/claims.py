@@ -17,7 +17,7 @@ pistons = load_case(Path(snakemake.input.rig).parent, states=()).rig.pump["pisto
 results = pd.read_csv(snakemake.input.table)
 results = results[results.dataset.isin(snakemake.params.datasets)]
 cells = paper_claims.cells_of(results, pd.read_csv(snakemake.input.paper))
-compared = paper_claims.comparisons(cells)
+compared = paper_claims.compare_cells(cells)
 judged = paper_claims.judge_claims(
     compared, cells, snakemake.params.samples_per_revolution / pistons
 )

@@ -64,11 +64,11 @@ from typing import NamedTuple
 import numpy as np
 
 from rippletwin.calibration.error_costs import error_costs
-from rippletwin.calibration.error_sizes import ErrorSizes, most_likely_sizes
+from rippletwin.calibration.error_sizes import ErrorSizes, find_most_likely_sizes
 from rippletwin.calibration.smooth_source import SmoothSourceError, SourceExpansion
 from rippletwin.calibration.source_expansion import (
     SourceData,
-    most_likely_expansion,
+    find_most_likely_expansion,
     whiten_with_source,
 )
 from rippletwin.calibration.whitening import TINY, NoiseBasis, Whitening, best_amplitude
@@ -251,7 +251,7 @@ class ReadingErrors:
         """Move the expansion to the most likely smooth error."""
         if len(self._smooth.frequencies) and self.sizes.smooth > 0.0:
             data = self._source_data(h)
-            self._expansion = most_likely_expansion(data, self._expansion, SOURCE_STEPS)
+            self._expansion = find_most_likely_expansion(data, self._expansion, SOURCE_STEPS)
 
     def _estimate_sizes(self, h: np.ndarray, scale: float, near: bool) -> None:
         """Set the sizes to their most likely values at the present expansion."""
@@ -274,7 +274,7 @@ class ReadingErrors:
             )
 
         any_nominal = len(self._smooth.frequencies) > 0
-        self.sizes = most_likely_sizes(costs, self.sizes, any_nominal, near)
+        self.sizes = find_most_likely_sizes(costs, self.sizes, any_nominal, near)
 
     def _source_data(self, h: np.ndarray) -> SourceData:
         return SourceData(

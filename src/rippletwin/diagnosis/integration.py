@@ -60,7 +60,7 @@ class Density:
         below = cumulative_trapezoid(weight, nodes, initial=0.0)
         return np.interp(shares, below / below[-1], nodes)
 
-    def widened(self, sd: float) -> Density:
+    def widen(self, sd: float) -> Density:
         """The density with an independent Gaussian error of the logarithm beside it."""
         step = sd / PER_SD
         grid = np.arange(self.nodes[0] - 4.0 * sd, self.nodes[-1] + 4.0 * sd, step)

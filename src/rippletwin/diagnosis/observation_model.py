@@ -23,7 +23,7 @@ from rippletwin.diagnosis.division import Division
 from rippletwin.diagnosis.drifting_line import DriftingLine
 from rippletwin.diagnosis.faults.base import Fault
 from rippletwin.diagnosis.hypothesis import Errors, Hypothesis, Parts, coherence
-from rippletwin.diagnosis.likelihood import Marginal, complex_columns, marginal
+from rippletwin.diagnosis.likelihood import Marginal, complex_columns, marginalise
 from rippletwin.diagnosis.pump_flow import LeakFlow
 
 TURN_SD = 0.02  # rad, of a shaft angle that has been found already
@@ -125,7 +125,7 @@ class ObservationModel:
     def change_of_flow(self, hypothesis: Hypothesis) -> np.ndarray:
         """Change (F,) of the pump's flow from that of the hypothesis to the recording's, m3/s, as
         the anchor's shaft stands; the line is that of the last linearisation."""
-        parts = self.parts(hypothesis)
+        parts = self.predict(hypothesis)
         left = (self.values - parts.healthy - parts.change)[0] / self.response[0]
         return left * np.exp(-1j * self.orders * hypothesis.turn)
 
@@ -144,7 +144,7 @@ class ObservationModel:
         noise = self.anchor.variance + self.observation.variance
         self.noise = self.division.divide_variance(noise)
 
-    def parts(self, hypothesis: Hypothesis) -> Parts:
+    def predict(self, hypothesis: Hypothesis) -> Parts:
         """The prediction of a hypothesis, divided."""
         slopes = self._slopes
         moved = self.response + np.tensordot(self.state_of_line(hypothesis) - self._at, slopes, 1)
@@ -177,11 +177,11 @@ class ObservationModel:
         """Marginal likelihood of the recording below a frequency, or of a part of the divided
         readings. The first amplitudes are those of the shaft angle, in `TURN_SD`, and of the
         drift."""
-        return self._evaluate(self.parts(hypothesis), hypothesis.drift, errors, highest_hz, part)
+        return self._evaluate(self.predict(hypothesis), hypothesis.drift, errors, highest_hz, part)
 
     def log_likelihoods(self, hypothesis: Hypothesis, errors: Sequence[Errors]) -> np.ndarray:
         """Log likelihoods (len(errors),) under errors of different sizes."""
-        parts = self.parts(hypothesis)
+        parts = self.predict(hypothesis)
         found = [self._evaluate(parts, hypothesis.drift, each) for each in errors]
         return np.array([each.log_likelihood for each in found])
 
@@ -200,7 +200,7 @@ class ObservationModel:
         residual = self.values - expected + sure * np.tensordot(drift, parts.slopes, 1)
         variance = self.variance(parts, errors)
         columns = columns[:, part, below]
-        return marginal(residual[part, below], variance[part, below], columns, ALIKE)
+        return marginalise(residual[part, below], variance[part, below], columns, ALIKE)
 
     def variance(self, parts: Parts, errors: Errors) -> np.ndarray:
         """Variance (S, F), Pa2, of the divided readings' independent errors. What the twin says of
@@ -262,7 +262,7 @@ class ObservationModel:
                 out[which] = local_power(readings[:, which])
         return out
 
-    def followed(
+    def fit_turn_and_drift(
         self, hypothesis: Hypothesis, errors: Errors, limits_hz: Sequence[float]
     ) -> Hypothesis:
         """The hypothesis with its shaft angle and drift at their most likely values, found below

@@ -26,7 +26,7 @@ from rippletwin.case.model import ATMOSPHERE
 SMOOTHING = 1e3  # Pa, the drop below which an orifice is linear
 GAMMA = 1.0 - np.sqrt(0.5)  # share of a step at its first stage
 NEWTON_TOLERANCE = 1e-11  # of a Newton step, relative to the largest pressure
-TANGENT_STEPS = 10  # Newton steps with the true slopes; then steeper ones, see `orifice`
+TANGENT_STEPS = 10  # Newton steps with the true slopes; then steeper ones, see `orifice_flow`
 MAX_NEWTON = 80
 
 
@@ -38,7 +38,7 @@ def compression(p, bulk_modulus, air):
 
 
 @njit(cache=True)
-def orifice(conductance, drop, tangency):
+def orifice_flow(conductance, drop, tangency):
     """Flow through a smoothed orifice, m3/s, and a slope; `conductance` = Cd A sqrt(2/rho).
 
     The slope is the tangent's for `tangency` 1 and the chord's from the origin for 0. On a square
@@ -94,23 +94,23 @@ def solve_stage(p, rate, target, step, tables, pump, case_leak, cross_leak, c_pl
         for k in range(n):
             rate[k] = -tables[1, k]
         for k in range(n):
-            q, slope = orifice(tables[2, k], p[k] - p[n], tangency)
+            q, slope = orifice_flow(tables[2, k], p[k] - p[n], tangency)
             delivered += q
             slopes += slope
             inflow = -q
             matrix[k, k] += slope
             matrix[k, n] = -slope
             matrix[n, k] = -impedance * slope
-            q, slope = orifice(tables[3, k], p[k] - suction_pressure, tangency)
+            q, slope = orifice_flow(tables[3, k], p[k] - suction_pressure, tangency)
             inflow -= q
             matrix[k, k] += slope
-            q, slope = orifice(case_leak[k], p[k] - suction_pressure, tangency)
+            q, slope = orifice_flow(case_leak[k], p[k] - suction_pressure, tangency)
             inflow -= q + laminar * (p[k] - suction_pressure)
             matrix[k, k] += slope + laminar
             rate[k] += inflow
             if cross_leak[k] > 0.0:
                 m = (k + 1) % n
-                q, slope = orifice(cross_leak[k], p[k] - p[m], tangency)
+                q, slope = orifice_flow(cross_leak[k], p[k] - p[m], tangency)
                 rate[k] -= q
                 rate[m] += q
                 matrix[k, k] += slope
@@ -140,7 +140,7 @@ def solve_stage(p, rate, target, step, tables, pump, case_leak, cross_leak, c_pl
 
 
 @njit(cache=True)
-def revolution(
+def simulate_revolution(
     p,
     tables,
     stage_tables,

@@ -79,7 +79,7 @@ def observable_of(
     return to_reflection(impedance / scale)[None]
 
 
-def whitened_columns(
+def whiten_columns(
     posterior: Posterior, prediction: np.ndarray, moved: np.ndarray | Sequence
 ) -> np.ndarray:
     """Whitened differences (..., S, F) of predictions `moved` (..., S, F) from `prediction`.
@@ -92,7 +92,7 @@ def whitened_columns(
     return (r[1:] - r[0]).reshape(moved.shape)
 
 
-def missing_immittance(
+def find_missing_immittance(
     fit: Fit, observations: Sequence, effect_index: int = -1
 ) -> MissingImmittance | None:
     """What one effect of a fit adds to the line; None for a fit without effects.
@@ -113,7 +113,7 @@ def missing_immittance(
     whole = observable_of(posterior, changed)
     probe = observable_of(posterior, _interpolate_networks(without, changed, 1.0 + PROBE_SHARE))
     prediction = posterior.predict(theta)
-    column = whitened_columns(posterior, prediction, prediction + (probe - whole) / PROBE_SHARE)
+    column = whiten_columns(posterior, prediction, prediction + (probe - whole) / PROBE_SHARE)
     r = posterior.whitened(prediction)[0]
     weight = np.maximum(np.sum(np.abs(column) ** 2, axis=0), 1e-300)
     share = -np.sum(np.conj(column) * r, axis=0) / weight

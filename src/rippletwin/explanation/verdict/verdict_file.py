@@ -16,7 +16,7 @@ from rippletwin.explanation.checks.profile_intervals import (
     sensor_intervals,
 )
 from rippletwin.explanation.checks.support import Support
-from rippletwin.explanation.localise.missing_immittance import is_passive, missing_immittance
+from rippletwin.explanation.localise.missing_immittance import find_missing_immittance, is_passive
 from rippletwin.explanation.localise.shaft_orders import ShaftEffect
 from rippletwin.explanation.verdict.decision import (
     equivalent_places,
@@ -30,7 +30,7 @@ from rippletwin.explanation.verdict.next_experiment import (
     propose_sensor_position,
 )
 from rippletwin.explanation.verdict.places import element_and_extent, element_in_words
-from rippletwin.explanation.verdict.summary_text import summary_text
+from rippletwin.explanation.verdict.summary_text import describe_verdict
 from rippletwin.twin import twin_file
 from rippletwin.twin.effects.library import generalisations
 from rippletwin.twin.unknown_load import load_curve
@@ -67,7 +67,7 @@ def verdict_dict(explanation: Explanation) -> dict:
         "warnings": list(e.warnings),
         "sentence": "",
     }
-    result["sentence"] = summary_text(e, result, entries)
+    result["sentence"] = describe_verdict(e, result, entries)
     return result
 
 
@@ -181,7 +181,7 @@ def _stand_in(e: Explanation, entries: list[dict], index: int) -> dict:
     if effect.describe is not None:
         follows = effect.describe(values)
     else:
-        missing = missing_immittance(accepted, e.observations, index)
+        missing = find_missing_immittance(accepted, e.observations, index)
         follows = None if missing is None else missing.law_in_words
     element, _ = element_and_extent(e.rig, entry["place"], entry["parameters"])
     return {

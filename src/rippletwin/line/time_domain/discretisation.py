@@ -24,7 +24,7 @@ MAX_PREWARPED = 0.5  # rad a half step: a faster resonance is hardly resolved
 SAME_POSITION = 1e-9  # m: positions closer than this are the same
 
 
-def bilinear(element: Element, dt: float) -> np.ndarray:
+def discretise_element(element: Element, dt: float) -> np.ndarray:
     """(b0, b1, b2, a1, a2) of the element at steps of `dt` by the trapezoidal rule.
 
     s = (2/dt)(z - 1)/(z + 1) keeps what is passive passive, hence stable (Dahlquist 1963). It would

@@ -9,7 +9,12 @@ import numpy as np
 
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
 from rippletwin.line.time_domain import moc_kernel, weighting_functions
-from rippletwin.line.time_domain.discretisation import SAME_POSITION, bilinear, cells_of, discretise
+from rippletwin.line.time_domain.discretisation import (
+    SAME_POSITION,
+    cells_of,
+    discretise,
+    discretise_element,
+)
 from rippletwin.line.time_domain.kernel_arrays import JunctionArrays, PipeArrays, StateArrays
 from rippletwin.line.time_domain.line_elements import ENDS, Branch, TimeDomainLine
 
@@ -39,7 +44,7 @@ class Grid:
         self.kinds = np.zeros((len(self.ladder), 2), dtype=np.int64)
         self.filters = np.zeros((len(self.ladder) + 1, 5))  # the last is the load's valve
         if self.line.end.valve is not None:
-            self.filters[-1] = bilinear(self.line.end.valve, self.dt)
+            self.filters[-1] = discretise_element(self.line.end.valve, self.dt)
         for r, rung in enumerate(self.ladder):
             if isinstance(rung, Branch):
                 self.kinds[r] = moc_kernel.BRANCH, len(self.pipes)
@@ -50,7 +55,7 @@ class Grid:
                 self.kinds[r, 0] = {"shunt": moc_kernel.SHUNT, "series": moc_kernel.SERIES}[
                     rung.kind
                 ]
-                self.filters[r] = bilinear(rung, self.dt)
+                self.filters[r] = discretise_element(rung, self.dt)
 
     def _lay_nodes(self):
         """Nodes of each pipe: its left end, N cells on, and its right end theta cells further."""
