@@ -31,8 +31,8 @@ def test_ratios_between_sensors_give_the_wave_speed_whatever_the_pump_is_said_to
     twin = Twin(leaking_pump.rig(), healthy)
     theta = twin.theta.copy()
     theta[twin.index["diameter[1]"]] = 6.0
-    bent = twin.with_(theta=theta)
-    found = calibrate_line(bent, healthy).values()
+    biased = twin.with_(theta=theta)
+    found = calibrate_line(biased, healthy).values()
     true = 0.98 * leaking_pump.WAVE_SPEED
     assert found["wave_speed[1]"] == pytest.approx(true, rel=5e-3)
     assert found["diameter[1]"] == pytest.approx(leaking_pump.DIAMETER, rel=0.05)

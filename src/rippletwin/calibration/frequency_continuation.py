@@ -6,7 +6,7 @@ harmonics has many local modes. Two rules lead to the right one:
 1. All operating points are fitted together and in absolute frequency, first below 800 Hz, then
    higher.
 2. Every hypothesis is fitted that way from the data sheet, with its effects in the model from the
-   first step. A fit without a necessary effect has bent the other parameters.
+   first step. A fit without a necessary effect has biased the other parameters.
 
 The nonlinear compliance of the line takes long to solve. During continuation it is omitted or
 frozen, then frozen again at each new point. It is solved exactly only from the final mode.

@@ -115,13 +115,13 @@ def judge_beside_network(
     """
     while True:
         fits = _fit_without_beside(workers, network, judged)
-        lost = [
+        gains = [
             np.inf if _is_certain(judged.best, k) else network.evidence - fit.evidence
             for k, fit in enumerate(fits)
         ]
-        if min(lost, default=0.0) >= 0.0:
+        if min(gains, default=0.0) >= 0.0:
             break
-        k = int(np.argmin(lost))
+        k = int(np.argmin(gains))
         network, best = fits[k], judged.without[k].stated
         supports = judged.supports[:k] + judged.supports[k + 1 :]
         judged = Judged(best, supports, fit_without_each_effect(workers, base, best))
@@ -129,7 +129,7 @@ def judge_beside_network(
         replace(support, level="supported")
         if support.level == "established" and gain < MIN_LOG_BAYES_FACTOR
         else support
-        for support, gain in zip(judged.supports, lost)
+        for support, gain in zip(judged.supports, gains)
     )
     return network, replace(judged, supports=supports)
 
@@ -143,21 +143,21 @@ def withhold_what_is_in_doubt(
 
     * whose own parameters are not plausible in the explanation: a network moves them,
     * where the explanation leaves much or did not converge, but a usual effect,
-    * that has a rival in the data sheet, where the line does the work of physics that is left out:
-      a parameter contradicts the sheet, or held-out data leave much; but a usual effect.
+    * that has a rival in the data sheet, where the line's parameters are biased by physics that is
+      left out: one contradicts the sheet, or held-out data leave much; but a usual effect.
 
     held_out_error   model error, relative, of the explanation on data that were left out
     has_rivals       of each effect, whether other values of the data sheet do nearly as well
     """
     leaves_much = explanation.model_error > MUCH_MODEL_ERROR
     converged = explanation.expected_gain <= UNCONVERGED_GAIN  # else its evidence is not known
-    bent = largest_pull(explanation)[0] > PULL_ALARM or held_out_error > MUCH_MODEL_ERROR
+    biased = largest_pull(explanation)[0] > PULL_ALARM or held_out_error > MUCH_MODEL_ERROR
     rig = judged.best.twin.rig
     supports = []
     for support, (effect, place), has_rival in zip(
         judged.supports, judged.best.hypothesis, has_rivals, strict=True
     ):
-        is_doubtful_line = leaves_much or not converged or (bent and has_rival)
+        is_doubtful_line = leaves_much or not converged or (biased and has_rival)
         in_doubt = is_doubtful_line and not effect.usual(rig, place)
         if _pull_of_effect(explanation, f"{effect.name}@{place}.") > PULL_ALARM:
             in_doubt = True
