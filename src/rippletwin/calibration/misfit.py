@@ -36,12 +36,12 @@ class Misfit:
 
 
 def relative_misfit(measured: np.ndarray, predicted: np.ndarray) -> float:
-    """|measured - predicted| / |measured| of arrays of one shape."""
+    """|measured - predicted| / |measured| of arrays of one shape and unit."""
     return float(np.linalg.norm(measured - predicted) / np.linalg.norm(measured))
 
 
 def theil_coefficient(measured: np.ndarray, predicted: np.ndarray) -> float:
-    """Theil's U1 of arrays of one shape; 0 where both vanish."""
+    """Theil's U1, from 0 to 1, of arrays of one shape and unit; 0 where both vanish."""
     total = np.linalg.norm(measured) + np.linalg.norm(predicted)
     return float(np.linalg.norm(measured - predicted) / total) if total else 0.0
 

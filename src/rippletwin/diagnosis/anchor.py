@@ -112,15 +112,16 @@ def make_anchor(
 
 
 def scale_of_rest(sensors: int) -> float:
-    """The power of an error at all sensors over what of it no flow explains."""
+    """The power of an error at all sensors over what of it no flow explains, a ratio."""
     return sensors / max(sensors - 1, 1)  # a flow takes one in `sensors`
 
 
 def without_recording(
     anchor: Anchor, simulated: np.ndarray, response: np.ndarray, pistons: int
 ) -> Anchor:
-    """The anchor that the twin alone is: its own flow, simulated (F,), through its line, a response
-    (S, F), as wrong about each order as the recording of `anchor` shows it to be."""
+    """The anchor that the twin alone is: its own flow, simulated (F,), m3/s, through its line, a
+    response (S, F), Pa s/m3, as wrong about each order as the recording of `anchor` shows it to
+    be."""
     turned = simulated * np.exp(1j * anchor.orders * anchor.angle)
     own, sensors = anchor.orders % pistons == 0, len(anchor.rest)
     along, across = response * (anchor.flow - turned), np.sqrt(scale_of_rest(sensors)) * anchor.rest
@@ -149,7 +150,8 @@ def find_alignment(here: np.ndarray, there: np.ndarray, orders: np.ndarray, pitc
 
 
 def correlate(here, there, orders, weight=1.0, count: int = ANGLES) -> np.ndarray:
-    """Re sum w conj(h exp(j n x)) t at `count` even angles x of a revolution, (..., count)."""
+    """Re sum w conj(h exp(j n x)) t at `count` even angles x of a revolution, (..., count), of
+    spectra h = `here` and t = `there` (..., S, F) at shaft orders n (F,)."""
     product = np.sum(weight * np.conj(here) * there, axis=-2)
     spectrum = np.zeros((*product.shape[:-1], count), complex)
     spectrum[..., orders] = product

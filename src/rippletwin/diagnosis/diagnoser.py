@@ -67,7 +67,7 @@ class Diagnoser:
         self, observation, healthy, start: float = 0.0, repeats: Sequence[np.ndarray] = ()
     ) -> ObservationModel:
         """The observation model of an observation, anchored to a healthy one, at the orders that
-        both have, `ORDERS` at most. `repeats` as in `ObservationModel`."""
+        both have, `ORDERS` at most. `start` and `repeats` as in `ObservationModel`."""
         count = min(len(healthy.orders), len(observation.orders), ORDERS)
         healthy, observation = (select_frequencies(o, slice(count)) for o in (healthy, observation))
         pressure = _rounded(load_pressure_of(self.twin, observation))
@@ -103,7 +103,7 @@ class Diagnoser:
 
 
 def distance_between(one, other) -> float:
-    """Distance of the operating points of two observations."""
+    """Distance of the operating points of two observations, relative, as `anchor.distance`."""
     return distance(one.speed_hz, other.speed_hz, one.load_pressure, other.load_pressure)
 
 

@@ -36,12 +36,12 @@ class ErrorPrior:
     change_sd: float = 0.6
 
     def log_weights(self) -> np.ndarray:
-        """Log probabilities (len(SCATTERS), len(CHANGES)) on the grid of both."""
+        """Log probabilities (A, B) on the grid of A SCATTERS and B CHANGES."""
         a = -0.5 * (np.log(SCATTERS / self.scatter) / self.scatter_sd) ** 2
         return (a - logsumexp(a))[:, None] + self.log_weights_of_change()
 
     def log_weights_of_change(self) -> np.ndarray:
-        """Log probabilities (len(CHANGES),)."""
+        """Log probabilities (B,) of the B CHANGES."""
         b = -0.5 * (np.log(CHANGES / self.change) / self.change_sd) ** 2
         return b - logsumexp(b)
 

@@ -94,7 +94,7 @@ def judge_windows(classes: Sequence[str], said: np.ndarray, p_values: np.ndarray
 
 
 def cut_windows(recording: Recording, rig: Rig, samples: int) -> np.ndarray:
-    """Windows (R, S, M) of one revolution each, without their means."""
+    """Windows (R, S, M), Pa, of one revolution each at M even shaft angles, without their means."""
     return remove_mean(revolutions_of(recording, rig, samples).windows)
 
 

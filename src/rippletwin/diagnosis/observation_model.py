@@ -89,7 +89,7 @@ class ObservationModel:
         return np.array(found).reshape(len(found), len(self.orders))
 
     def leak_change(self, fault: Fault, area: float, piston: int) -> np.ndarray:
-        """The same (F,) of one leak."""
+        """The same (F,) of one leak of `area`, m2, at `piston`, counted from 0."""
         return self._turned(self.flows[fault.name].harmonics(area), piston)
 
     def _turned(self, harmonics: np.ndarray, piston: int) -> np.ndarray:
@@ -115,7 +115,8 @@ class ObservationModel:
         return float(np.log(low)), float(np.log(high))
 
     def state_of_line(self, hypothesis: Hypothesis) -> np.ndarray:
-        """Drift (D,) with what the leaks' change of mean flow makes of an orifice set anew."""
+        """Drift (D,), standard deviations, with what the leaks' change of mean flow makes of an
+        orifice set anew."""
         gained = sum(
             self.flows[fault.name].harmonics(area)[0].real / self.flows[fault.name].mean
             for fault, area in zip(hypothesis.state, hypothesis.areas)
@@ -145,7 +146,7 @@ class ObservationModel:
         self.noise = self.division.divide_variance(noise)
 
     def predict(self, hypothesis: Hypothesis) -> Parts:
-        """The prediction of a hypothesis, divided."""
+        """The prediction of a hypothesis, divided, Pa."""
         slopes = self._slopes
         moved = self.response + np.tensordot(self.state_of_line(hypothesis) - self._at, slopes, 1)
         leaks = self.change(hypothesis)
@@ -180,7 +181,7 @@ class ObservationModel:
         return self._evaluate(self.predict(hypothesis), hypothesis.drift, errors, highest_hz, part)
 
     def log_likelihoods(self, hypothesis: Hypothesis, errors: Sequence[Errors]) -> np.ndarray:
-        """Log likelihoods (len(errors),) under errors of different sizes."""
+        """Log likelihoods (E,) of the recording under E `errors` of different sizes."""
         parts = self.predict(hypothesis)
         found = [self._evaluate(parts, hypothesis.drift, each) for each in errors]
         return np.array([each.log_likelihood for each in found])
@@ -222,7 +223,7 @@ class ObservationModel:
         return self.noise + self._in_rows(self.sensors * flow, across)
 
     def expected_reading(self, parts: Parts, errors: Errors) -> np.ndarray:
-        """The reading (S, F) to expect: changes count by as much as they are sure."""
+        """The divided reading (S, F), Pa, to expect: changes count by as much as they are sure."""
         changed = parts.drifted + parts.change
         return parts.healthy - parts.drifted + self._sure(errors) * changed
 
@@ -249,12 +250,14 @@ class ObservationModel:
         return min(float(np.linalg.norm(self.values - healthy) / predicted), MAX_SHARE)
 
     def scatter_power(self, healthy: np.ndarray) -> np.ndarray:
-        """Power (F,) to which the scatter of repeated healthy recordings is in proportion."""
+        """Power (F,), Pa2, to which the scatter of repeated healthy recordings is in proportion, of
+        readings `healthy` (S, F), Pa."""
         own, all_orders = self.power_by_class(healthy), local_power(healthy)
         return own + BETWEEN * all_orders
 
     def power_by_class(self, readings: np.ndarray) -> np.ndarray:
-        """Local power (F,) of readings (S, F), of pistons' orders and of all others apart."""
+        """Local power (F,), Pa2, of readings (S, F), Pa, of pistons' orders and of all others
+        apart."""
         out = np.empty(len(self.orders))
         even = self.orders % self.pistons == 0
         for which in (even, ~even):
@@ -265,8 +268,9 @@ class ObservationModel:
     def fit_turn_and_drift(
         self, hypothesis: Hypothesis, errors: Errors, limits_hz: Sequence[float]
     ) -> Hypothesis:
-        """The hypothesis with its shaft angle and drift at their most likely values, found below
-        one frequency after the other: phases at high ones would be lost at first."""
+        """The hypothesis with its shaft angle, rad, and drift, standard deviations, at their most
+        likely values, found below one of `limits_hz` after the other: at high frequencies the phase
+        may be off by more than half a turn at first."""
         for limit in limits_hz:
             self.linearise_line(hypothesis)
             amplitudes = self.evaluate(hypothesis, errors, limit).amplitudes
@@ -309,8 +313,8 @@ def _explained_power(measured: np.ndarray, predicted: np.ndarray) -> np.ndarray:
 
 
 def local_power(readings: np.ndarray) -> np.ndarray:
-    """Mean square (F,) of readings (S, F) over sensors and neighbouring orders: a zero of one
-    sensor, or of one order, is no place where an error is small."""
+    """Mean square (F,), Pa2, of readings (S, F), Pa, over sensors and neighbouring orders: a zero
+    of one sensor, or of one order, is no place where an error is small."""
     power = np.mean(np.abs(readings) ** 2, axis=0)
     return uniform_filter1d(power, min(NEIGHBOURS, len(power)), mode="nearest")
 

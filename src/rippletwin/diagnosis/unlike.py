@@ -28,6 +28,7 @@ class Unlikeness:
 
     @property
     def unlike(self) -> bool:
+        """Whether the recording is unlike everything that was tried."""
         return self.p_value < UNLIKE
 
 

@@ -32,14 +32,16 @@ MAX_NEWTON = 80
 
 @njit(cache=True)
 def compression(p, bulk_modulus, air):
-    """c(p), and dc/dp in 1/Pa."""
+    """c(p), and dc/dp in 1/Pa, of liquid with the volume fraction `air` of free air; `p` in Pa
+    absolute, `bulk_modulus` in Pa."""
     gas = air * ATMOSPHERE / p
     return p / bulk_modulus - gas, 1.0 / bulk_modulus + gas / p
 
 
 @njit(cache=True)
 def orifice_flow(conductance, drop, tangency):
-    """Flow through a smoothed orifice, m3/s, and a slope; `conductance` = Cd A sqrt(2/rho).
+    """Flow through a smoothed orifice, m3/s, and a slope, m3/(Pa s), at a pressure `drop`, Pa;
+    `conductance` = Cd A sqrt(2/rho), m3/s/sqrt(Pa).
 
     The slope is the tangent's for `tangency` 1 and the chord's from the origin for 0. On a square
     root Newton's method alternates between +drop and -drop; a slope in between converges.
@@ -165,7 +167,8 @@ def simulate_revolution(
     line_p/_q     (cells + 1,) state of the line, empty where the outlet's pressure is given
     sensors       (S, 5): first of four neighbouring nodes, and their weights
     outlet        (K,) the outlet's pressure at the end of each step, Pa; empty with a line
-    Returns flow (K,), pressures (K, n + 1) and sensor pressures (K, S), each at a step's end.
+    Returns flow (K,), m3/s, pressures (K, n + 1) and sensor pressures (K, S), Pa, each at a step's
+    end.
     """
     steps, _, n = tables.shape
     zc, half, k_v, behind = line

@@ -54,7 +54,8 @@ class Observation:
 
     @property
     def variance(self) -> np.ndarray:
-        """Variance (S, F) of the complex errors of values, each sensor and frequency alone."""
+        """Variance (S, F) of the complex errors of values, in their unit squared, each sensor and
+        frequency alone."""
         return np.einsum("fss->sf", self.covariance).real
 
 

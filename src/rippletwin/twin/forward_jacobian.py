@@ -67,8 +67,8 @@ class DifferentiableForward(ForwardModel):
         self.freeze_compliance, self._outflows = True, None
 
     def use_full_jacobian(self, theta: np.ndarray) -> None:
-        """Set `jacobian_correction` to what `derivatives` lack at theta because the outflows are
-        frozen. It serves at theta and about it, as long as it changes little."""
+        """Set `jacobian_correction` to what `derivatives` lack at theta (P,) because the outflows
+        are frozen. It serves at theta and about it, as long as it changes little."""
         self.jacobian_correction = None
         solver = self._extended_for_compliance[0].compliance_solver
         usual, solver.tolerance = solver.tolerance, SOLVED_TOLERANCE
@@ -83,8 +83,8 @@ class DifferentiableForward(ForwardModel):
         self.jacobian_correction, solver.tolerance = correction, usual
 
     def linear_load(self, theta: np.ndarray) -> np.ndarray | None:
-        """Readings (S, F) with a linear orifice and the outflows of theta; None without an orifice,
-        where they are those of the prediction."""
+        """Readings (S, F), Pa, with a linear orifice and the outflows of theta (P,); None without
+        an orifice, where they are those of the prediction."""
         if self.load.orifice is None:
             return None
         self._solve_at(theta)
@@ -93,7 +93,8 @@ class DifferentiableForward(ForwardModel):
         return network.readings()
 
     def derivatives(self, theta: np.ndarray) -> np.ndarray:
-        """d readings/d theta, (P, S, F); rows S are the rig's sensors, F all frequencies."""
+        """d readings/d theta, (P, S, F), Pa per unit of a coordinate; rows S are the rig's sensors,
+        F all frequencies."""
         self._solve_at(theta)
         self._freeze = True
         base = self.network(theta)

@@ -79,8 +79,8 @@ class ForwardModel:
         return self._read(self.network(theta), theta)
 
     def unit_response(self, theta: np.ndarray) -> list[np.ndarray]:
-        """Predictions for a unit flow at every frequency, in the shaft's frame, and a ripple so
-        small that load and line are linear."""
+        """Predictions, list of (S, F), Pa s/m3, at theta (P,) for a unit flow at every frequency,
+        in the shaft's frame, and a ripple so small that load and line are linear."""
         network = self._linear(theta)
         network.source_flow = self.source.turn(theta)
         return self._read(network, theta)
@@ -105,7 +105,7 @@ class ForwardModel:
         return bool(self._periodic and self._linear(self.twin.theta).nonlinear_compliances)
 
     def network(self, theta: np.ndarray) -> FrequencyDomainLine:
-        """The line with source, effects and load at `theta`; nonlinear load and compliance are
+        """The line with source, effects and load at `theta` (P,); nonlinear load and compliance are
         solved at full amplitude."""
         whole = None
         if self.load.orifice is not None and self._orifice_is_exact:

@@ -251,7 +251,13 @@ def evaluate_without(base, observations: Sequence, job: tuple) -> list[dict[tupl
 def support_level(
     robustness: Robustness, held_out: float, pull: float, deviations: float = 0.0
 ) -> str:
-    """Level of an effect with these results of the checks."""
+    """Level of an effect with these results of the checks.
+
+    robustness   its log Bayes factors beside free corrections
+    held_out     log predictive probability of held-out data that it adds
+    pull         of its parameters, prior standard deviations
+    deviations   standard deviations between its parameters from parts of the data and from all
+    """
     if robustness.plain < MIN_LOG_BAYES_FACTOR or held_out <= 0.0:
         return "suggested"
     survives = robustness.least >= MIN_LOG_BAYES_FACTOR and robustness.own >= 0.0

@@ -53,7 +53,7 @@ def position_spacing(rig, frequency_hz: np.ndarray) -> float:
 
 
 def own_element(effect, place, values: Mapping[str, float], rig) -> tuple:
-    """The element at which an effect itself acts, with its fitted `values`."""
+    """The element at which an effect itself acts, with its fitted `values` by name, SI units."""
     everywhere = tuple(range(len(rig.line))) if len(rig.line) > 1 else 0
     if effect.element == "sensor":
         return "sensor", place.index
@@ -87,7 +87,7 @@ def correct_line(
     correction: np.ndarray | float,
     reference: FrequencyDomainLine,
 ) -> FrequencyDomainLine:
-    """A copy of `network` with a correction, (F,) or a number, of an element.
+    """A copy of `network` with a relative correction, (F,) or a number, of an element.
 
     What is inserted at a position is `correction` times the unit immittance of `reference`, the
     line at which corrections were linearised. The source and the sensors are left as they are.

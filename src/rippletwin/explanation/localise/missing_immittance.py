@@ -61,7 +61,7 @@ class MissingImmittance:
 def observable_of(
     posterior: Posterior, network: FrequencyDomainLine, theta: np.ndarray | None = None
 ) -> np.ndarray:
-    """The observed quantity of a network, (S, F): pressures, or reflection coefficients.
+    """The observed quantity of a network, (S, F): pressures, Pa, or reflection coefficients.
 
     `theta` (P,) are the parameters of the network, by default those of the posterior's twin.
     """
@@ -82,7 +82,7 @@ def observable_of(
 def whiten_columns(
     posterior: Posterior, prediction: np.ndarray, moved: np.ndarray | Sequence
 ) -> np.ndarray:
-    """Whitened differences (..., S, F) of predictions `moved` (..., S, F) from `prediction`.
+    """Whitened differences (..., S, F) of predictions `moved` (..., S, F) from `prediction` (S, F).
 
     A free source keeps its most likely amplitude at `prediction`.
     """
@@ -219,7 +219,8 @@ def _interpolate_networks(
 def describe_law(
     frequency_hz: np.ndarray, immittance: np.ndarray, weight: np.ndarray | None = None
 ) -> str:
-    """What an immittance (F,) behaves like, in words: a noun, with its simple law in brackets.
+    """What an immittance (F,), SI units, behaves like over frequency_hz (F,), in words: a noun,
+    with its simple law in brackets.
 
     `weight` (F,) is 1/sqrt(w) by default.
     """

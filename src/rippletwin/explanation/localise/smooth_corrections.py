@@ -91,8 +91,8 @@ class SmoothCorrections:
         return self._solve(element).log_evidence
 
     def most_likely(self, element: tuple) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Frequencies (F,), the most likely correction (F,) of an element, and how well each
-        frequency determines it: the power (F,) of what a unit of it changes, whitened."""
+        """Frequencies (F,), Hz, the most likely relative correction (F,) of an element, and how
+        well each frequency determines it: the power (F,) of what a unit of it changes, whitened."""
         solved = self._solve(element)
         power = self._posterior.power * solved.model_error**2
         weight = np.sum(np.abs(solved.change) ** 2, axis=0) / power
@@ -201,7 +201,7 @@ class SmoothCorrections:
 
     @property
     def frequency_hz(self) -> np.ndarray:
-        """Frequencies (F,) of all observations side by side."""
+        """Frequencies (F,), Hz, of all observations side by side."""
         return self._posterior.forward.frequency_hz
 
     def _promise(self, element: tuple) -> float:
@@ -235,8 +235,8 @@ class SmoothCorrections:
         return {e: self.log_evidence(e) for e in elements}
 
     def change(self, element: tuple) -> np.ndarray | None:
-        """Change (S, F) of the prediction that a unit correction of an element makes; None without
-        an element."""
+        """Change (S, F) of the prediction, in its unit, that a unit correction of an element makes;
+        None without an element."""
         if element[0] == NONE:
             return None
         moved = self._observe(self.network, element, PROBE_SHARE, self.theta)
@@ -267,7 +267,8 @@ class _Solved:
 
 
 def smooth_basis(frequency_hz: np.ndarray) -> np.ndarray:
-    """Basis (K, F) of functions smooth in frequency with basis.T @ basis = kernel of unit size."""
+    """Basis (K, F) of functions smooth over frequency_hz (F,), with 2 basis.T @ basis = the kernel
+    of unit size."""
     f = np.asarray(frequency_hz, float) / CORRELATION_HZ
     values, vectors = np.linalg.eigh(np.exp(-0.5 * np.subtract.outer(f, f) ** 2))
     kept = values > MIN_EIGENVALUE * np.max(values)

@@ -202,7 +202,7 @@ class Grid:
         self.filter_states[r] = y - b0 * u, b2 * u - a2 * y
 
     def advance(self, nodes):
-        """One period: pressure and flow (len(nodes), M) at `nodes`; the state is updated."""
+        """One period: pressure, Pa, and flow, m3/s, (N, M) at `nodes` (N,); updates the state."""
         flow = np.asarray(self.line.flow, dtype=float)
         return moc_kernel.advance(
             flow,
@@ -217,7 +217,8 @@ class Grid:
         return kind(*(getattr(self, name) for name in kind._fields))
 
     def locate(self, x):
-        """(pipe, nearest node, distance from it to x towards the load, m)."""
+        """(pipe, nearest node, distance from it to x, m, towards the load). Raises ValueError for x
+        outside the line."""
         if not -1e-12 <= x <= self.line.length * (1 + 1e-12):
             raise ValueError(f"position {x} m lies outside the line of {self.line.length} m")
         starts = np.array(self.starts[: self.main])
@@ -231,7 +232,8 @@ class Grid:
         return k, node, 0.0 if abs(offset) < SAME_POSITION else float(offset)
 
     def shift(self, k, offset, pressure, flow):
-        """Periodic pressure and flow (M,) a fraction of a cell further on, by the exact line."""
+        """Periodic pressure, Pa, and flow, m3/s, (M,) in pipe k, by `offset`, m, further on: a
+        fraction of a cell, by the exact line."""
         line, pipe = self.line, self.pipes[k].linear(self.line.density)
         p, q = np.fft.rfft(pressure), np.fft.rfft(flow)
         s = 2j * np.pi * np.arange(1, len(p)) / line.period
