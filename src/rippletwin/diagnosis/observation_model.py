@@ -16,7 +16,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from rippletwin.diagnosis.anchor import Anchor
 from rippletwin.diagnosis.division import Division
@@ -24,6 +23,7 @@ from rippletwin.diagnosis.drifting_line import DriftingLine
 from rippletwin.diagnosis.faults.base import Fault
 from rippletwin.diagnosis.hypothesis import Errors, Hypothesis, Parts, coherence
 from rippletwin.diagnosis.likelihood import Marginal, complex_columns, marginalise
+from rippletwin.diagnosis.local_power import explained_power, local_power
 from rippletwin.diagnosis.pump_flow import LeakFlow
 
 TURN_SD = 0.02  # rad, of a shaft angle that has been found already
@@ -37,7 +37,6 @@ MIN_CHANGE_ERROR = 0.04  # relative, of the change by a leak behind the best of 
 MAX_SHARE = 2.0  # of a measured change over the predicted one, up to which errors grow with it
 MAX_USUAL_ERROR = 0.3  # relative, of a leak's change behind the worst of twins
 ALIKE = 8.0  # readings whose errors go together: those of a line are as wide as its resonances
-NEIGHBOURS = 9  # shaft orders over which a power is averaged
 WHOLE = slice(None)
 BETWEEN = 0.01  # share of a power whose errors show at orders that have none of it
 
@@ -163,7 +162,7 @@ class ObservationModel:
             pump=moved * self._pump_slopes(hypothesis)[:, None] * turn,
             spread=local_power(moved) * np.mean(np.abs(leaks.sum(axis=0)) ** 2),
             measured=self._measured_share(healthy, added.sum(axis=0)),
-            explained=_explained_power(self.values - healthy, added.sum(axis=0)),
+            explained=explained_power(self.values - healthy, added.sum(axis=0)),
         )
 
     # likelihood
@@ -300,23 +299,6 @@ class ObservationModel:
             leak * parts.pump,
         )
         return np.concatenate([*known, *smooth])
-
-
-def _explained_power(measured: np.ndarray, predicted: np.ndarray) -> np.ndarray:
-    """Local power (F,) of a measured change (S, F), times the share of it that the predicted one
-    explains at the best size: their coherence."""
-    powers = [np.sum(np.abs(x) ** 2) for x in (measured, predicted)]
-    if not all(powers):
-        return np.zeros(measured.shape[1])
-    share = np.abs(np.vdot(predicted, measured)) ** 2 / np.prod(powers)
-    return share * local_power(measured)
-
-
-def local_power(readings: np.ndarray) -> np.ndarray:
-    """Mean square (F,), Pa2, of readings (S, F), Pa, over sensors and neighbouring orders: a zero
-    of one sensor, or of one order, is no place where an error is small."""
-    power = np.mean(np.abs(readings) ** 2, axis=0)
-    return uniform_filter1d(power, min(NEIGHBOURS, len(power)), mode="nearest")
 
 
 def _cosines(frequency_hz: np.ndarray, count: int) -> np.ndarray:
