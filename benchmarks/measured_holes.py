@@ -24,7 +24,7 @@ from rippletwin.explanation.verdict.verdict_file import write_verdict
 from rippletwin.figures.explanation import draw
 from rippletwin.spectra.observation import observe
 from rippletwin.twin.effects.library import EFFECTS
-from rippletwin.twin.forward_model import reflection
+from rippletwin.twin.reflection import to_reflection
 
 DATA_SHEET = Path(__file__).resolve().parent.parent / "resources" / "hole_tube" / "rig.yaml"
 STATES = ("closed", "first_open")
@@ -91,7 +91,7 @@ def main() -> None:
         folder = arguments.folder / state
         fitted = case(arguments.measured, state, folder / "fitted")
         unseen = unseen_run(arguments.measured, state, 3, fitted, folder / "unseen")
-        first, second = reflection(fitted.recordings[0].spectra[:, 0])
+        first, second = to_reflection(fitted.recordings[0].spectra[:, 0])
         explanation = explain(fitted, processes=arguments.processes)
         accepted = explanation.decision.accepted
         misfits = [

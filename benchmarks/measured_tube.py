@@ -29,7 +29,7 @@ from rippletwin.spectra.frequency_selection import select_fitted_frequencies
 from rippletwin.spectra.observation import observe
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
-from rippletwin.twin.forward_model import reflection
+from rippletwin.twin.reflection import to_reflection
 from rippletwin.twin.twin import Twin
 
 DATA_SHEET = Path(__file__).resolve().parent.parent / "resources" / "air_tube" / "rig.yaml"
@@ -83,7 +83,7 @@ def with_wave_speed_of(fit: Fit, observation) -> tuple[Fit, float]:
 def reflection_difference(a, b) -> float:
     """Relative difference of two runs' reflection coefficients at the frequencies both have."""
     _, i, j = np.intersect1d(a.frequency_hz, b.frequency_hz, return_indices=True)
-    first, second = reflection(a.values[:, i]), reflection(b.values[:, j])
+    first, second = to_reflection(a.values[:, i]), to_reflection(b.values[:, j])
     return float(np.linalg.norm(second - first) / np.linalg.norm(first))
 
 

@@ -18,7 +18,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import minimize
 
-from rippletwin.calibration.shaft_angles import best_turn
+from rippletwin.calibration.shaft_angles import find_best_turn
 from virtualrig.nuisance import true_pump
 from virtualrig.nuisance_case import draw_nuisance_case
 from virtualrig.pump import Pump
@@ -46,7 +46,7 @@ def ripple_error(number: int, pumps: int, index: int) -> list[tuple[np.ndarray, 
             for p in both
         )
         weighted = np.conj(nominal[orders]) * true[orders]
-        turn = np.exp(-1j * orders * best_turn(weighted, orders)[0])
+        turn = np.exp(-1j * orders * find_best_turn(weighted, orders)[0])
         ratio = true[orders] / nominal[orders] * turn
         logarithm = np.log(np.abs(ratio)) + 1j * np.unwrap(np.angle(ratio))
         errors.append((orders * speed / 60, orders, logarithm))

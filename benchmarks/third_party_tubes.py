@@ -35,7 +35,7 @@ from rippletwin.case.load import load_case
 from rippletwin.explanation.explain import explain
 from rippletwin.explanation.verdict.verdict_file import write_verdict
 from rippletwin.spectra.observation import observe
-from rippletwin.twin.forward_model import reflection
+from rippletwin.twin.reflection import to_reflection
 
 KINDS = ("tube", "hole", "hole and cone", "two holes", "hole, no losses")
 LOSSES = ("unsteady_friction", "thermal_boundary_layer")
@@ -193,7 +193,7 @@ def main() -> None:
         data = [observe(unseen.recordings[0], fitted.rig)]
         base, accepted = explanation.search.base, explanation.decision.accepted
         before, after = (score_fit(fit, data).misfit for fit in (base, accepted))
-        first, second = reflection(fitted.recordings[0].spectra[:, 0])
+        first, second = to_reflection(fitted.recordings[0].spectra[:, 0])
         between = float(np.linalg.norm(second - first) / np.linalg.norm(first))
         result = score(tube, verdict["effects"])
         scores.append((kind, result))

@@ -18,7 +18,7 @@ import numpy as np
 
 from rippletwin.harmonics import peak_amplitudes
 from rippletwin.spectra.angular_resampling import cut_revolutions
-from rippletwin.spectra.speed_regression import harmonics_at_mean_speed, mean_speed
+from rippletwin.spectra.speed_regression import mean_speed, regress_to_mean_speed
 from virtualrig.recorder import SAMPLING_RATE_HZ, Point, record
 from virtualrig.rig import SHEET, build, read_yaml
 
@@ -59,7 +59,7 @@ def harmonics(take, speed_rpm: float):
         speed,
         orders,
         spectra.mean(0),
-        harmonics_at_mean_speed(spectra, revolutions.speed_hz, orders)[0],
+        regress_to_mean_speed(spectra, revolutions.speed_hz, orders)[0],
     )
 
 

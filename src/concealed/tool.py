@@ -16,7 +16,7 @@ import numpy as np
 from concealed.sparse import pick_by_matching_pursuit
 from rippletwin import store
 from rippletwin.calibration.likelihood import Likelihood
-from rippletwin.calibration.misfit import misfit
+from rippletwin.calibration.misfit import measure_misfit
 from rippletwin.calibration.report import segment_table
 from rippletwin.calibration.shaft_angles import fit_shaft_angles
 from rippletwin.case.load import load_case
@@ -81,7 +81,7 @@ def compute_baselines(explanation) -> dict:
     nominal = fit_shaft_angles(likelihood, np.zeros_like(base.twin.theta))
     candidates = applicable_candidates(explanation.rig, observations)
     return {
-        "nominal": misfit(likelihood, nominal).relative,
+        "nominal": measure_misfit(likelihood, nominal).relative,
         "segments": {
             "calibrated": _segments(explanation.without_effects),
             "corrected": _segments(accepted),

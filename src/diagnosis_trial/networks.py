@@ -21,11 +21,11 @@ from diagnosis_trial.taught_signals import TaughtSignals
 from rippletwin.case.model import Case, Recording, Rig
 from rippletwin.diagnosis.network_answers import (
     STATE_OF,
+    cut_windows,
     is_at_their_point,
     judge_windows,
-    windows_of,
 )
-from rippletwin.diagnosis.pump_flow import healthy_flow, with_fitted_pump
+from rippletwin.diagnosis.pump_flow import simulate_healthy_pump, with_fitted_pump
 from rippletwin.flow_sensor.estimate import band_limit
 from rippletwin.flow_sensor.line_response import line_factory
 from rippletwin.flow_sensor.methods import noise_of_flow
@@ -99,7 +99,7 @@ def ask_network(kept: KeptNetworks, recordings: list[Recording], rig: Rig, twin:
         if kept.signal == "flow":
             windows = _flow_windows(recording, rig, twin, kept.speed_hz)
         else:
-            windows = windows_of(recording, rig, kept.samples_per_revolution)
+            windows = cut_windows(recording, rig, kept.samples_per_revolution)
         probabilities = dict.fromkeys(dict.fromkeys(STATE_OF.values()), 0.0)
         for name, share in zip(kept.classes, kept.probabilities(windows), strict=True):
             probabilities[STATE_OF[name]] += float(share)
@@ -128,7 +128,7 @@ def _flow_windows(recording: Recording, rig: Rig, twin: Twin, learnt_speed_hz: f
     shaft orders that a network has learnt."""
     revolutions = revolutions_of(recording, rig, SAMPLES)
     fitted, pressure = with_fitted_pump(twin), recording.load_pressure
-    ripple = healthy_flow(fitted.rig.pump, fitted.rig.fluid, recording.speed_rpm, pressure)
+    ripple = simulate_healthy_pump(fitted.rig.pump, fitted.rig.fluid, recording.speed_rpm, pressure)
     found = estimate_flow(
         revolutions.windows,
         revolutions.speed_hz,

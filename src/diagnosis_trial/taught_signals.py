@@ -10,9 +10,9 @@ import numpy as np
 
 from rippletwin.diagnosis.faults.library import FAULTS
 from rippletwin.diagnosis.pump_flow import (
-    healthy_flow,
     leak_velocity,
-    leaking_flow,
+    simulate_healthy_pump,
+    simulate_leaking_pump,
     with_fitted_pump,
 )
 from rippletwin.diagnosis.randomised_signals import FAULT_OF, SignalSource, severity_bins
@@ -44,7 +44,7 @@ class TaughtSignals:
         self._speed_hz, self._pressure = speed_hz, load_pressure
         rig = with_fitted_pump(twin).rig
         self._point = rig.pump, rig.fluid, 60.0 * speed_hz, load_pressure
-        flow = float(healthy_flow(*self._point).flow.mean())
+        flow = float(simulate_healthy_pump(*self._point).flow.mean())
         velocity = float(leak_velocity(rig.pump, rig.fluid, load_pressure))
         self._unit_area = flow / rig.pump["pistons"] / velocity  # passes the flow of one piston
 
@@ -70,8 +70,8 @@ class TaughtSignals:
         """Flow (1, M') of a class, m3/s."""
         fault, area = self._fixed_fault(name)
         if fault is None:
-            return healthy_flow(*self._point).flow[None]
-        return leaking_flow(*self._point, fault, area).flow[None]
+            return simulate_healthy_pump(*self._point).flow[None]
+        return simulate_leaking_pump(*self._point, fault, area).flow[None]
 
     def _fixed_fault(self, name: str):
         """The fault of a class, None where it is healthy, and its leak area, m2."""

@@ -11,7 +11,7 @@ import pytest
 from paper_rig import paper_rig
 from rippletwin import cli
 from rippletwin.calibration.calibrate import calibrate, conclude
-from rippletwin.calibration.laplace import UNCONVERGED_GAIN, laplace
+from rippletwin.calibration.laplace import UNCONVERGED_GAIN, approximate_posterior
 from rippletwin.calibration.likelihood import EVENNESS, Likelihood
 from rippletwin.calibration.pareto import calibrate_pareto
 from rippletwin.case.model import Load
@@ -146,7 +146,7 @@ def test_a_fit_that_has_not_converged_says_so(monkeypatch):
     beside = result.twin.theta.copy()
     beside[0] += 10.0 * result.sd[0]
     (told,) = [w for w in conclude(model, beside).warnings if w.startswith("not converged")]
-    gain = laplace(model, beside).expected_gain
+    gain = approximate_posterior(model, beside).expected_gain
     assert gain > UNCONVERGED_GAIN and f"promises {gain:.1f} of log posterior" in told
     monkeypatch.setattr(Likelihood, "is_valid", lambda *_: False)
     told = conclude(model, beside).warnings

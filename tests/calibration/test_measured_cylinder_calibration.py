@@ -11,7 +11,7 @@ import pytest
 from paths import MEASURED
 from rippletwin.calibration.calibrate import calibrate
 from rippletwin.calibration.likelihood import Likelihood
-from rippletwin.calibration.misfit import misfit
+from rippletwin.calibration.misfit import measure_misfit
 from rippletwin.case.load import load_case
 from rippletwin.spectra.observation import observe
 from rippletwin.twin.twin import Twin
@@ -44,7 +44,7 @@ def case(request, tmp_path_factory):
 def nominal(case, friction):
     observations = [observe(r, case.rig) for r in case.healthy]
     twin = Twin(case.rig, observations, friction=friction)
-    return misfit(Likelihood(twin, observations), twin.theta).relative
+    return measure_misfit(Likelihood(twin, observations), twin.theta).relative
 
 
 def test_the_papers_friction_fits_the_tube_only_with_a_nonsensical_radius(case):

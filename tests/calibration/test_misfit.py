@@ -7,7 +7,7 @@ import pytest
 
 from paper_rig import paper_rig
 from rippletwin.calibration.likelihood import Likelihood
-from rippletwin.calibration.misfit import misfit, theil
+from rippletwin.calibration.misfit import measure_misfit, theil_coefficient
 from rippletwin.calibration.pareto import sensor_misfits
 from rippletwin.twin.twin import Twin
 from synthetic_recordings import point, recordings
@@ -25,8 +25,10 @@ def test_theil_from_harmonics_is_theil_from_the_time_signals():
     turn = np.exp(1j * np.outer(data[0].orders, angle))
     x, y = (measured @ turn).real, (predicted @ turn).real
     expected = np.sqrt(np.mean((x - y) ** 2)) / (np.sqrt(np.mean(x**2)) + np.sqrt(np.mean(y**2)))
-    assert theil(measured, predicted) == pytest.approx(expected, rel=1e-9)
-    assert misfit(Likelihood(twin, data), twin.theta).theil == pytest.approx(expected, rel=1e-9)
+    assert theil_coefficient(measured, predicted) == pytest.approx(expected, rel=1e-9)
+    assert measure_misfit(Likelihood(twin, data), twin.theta).theil == pytest.approx(
+        expected, rel=1e-9
+    )
 
 
 def test_an_unknown_source_is_no_misfit():
@@ -42,6 +44,6 @@ def test_an_unknown_source_is_no_misfit():
     free = [replace(free[0], values=1e-3 * (flow[0] + 1j * flow[1]) * response)]
     likelihood = Likelihood(twin, free)
     assert np.max(sensor_misfits(likelihood, twin.theta)) < 1e-20
-    assert misfit(likelihood, twin.theta).relative < 1e-10
+    assert measure_misfit(likelihood, twin.theta).relative < 1e-10
     free[0].values[0] *= 1.5
     assert sensor_misfits(Likelihood(twin, free), twin.theta)[0] > 1e-3

@@ -12,7 +12,7 @@ from rippletwin.calibration.multistart import (
     RANDOM_STARTS,
     SCALINGS,
     choose_starts,
-    distinct_modes,
+    select_distinct_modes,
 )
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.score_test import MAX_FOLLOWED, ScoreTest
@@ -88,4 +88,4 @@ def test_starts_behind_a_free_source_are_ranked_by_ratios_between_sensors():
 def test_modes_near_a_better_one_are_dropped():
     """Of two modes that differ by 0.03 in one coordinate the better stays, and one farther away."""
     modes = [(2.0, np.array([0.0, 0.03])), (1.0, np.zeros(2)), (3.0, np.array([0.0, 1.0]))]
-    assert [value for value, _ in distinct_modes(modes)] == [1.0, 3.0]
+    assert [value for value, _ in select_distinct_modes(modes)] == [1.0, 3.0]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rippletwin.calibration.fit import laplace_fit
+from rippletwin.calibration.fit import conclude_fit
 from rippletwin.calibration.misfit import score_fit
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.ripple_correction import correct_ripple
@@ -31,7 +31,7 @@ def fitted():
         data.append(replace(o, flow_ripple=nominal))
     model = Posterior(truth, data)
     model.estimate_errors(model.predict(truth.theta), truth.theta)
-    return laplace_fit(model, (), truth.theta), data
+    return conclude_fit(model, (), truth.theta), data
 
 
 def test_the_error_of_the_ripple_is_recovered(fitted):

@@ -115,7 +115,7 @@ def test_the_line_is_charged_with_its_own_misfit_alone(diagnoses):
     of a line whose waves are 8 % faster is. With one sensor nobody can tell, and all of it counts.
     """
     pump_is_wrong, line_is_wrong = (
-        Diagnoser(Twin(leaking_pump.rig(), [anchor]), ()).model(anchor, anchor).anchor
+        Diagnoser(Twin(leaking_pump.rig(), [anchor]), ()).make_model(anchor, anchor).anchor
         for anchor in (
             leaking_pump.record("anchor"),
             leaking_pump.record("anchor", wave_speed=1.08 * leaking_pump.WAVE_SPEED),
@@ -126,7 +126,7 @@ def test_the_line_is_charged_with_its_own_misfit_alone(diagnoses):
     assert np.median(line_is_wrong.line_misfit) > 0.3
     rig, anchor = leaking_pump.rig(), leaking_pump.record("anchor")
     rig, anchor = replace(rig, sensors=rig.sensors[:1]), leaking_pump.first_sensor(anchor)
-    alone = Diagnoser(Twin(rig, [anchor]), ()).model(anchor, anchor).anchor
+    alone = Diagnoser(Twin(rig, [anchor]), ()).make_model(anchor, anchor).anchor
     np.testing.assert_array_equal(alone.line_misfit, alone.misfit)
 
 
@@ -137,7 +137,7 @@ def test_changes_between_healthy_recordings_are_learned():
     rng = np.random.default_rng(3)
     anchor = leaking_pump.record("anchor", rng=rng)
     diagnoser = Diagnoser(Twin(leaking_pump.rig(), [anchor]), ())
-    model = diagnoser.model(anchor, anchor)
+    model = diagnoser.make_model(anchor, anchor)
     orders, response = model.orders, model.line.response()[:, : len(model.orders)]
     own = orders % leaking_pump.PISTONS == 0
     extra = 0.06 * own * model.anchor.flow * np.exp(2j * np.pi * rng.uniform(size=len(orders)))
@@ -146,7 +146,7 @@ def test_changes_between_healthy_recordings_are_learned():
         values = (anchor.values + share * response * extra) * np.exp(1j * orders * TURN)
         return replace(anchor, label=label, values=values)
 
-    _, learned = compare_healthy(diagnoser.model(changed("again", 1.0), anchor), ErrorPrior())
+    _, learned = compare_healthy(diagnoser.make_model(changed("again", 1.0), anchor), ErrorPrior())
     assert np.linalg.norm(learned - extra) < 0.2 * np.linalg.norm(extra)
     new = changed("new", 1.5)
     p_values = [
@@ -165,15 +165,17 @@ def test_the_pitch_is_judged_by_the_likelihood():
         leaking_pump.record(name, fault, turn, rng)
         for name, fault, turn in (("anchor", None, 0.0), ("slipper", Slipper(1e-7, 2), TURN))
     )
-    model = Diagnoser(Twin(leaking_pump.rig(), [anchor]), ()).model(anchor, anchor)
+    model = Diagnoser(Twin(leaking_pump.rig(), [anchor]), ()).make_model(anchor, anchor)
     orders, response = model.orders, model.line.response()[:, : len(model.orders)]
     own = orders % leaking_pump.PISTONS == 0
     unequal = np.where(own, 0.0, 1e-8) * np.exp(2j * np.pi * rng.uniform(size=len(orders)))
     anchor = replace(anchor, values=anchor.values + response * unequal)
     turned = response * unequal * np.exp(1j * orders * TURN)
     leaking = replace(leaking, values=leaking.values + turned)
-    model = Diagnoser(Twin(leaking_pump.rig(), [anchor]), select_faults()).model(leaking, anchor)
-    candidates = Screen(model).one(select_faults()[0])
+    model = Diagnoser(Twin(leaking_pump.rig(), [anchor]), select_faults()).make_model(
+        leaking, anchor
+    )
+    candidates = Screen(model).screen_one(select_faults()[0])
     apart = np.angle(np.exp(1j * (np.array([c.turn for c in candidates]) - TURN)))
     wrong = next(k for k in range(len(candidates)) if abs(apart[k]) > 0.5)
     preferred = replace(candidates[wrong], score=candidates[0].score + 50.0)
@@ -206,10 +208,10 @@ def test_shaft_angles_that_the_twin_has_fitted_count_for_nothing():
     twin = Twin(leaking_pump.rig(), [anchor])
     angle = np.equal(list(twin.index), "angle[anchor]")
     for each in (twin, twin.with_(theta=200.0 * angle)):
-        model = Diagnoser(each, ()).model(again, anchor)
+        model = Diagnoser(each, ()).make_model(again, anchor)
         nothing = Hypothesis((), (), (), 0.0, np.zeros(len(model.line.drifts)))
         model.linearise_line(nothing)
-        left = model.values - model.parts(nothing).healthy
+        left = model.values - model.predict(nothing).healthy
         assert np.linalg.norm(left) < 1e-3 * np.linalg.norm(model.values)
 
 

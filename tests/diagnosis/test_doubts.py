@@ -9,7 +9,7 @@ import pytest
 import leaking_pump
 from rippletwin.calibration.laplace import UNCONVERGED_GAIN
 from rippletwin.diagnosis import pump_flow
-from rippletwin.diagnosis.doubts import doubts
+from rippletwin.diagnosis.doubts import find_doubts
 from rippletwin.diagnosis.faults.library import FAULTS
 from rippletwin.diagnosis.integration import Density
 
@@ -39,7 +39,7 @@ GRID = np.linspace(-1.0, 1.0, 41)
 )
 def test_a_leak_at_the_end_of_what_was_tried(middle, width, words):
     """A posterior that the grid cuts off says so; one that ends within it says nothing."""
-    found = doubts(diagnosis(-0.5 * ((GRID - middle) / width) ** 2))
+    found = find_doubts(diagnosis(-0.5 * ((GRID - middle) / width) ** 2))
     assert len(found) == len(words)
     assert all(word in text for word, text in zip(words, found))
 
@@ -47,8 +47,8 @@ def test_a_leak_at_the_end_of_what_was_tried(middle, width, words):
 def test_a_fit_of_the_pump_that_did_not_converge():
     """A step that promises more than decides between explanations is a doubt, with its size."""
     inside = -8.0 * GRID**2
-    assert not doubts(diagnosis(inside, expected_gain=0.9 * UNCONVERGED_GAIN))
-    (told,) = doubts(diagnosis(inside, expected_gain=7.24))
+    assert not find_doubts(diagnosis(inside, expected_gain=0.9 * UNCONVERGED_GAIN))
+    (told,) = find_doubts(diagnosis(inside, expected_gain=7.24))
     assert "did not converge" in told and "promises 7.2 of log posterior" in told
 
 
@@ -66,8 +66,8 @@ def test_a_pump_that_does_not_become_periodic(monkeypatch):
 
     monkeypatch.setattr(pump_flow, "simulate", cut_short)
     point = leaking_pump.SHEET, leaking_pump.OIL, leaking_pump.SPEED, leaking_pump.LOAD
-    flow = pump_flow.leak_flow(*point, FAULTS["slipper"])
+    flow = pump_flow.simulate_leak_flow(*point, FAULTS["slipper"])
     for kept in (pump_flow._simulated, pump_flow._leak_flow):
         kept.cache_clear()
     assert len(done) > 3 and all(run.converged for run in done) and not flow.periodic
-    assert "periodic" in doubts(diagnosis(-8.0 * GRID**2, flow.periodic))[0]
+    assert "periodic" in find_doubts(diagnosis(-8.0 * GRID**2, flow.periodic))[0]

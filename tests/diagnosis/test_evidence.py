@@ -11,7 +11,7 @@ from rippletwin.case.model import Case
 from rippletwin.diagnosis.diagnose import check_twin, recalibrate_twin
 from rippletwin.diagnosis.diagnosed_numbers import gather
 from rippletwin.diagnosis.diagnoser import Diagnoser
-from rippletwin.diagnosis.doubts import doubts
+from rippletwin.diagnosis.doubts import find_doubts
 from rippletwin.diagnosis.evidence import (
     CHANGES,
     SCATTERS,
@@ -50,7 +50,7 @@ def test_the_evidence_is_the_mean_likelihood_over_areas_and_errors(recordings):
     """Of a slipper's leak: against the sum over a fine grid of areas and over all errors at once,
     with the shaft angle and the drift of the mode, to 0.2."""
     anchor, leaking = recordings
-    model = Diagnoser(twin_of(anchor), [SLIPPER]).model(leaking, anchor)
+    model = Diagnoser(twin_of(anchor), [SLIPPER]).make_model(leaking, anchor)
     prior = ErrorPrior()
     (found,) = weigh_states(model, [(SLIPPER,)], prior)
     model.linearise_line(found.mode)
@@ -66,7 +66,7 @@ def test_the_evidence_is_the_mean_likelihood_over_areas_and_errors(recordings):
     ]
     over_areas = logsumexp(each) + np.log(0.02 / (high - low))
     again, _ = _at_best_pitch(
-        model, Screen(model).one(SLIPPER), Errors(prior.scatter, prior.change)
+        model, Screen(model).screen_one(SLIPPER), Errors(prior.scatter, prior.change)
     )
     scores = np.array([c.score for c in again])
     places = logsumexp(scores - scores.max()) - 2.0 * np.log(model.pistons)
@@ -81,7 +81,7 @@ def test_a_leak_beyond_what_is_tried_is_doubted(recordings, end, words):
     anchor, leaking = recordings
     fault = replace(SLIPPER, **{end: 0.115 if end == "largest" else 0.135})
     found = Diagnoser(twin_of(anchor), [fault])(leaking, [anchor])
-    assert [words in text for text in doubts(found)] == [True]
+    assert [words in text for text in find_doubts(found)] == [True]
 
 
 def test_faults_that_cannot_be_together_are_tried_alone(recordings):
@@ -106,7 +106,7 @@ def test_more_orders_than_the_pump_s_are_left_out(recordings):
         values=rng.normal(size=(2, len(orders))) + 0j,
         covariance=np.tile(np.eye(2, dtype=complex), (len(orders), 1, 1)),
     )
-    model = Diagnoser(twin_of(anchor), [SLIPPER]).model(slow, slow)
+    model = Diagnoser(twin_of(anchor), [SLIPPER]).make_model(slow, slow)
     assert model.orders[-1] == ORDERS
     assert model.leak_change(SLIPPER, 1e-7, 0).shape == (ORDERS,)
 
@@ -151,7 +151,7 @@ def test_a_recording_without_pressure_over_its_load_is_refused(recordings):
 def test_a_piston_is_one_of_the_pump_s(recordings):
     """Also at shaft angles that are whole pitches but for rounding."""
     anchor, leaking = recordings
-    model = Diagnoser(twin_of(anchor), ()).model(leaking, anchor)
+    model = Diagnoser(twin_of(anchor), ()).make_model(leaking, anchor)
     for pitch in range(-40, 40):
         for off in (-1e-16, 0.0, 1e-16):
             turn = 2 * np.pi * pitch / model.pistons - model.anchor.angle + off

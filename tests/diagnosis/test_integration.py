@@ -42,6 +42,6 @@ def test_large_log_likelihoods_do_not_overflow():
 @pytest.mark.parametrize("own", [0.01, 0.3])
 def test_a_widened_gaussian_has_the_sum_of_both_variances(own):
     """Also one that is much narrower than the error beside it."""
-    found = explore(lambda x: -0.5 * ((x + 15.0) / own) ** 2, LOW, HIGH).widened(0.2)
+    found = explore(lambda x: -0.5 * ((x + 15.0) / own) ** 2, LOW, HIGH).widen(0.2)
     ends = norm.ppf([0.025, 0.5, 0.975], -15.0, np.hypot(own, 0.2))
     np.testing.assert_allclose(found.quantiles([0.025, 0.5, 0.975]), ends, atol=0.01)

@@ -154,7 +154,7 @@ def test_another_twin_and_other_faults_make_all_again(case, asked):
 def test_another_program_makes_all_again(case, asked, monkeypatch):
     """An answer of an older version is not mixed with those of a newer one."""
     run(case)
-    monkeypatch.setattr(kept_answers, "program", lambda: "newer")
+    monkeypatch.setattr(kept_answers, "digest_program", lambda: "newer")
     run(case)
     assert asked[3:] == ["twin", *UNKNOWN]
 

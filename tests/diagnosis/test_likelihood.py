@@ -5,7 +5,7 @@ Independent truth: the dense covariance of the real residuals.
 
 import numpy as np
 
-from rippletwin.diagnosis.likelihood import complex_columns, marginal
+from rippletwin.diagnosis.likelihood import complex_columns, marginalise
 
 
 def dense(residual, variance, columns):
@@ -32,7 +32,7 @@ def test_marginal_is_that_of_the_whole_covariance():
 
     residual, columns = draw(2, 7), np.concatenate([draw(1, 2, 7), complex_columns(draw(2, 2, 7))])
     variance = rng.uniform(0.1, 2.0, (2, 7))
-    found = marginal(residual, variance, columns)
+    found = marginalise(residual, variance, columns)
     value, square, amplitudes = dense(residual, variance, columns)
     np.testing.assert_allclose(found.log_likelihood, value, rtol=1e-12)
     np.testing.assert_allclose(found.square, square, rtol=1e-12)
@@ -44,9 +44,9 @@ def test_readings_that_are_alike_count_as_one():
     rng = np.random.default_rng(1)
     residual, column = rng.normal(size=(2, 1, 2, 5)) + 1j * rng.normal(size=(2, 1, 2, 5))
     variance = rng.uniform(0.1, 2.0, (2, 5))
-    once = marginal(residual[0], variance, column)
+    once = marginalise(residual[0], variance, column)
     copied = [np.repeat(x, 3, axis=-1) for x in (residual[0], variance, column)]
-    found = marginal(*copied, alike=3.0)
+    found = marginalise(*copied, alike=3.0)
     np.testing.assert_allclose(found.log_likelihood, once.log_likelihood, rtol=1e-12)
     np.testing.assert_allclose(found.amplitudes, once.amplitudes, rtol=1e-10)
     np.testing.assert_allclose(found.square, 3.0 * once.square, rtol=1e-10)

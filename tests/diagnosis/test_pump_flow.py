@@ -8,7 +8,7 @@ import pytest
 
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor
 from rippletwin.diagnosis.faults.library import FAULTS
-from rippletwin.diagnosis.pump_flow import STEPS, UNCERTAIN, leak_flow, with_fitted_pump
+from rippletwin.diagnosis.pump_flow import STEPS, UNCERTAIN, simulate_leak_flow, with_fitted_pump
 from rippletwin.harmonics import peak_amplitudes
 from rippletwin.pump.faults import Cylinder, Slipper
 from rippletwin.pump.geometry import Geometry
@@ -30,7 +30,7 @@ def simulated(pump, fault=None):
 def test_areas_between_the_simulated_ones_are_right(name, fault):
     """Small, middling and large leaks that are no nodes: within 2 % of the change, half of
     what the best of twins errs by."""
-    flow = leak_flow(PUMP, OIL, SPEED, PRESSURE, FAULTS[name])
+    flow = simulate_leak_flow(PUMP, OIL, SPEED, PRESSURE, FAULTS[name])
     healthy = simulated(PUMP)
     for area in (3.1e-8, 4.4e-7, 3.3e-6):
         truth = simulated(PUMP, fault(area)) - healthy
@@ -47,7 +47,7 @@ def test_slopes_are_what_another_pump_makes():
     )
     changes = [simulated(pump, Slipper(area)) - simulated(pump) for pump in (PUMP, moved)]
     truth = changes[1] - changes[0]
-    slopes = leak_flow(PUMP, OIL, SPEED, PRESSURE, FAULTS["slipper"]).pump_slopes(area)
+    slopes = simulate_leak_flow(PUMP, OIL, SPEED, PRESSURE, FAULTS["slipper"]).pump_slopes(area)
     found = slopes[list(UNCERTAIN).index("dead_volume")][ORDERS]
     assert np.linalg.norm(found - truth) < 0.25 * np.linalg.norm(truth)
     assert np.linalg.norm(truth) > 0.005 * np.linalg.norm(changes[0])
@@ -60,7 +60,7 @@ def test_slopes_of_a_port_that_opens_slowly_are_there():
     slower = slow | {"port_opening_deg": 80.0 * (1 + UNCERTAIN["port_opening_deg"])}
     changes = [simulated(pump, Slipper(area)) - simulated(pump) for pump in (slow, slower)]
     truth = changes[1] - changes[0]
-    slopes = leak_flow(slow, OIL, SPEED, PRESSURE, FAULTS["slipper"]).pump_slopes(area)
+    slopes = simulate_leak_flow(slow, OIL, SPEED, PRESSURE, FAULTS["slipper"]).pump_slopes(area)
     found = slopes[list(UNCERTAIN).index("port_opening_deg")][ORDERS]
     assert np.linalg.norm(found - truth) < 0.25 * np.linalg.norm(truth)
 
@@ -68,7 +68,7 @@ def test_slopes_of_a_port_that_opens_slowly_are_there():
 def test_a_leak_has_a_discharge_coefficient_of_its_own_where_the_sheet_has_none():
     """An area of 0.7 stands for as much leak as a larger one of the default pump's 0.65."""
     pump = {"pistons": 9}
-    flow = leak_flow(pump, OIL, SPEED, PRESSURE, FAULTS["slipper"])
+    flow = simulate_leak_flow(pump, OIL, SPEED, PRESSURE, FAULTS["slipper"])
     truth = simulated(pump, Slipper(4e-7 * 0.7 / 0.65)) - simulated(pump)
     assert np.linalg.norm(flow.harmonics(4e-7)[ORDERS] - truth) < 0.01 * np.linalg.norm(truth)
 

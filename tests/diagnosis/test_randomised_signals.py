@@ -5,7 +5,7 @@ import pytest
 
 import leaking_pump
 from rippletwin.diagnosis import randomised_signals
-from rippletwin.diagnosis.anchor import alignment
+from rippletwin.diagnosis.anchor import find_alignment
 from rippletwin.diagnosis.pump_flow import NUMBERS
 from rippletwin.diagnosis.randomised_signals import SignalSource, severity_bins
 from rippletwin.harmonics import one_period, peak_amplitudes
@@ -47,7 +47,7 @@ def distance_at_best_angle(signal, truth):
     """Relative distance of two revolutions (S, M), the shaft angle being free."""
     orders = np.arange(1, 181)
     one, other = peak_amplitudes(signal)[:, orders], peak_amplitudes(truth)[:, orders]
-    turn = np.exp(1j * orders * alignment(one, other, orders, 2 * np.pi))
+    turn = np.exp(1j * orders * find_alignment(one, other, orders, 2 * np.pi))
     return np.linalg.norm(one * turn - other) / np.linalg.norm(other)
 
 

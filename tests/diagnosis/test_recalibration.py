@@ -14,7 +14,7 @@ from rippletwin.diagnosis import pump_calibration
 from rippletwin.diagnosis.diagnose import healthy_misfit
 from rippletwin.diagnosis.line_calibration import calibrate_line
 from rippletwin.diagnosis.pump_calibration import calibrate_pump, one_each_point
-from rippletwin.diagnosis.pump_flow import healthy_flow
+from rippletwin.diagnosis.pump_flow import simulate_healthy_pump
 from rippletwin.harmonics import peak_amplitudes
 from rippletwin.twin.twin import Twin
 
@@ -33,8 +33,8 @@ def test_ratios_between_sensors_give_the_wave_speed_whatever_the_pump_is_said_to
     twin = Twin(leaking_pump.rig(), healthy)
     theta = twin.theta.copy()
     theta[twin.index["diameter[1]"]] = 6.0
-    bent = twin.with_(theta=theta)
-    found = calibrate_line(bent, healthy).values()
+    biased = twin.with_(theta=theta)
+    found = calibrate_line(biased, healthy).values()
     true = 0.98 * leaking_pump.WAVE_SPEED
     assert found["wave_speed[1]"] == pytest.approx(true, rel=5e-3)
     assert found["diameter[1]"] == pytest.approx(leaking_pump.DIAMETER, rel=0.05)
@@ -52,7 +52,7 @@ def test_the_pump_s_flow_comes_nearer_to_the_true_one(healthy):
     point = leaking_pump.OIL, leaking_pump.SPEED, leaking_pump.LOAD
     orders = leaking_pump.PISTONS * np.arange(1, 13)
     true, sheet, found = (
-        np.abs(peak_amplitudes(healthy_flow(pump, *point).flow)[orders])
+        np.abs(peak_amplitudes(simulate_healthy_pump(pump, *point).flow)[orders])
         for pump in (leaking_pump.TRUE, line.rig.pump, fitted)
     )
     assert np.linalg.norm(found - true) < 0.5 * np.linalg.norm(sheet - true)

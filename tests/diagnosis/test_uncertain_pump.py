@@ -12,7 +12,7 @@ from rippletwin.diagnosis.pump_flow import (
     STEPS,
     TIMING_SD_DEG,
     UNCERTAIN,
-    leak_flow,
+    simulate_leak_flow,
     with_fitted_pump,
 )
 from rippletwin.diagnosis.uncertain_pump import SDS, UncertainPump, number_slopes
@@ -69,7 +69,7 @@ def test_a_drawn_number_is_what_a_pump_with_it_makes(name, z):
     moved = np.linalg.norm((truth - nominal)[own])
     assert moved > 0.05 * np.linalg.norm(nominal[own])
     assert np.linalg.norm((found - truth)[own]) < moved / 3
-    leak = leak_flow(SHEET, *POINT, FAULTS["slipper"])
+    leak = simulate_leak_flow(SHEET, *POINT, FAULTS["slipper"])
     change = (simulated(pump, Slipper(AREA)) - healthy) * turn
     left = np.linalg.norm(flows.change(leak, AREA, numbers) - change)
     still = np.linalg.norm(flows.change(leak, AREA, 0 * numbers) - change)

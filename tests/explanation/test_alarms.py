@@ -22,7 +22,7 @@ from rippletwin.explanation.checks.alarms import (
     largest_pull,
     read_alarms,
 )
-from rippletwin.explanation.localise.smooth_corrections import NONE
+from rippletwin.explanation.localise.elements import NONE
 from rippletwin.explanation.thresholds import (
     DISAGREEMENT_ALARM,
     DRIFT_SIGNIFICANCE,

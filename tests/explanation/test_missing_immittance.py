@@ -10,8 +10,8 @@ from rippletwin.explanation.localise.free_corrections import locate_mismatch
 from rippletwin.explanation.localise.missing_immittance import (
     MissingImmittance,
     describe_law,
+    find_missing_immittance,
     is_passive,
-    missing_immittance,
 )
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
@@ -38,7 +38,7 @@ def test_the_missing_admittance_follows_the_true_law(hose):
     """At nine of ten frequencies alone the data give the hose's admittance within four standard
     deviations, and its law is recognised."""
     _, observations, fit, _ = hose
-    missing = missing_immittance(fit, observations)
+    missing = find_missing_immittance(fit, observations)
     assert (missing.where, missing.unit) == ("segment 2", "m2/(Pa s)")
     s = 2j * np.pi * missing.frequency_hz
     rig = fit.twin.calibrated_rig()

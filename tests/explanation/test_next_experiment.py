@@ -11,8 +11,8 @@ from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.frequency_continuation import refine
 from rippletwin.explanation.verdict import next_experiment
 from rippletwin.explanation.verdict.candidate_recordings import (
-    candidate_recordings,
     further_sensors,
+    list_candidate_recordings,
 )
 from rippletwin.explanation.verdict.decision import equivalent_places, rival_fits
 from rippletwin.explanation.verdict.next_experiment import (
@@ -62,7 +62,7 @@ def test_an_explanation_loses_nothing_to_itself(hose):
     on every one."""
     base, observations, fit = hose
     air = refine(base, AIR, observations, [np.zeros(len(base.with_(effects=AIR).parameters))])
-    for _, rig, observation in candidate_recordings(fit.twin, observations)[::4]:
+    for _, rig, observation in list_candidate_recordings(fit.twin, observations)[::4]:
         assert expected_loss(fit, fit, rig, observation) < 1e-6
         assert expected_loss(fit, air, rig, observation) > 1e-3
 
@@ -87,7 +87,7 @@ def test_all_common_parameters_are_carried_to_the_new_recording(uncertain_pump):
     carried = {name for name in index if not name.startswith("angle")}
     assert {"bulk_modulus", "port_timing"} < carried
     periodic = [
-        (rig, o) for _, rig, o in candidate_recordings(fit.twin, observations) if o.speed_hz
+        (rig, o) for _, rig, o in list_candidate_recordings(fit.twin, observations) if o.speed_hz
     ]
     assert len(periodic) > 5
     for rig, observation in periodic:
@@ -107,7 +107,7 @@ def test_a_rival_with_another_pump_is_expected_to_lose(uncertain_pump):
     rival = replace(fit, twin=fit.twin.with_(theta=theta))
     _, rig, observation = next(
         c
-        for c in candidate_recordings(fit.twin, observations)
+        for c in list_candidate_recordings(fit.twin, observations)
         if c[0].startswith("another operating point")
     )
     assert expected_loss(fit, rival, rig, observation) > 1.0
@@ -120,7 +120,7 @@ def test_the_scaled_ripple_keeps_everything_but_its_size(uncertain_pump):
     fit, observations = uncertain_pump
     old = replace(observations[0].flow_ripple, modulation=0.003 + 0.001j)
     observations = [replace(observations[0], flow_ripple=old)]
-    for recording, _, o in candidate_recordings(fit.twin, observations):
+    for recording, _, o in list_candidate_recordings(fit.twin, observations):
         if recording.startswith("another operating point"):
             scale = o.speed_hz / observations[0].speed_hz
             np.testing.assert_allclose(o.flow_ripple.flow, scale * old.flow)

@@ -11,10 +11,10 @@ from rippletwin.explanation.fit_jobs import Continuation, FitJob, FromTheta, Wor
 from rippletwin.explanation.search import sheet_tolerance
 from rippletwin.explanation.search.sheet_tolerance import (
     SCALES,
+    estimate_tolerance_scale,
+    evidence_of_scales,
     fit_with_wider_tolerances,
-    scale_evidence,
     scale_tolerances,
-    tolerance_scale,
 )
 from rippletwin.twin.twin import Twin
 from synthetic_observations import make
@@ -26,7 +26,7 @@ def test_the_evidence_is_that_of_the_data_under_each_prior():
     rng = np.random.default_rng(1)
     a, y = rng.normal(size=(7, 4)), rng.normal(size=7) * 3.0
     covariance = np.linalg.inv(a.T @ a + np.eye(4))
-    evidence = scale_evidence(covariance @ a.T @ y, covariance)
+    evidence = evidence_of_scales(covariance @ a.T @ y, covariance)
     densities = []
     for k in SCALES:
         total = np.eye(7) + k**2 * a @ a.T
@@ -40,7 +40,7 @@ def test_numbers_twice_as_far_off_double_the_tolerances():
     rng = np.random.default_rng(2)
     for true in (1.0, 2.0):
         covariance = 0.01 * np.eye(40)
-        evidence = scale_evidence(true * rng.normal(size=40), covariance)
+        evidence = evidence_of_scales(true * rng.normal(size=40), covariance)
         assert SCALES[int(np.argmax(evidence))] == pytest.approx(true, rel=0.2)
 
 
@@ -63,7 +63,7 @@ def test_the_tolerances_never_get_more_than_four_times_as_wide(so_far, found):
         rig=SimpleNamespace(tolerance_scale=so_far),
     )
     fit = SimpleNamespace(twin=twin, evidence=0.0, covariance=0.01 * np.eye(6))
-    assert tolerance_scale(fit) == pytest.approx(found)
+    assert estimate_tolerance_scale(fit) == pytest.approx(found)
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +83,7 @@ def test_wider_tolerances_are_taken_where_they_gain(plain_fit, monkeypatch, gain
     begun anew, from 3 of log evidence on; both have twice the data sheet's tolerances, because the
     fit itself asks for none."""
     fit, workers = plain_fit
-    monkeypatch.setattr(sheet_tolerance, "tolerance_scale", lambda fit: 1.0)
+    monkeypatch.setattr(sheet_tolerance, "estimate_tolerance_scale", lambda fit: 1.0)
     asked = []
 
     def run(jobs):

@@ -11,14 +11,16 @@ from rippletwin.calibration.frequency_continuation import refine
 from rippletwin.explanation.checks.robustness import compare_beside_corrections
 from rippletwin.explanation.checks.support import evaluate_corrections, evaluate_without
 from rippletwin.explanation.fit_jobs import FitJob, NearFit, Workers
-from rippletwin.explanation.localise.remainder import _interval, find_remainder
-from rippletwin.explanation.localise.smooth_corrections import (
-    CORRELATION_HZ,
+from rippletwin.explanation.localise.elements import (
     NONE,
-    _log_likelihoods,
     elements_of,
     own_element,
     position_spacing,
+)
+from rippletwin.explanation.localise.remainder import _interval, find_remainder
+from rippletwin.explanation.localise.smooth_corrections import (
+    CORRELATION_HZ,
+    _log_likelihoods,
     smooth_basis,
 )
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies

@@ -17,7 +17,7 @@ from rippletwin.explanation.verdict.number_text import (
 )
 from rippletwin.explanation.verdict.pressure_text import pressure_sentences
 from rippletwin.explanation.verdict.remainder_text import ripple_sentences
-from rippletwin.explanation.verdict.summary_text import summary_text
+from rippletwin.explanation.verdict.summary_text import describe_verdict
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
 
@@ -52,7 +52,7 @@ def summarise(
     result = {"verdict": verdict, "fit": fit, "next_recording": None, "pump": pump or {}}
     result |= {"load": None, "sensors": {}, "equivalents": []}
     result["remainder"] = remainder
-    return summary_text(e, result, [])
+    return describe_verdict(e, result, [])
 
 
 def test_shaft_orders_alone_are_named_without_an_effect_of_the_line():
@@ -256,7 +256,7 @@ def explained(
     fit["model_error"] = {"held_out": held_out_error, "after": 0.02}
     whole = {"verdict": verdict, "fit": fit, "next_recording": None, "pump": {}, "load": None}
     whole |= {"sensors": {}, "remainder": None, "equivalents": []} | result
-    return summary_text(e, whole, entries).split("\n")
+    return describe_verdict(e, whole, entries).split("\n")
 
 
 def test_a_named_verdict_begins_with_what_is_missing():

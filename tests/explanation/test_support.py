@@ -16,7 +16,7 @@ from rippletwin.explanation.checks.support import (
     judge_beside_network,
     judge_effects,
 )
-from rippletwin.explanation.localise.smooth_corrections import NONE
+from rippletwin.explanation.localise.elements import NONE
 from rippletwin.explanation.thresholds import (
     MAX_DISAGREEMENT,
     MIN_LOG_BAYES_FACTOR,

@@ -17,6 +17,7 @@ from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.verdict import verdict_file
 from rippletwin.explanation.verdict.decision import Decision
 from rippletwin.explanation.verdict.explanation import Explanation
+from rippletwin.explanation.verdict.mismatch_entry import describe_mismatch
 from rippletwin.explanation.verdict.verdict_file import verdict_dict
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
@@ -159,8 +160,7 @@ def test_the_p_value_bounds_all_hypotheses_that_were_fitted(explanation):
     )
     search = Search(base, [single, other], pair, [turned, pair], [network])
     e = replace(explanation, search=search, decision=Decision("consistent", pair))
-    assert verdict_file._mismatch(e, "consistent", [])["p_value"] == pytest.approx(
-        4 * np.exp(-10.0)
-    )
+    mismatch = describe_mismatch(e, "consistent", [], [])
+    assert mismatch["p_value"] == pytest.approx(4 * np.exp(-10.0))
     drawn = replace(e, null_distribution=NullDistribution((*[1.0] * 8, 5.0, 6.0)))
-    assert verdict_file._mismatch(drawn, "consistent", [])["p_value"] == pytest.approx(3 / 11)
+    assert describe_mismatch(drawn, "consistent", [], [])["p_value"] == pytest.approx(3 / 11)

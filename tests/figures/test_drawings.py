@@ -212,7 +212,7 @@ def test_a_reading_error_of_rounding_is_not_drawn(monkeypatch):
     effects = [(SimpleNamespace(name="sensor_gain"), "sensor p1")] * 2
     accepted = SimpleNamespace(hypothesis=effects)
     found = iter([noise, real])
-    monkeypatch.setattr(explained_numbers, "missing_immittance", lambda *_: next(found))
+    monkeypatch.setattr(explained_numbers, "find_missing_immittance", lambda *_: next(found))
     decision = SimpleNamespace(accepted=accepted)
     (shown,) = explained_numbers._missing(SimpleNamespace(decision=decision, observations=()))
     assert shown.law[0] == 0.1

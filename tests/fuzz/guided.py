@@ -46,7 +46,7 @@ with (
     from made_results import write_results
     from noise_networks import kept, saved
     from rippletwin.case.load import load_case
-    from rippletwin.case.rig_yaml import faults, parse_sheet
+    from rippletwin.case.rig_yaml import find_sheet_faults, parse_sheet
     from rippletwin.errors import InputError
     from rippletwin.learning.kept_networks import load_networks
     from rippletwin.report.page import report_case
@@ -84,7 +84,7 @@ def prepare_sheet(folder: Path) -> Reader:
     path = folder / "rig.yaml"
 
     def read():
-        if not list(faults(path, parse_sheet(path))):
+        if not list(find_sheet_faults(path, parse_sheet(path))):
             load_case(folder)
 
     return path, read

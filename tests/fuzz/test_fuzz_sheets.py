@@ -10,7 +10,7 @@ from config_errors import check_config
 from fuzzing import EDITS, TREE_EDITS, edited, edited_tree, little_memory, tried
 from paths import ROOT
 from rippletwin.case.load import load_case
-from rippletwin.case.rig_yaml import faults, parse_sheet
+from rippletwin.case.rig_yaml import find_sheet_faults, parse_sheet
 from rippletwin.errors import InputError
 
 FULL = (ROOT / "docs/reference/rig_yaml.md").read_text().split("```yaml\n")[1].split("```")[0]
@@ -37,7 +37,7 @@ def test_text_of_a_sheet(folder, edits):
         content = parse_sheet(path)
     except InputError:
         return
-    assert all(isinstance(error, InputError) for error in faults(path, content))
+    assert all(isinstance(error, InputError) for error in find_sheet_faults(path, content))
 
 
 @tried(4)
@@ -48,7 +48,7 @@ def test_values_of_a_sheet(folder, edits):
     content = edited_tree(sheet(), edits)
     if not isinstance(content, dict):
         return
-    found = faults(path, content)
+    found = find_sheet_faults(path, content)
     assert all(isinstance(error, InputError) and str(error) for error in found)
     if found:
         return
@@ -66,7 +66,9 @@ def test_values_of_a_full_sheet(edits):
     """The same of the sheet with every key."""
     content = edited_tree(yaml.safe_load(FULL.replace("9.5e6", "9500000.0")), edits)
     if isinstance(content, dict):
-        assert all(isinstance(error, InputError) for error in faults(ROOT / "rig.yaml", content))
+        assert all(
+            isinstance(error, InputError) for error in find_sheet_faults(ROOT / "rig.yaml", content)
+        )
 
 
 @tried(0.3)

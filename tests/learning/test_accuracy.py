@@ -9,7 +9,13 @@ import pandas as pd
 import pytest
 
 from paths import ROOT
-from rippletwin.learning.accuracy import confusion, confusion_of, result_row, score, summarise
+from rippletwin.learning.accuracy import (
+    confusion_of,
+    count_confusions,
+    result_row,
+    score,
+    summarise,
+)
 from rippletwin.learning.architectures import ARCHITECTURES, CLASSES
 from rippletwin.learning.tables import accuracy_table, answer_table, cost_table
 from rippletwin.learning.training import History
@@ -55,7 +61,7 @@ def test_always_guessing_one_class_scores_a_third():
 
 def test_confusion_counts():
     """By hand, three true states against four classes; known severities join C."""
-    counts = confusion(["H", "H", "S", "C", "C2"], [H, C1, S, C2, C1])
+    counts = count_confusions(["H", "H", "S", "C", "C2"], [H, C1, S, C2, C1])
     np.testing.assert_array_equal(counts, [[1, 0, 1, 0], [0, 1, 0, 0], [0, 0, 1, 1]])
 
 

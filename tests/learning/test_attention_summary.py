@@ -6,7 +6,7 @@ import torch
 
 from rippletwin.learning.architectures import CLASSES
 from rippletwin.learning.attention_summary import fault_attention, recording_attention
-from rippletwin.learning.grad_cam import alignment, attention_map
+from rippletwin.learning.grad_cam import attention_map, measure_alignment
 from rippletwin.learning.networks import build
 
 S = CLASSES.index("S")
@@ -30,13 +30,13 @@ def windows():
 
 
 def test_the_share_is_the_mean_over_inputs(windows):
-    """Against `alignment` of each input alone, for a region of its own in each."""
+    """Against `measure_alignment` of each input alone, for a region of its own in each."""
     made = network(1.0)
     region = np.zeros((3, 3072), dtype=bool)
     for k in range(3):
         region[k, 500 * k : 500 * k + 400] = True
     shares = [
-        alignment(attention_map(made, windows[k : k + 1], S), region[k : k + 1])[0]
+        measure_alignment(attention_map(made, windows[k : k + 1], S), region[k : k + 1])[0]
         for k in range(3)
     ]
     attended, blind = fault_attention(made, {"S": windows}, {"S": region})

@@ -9,12 +9,12 @@ from torch import nn
 
 from rippletwin.learning.architectures import ARCHITECTURES
 from rippletwin.learning.grad_cam import (
-    alignment,
     attention_density,
     attention_map,
     fault_region,
     feature_positions,
     grad_cam,
+    measure_alignment,
 )
 from rippletwin.learning.networks import build
 
@@ -135,7 +135,7 @@ def test_alignment_by_hand_and_at_chance():
     gives NaN."""
     region = np.array([[True, False, False, False]] * 4)
     heat = np.array([[1.0, 0, 0, 0], [0, 2, 0, 1], [3, 3, 3, 3], [0, 0, 0, 0]])
-    attended, share = alignment(heat, region)
+    attended, share = measure_alignment(heat, region)
     np.testing.assert_array_equal(attended, [1, 0, 0.25, np.nan])
     np.testing.assert_array_equal(share, [0.25] * 4)
 
@@ -148,7 +148,7 @@ def test_region_of_an_image_is_a_frequency():
     region = fault_region(np.zeros_like(faulty), faulty)
     np.testing.assert_array_equal(region, [[False, True, False]])
     heat = np.array([[[0, 0, 0, 1.0], [3, 0, 0, 0], [0, 0, 0, 0]]])
-    attended, share = alignment(heat, region)
+    attended, share = measure_alignment(heat, region)
     np.testing.assert_allclose([attended[0], share[0]], [0.75, 1 / 3])
 
 

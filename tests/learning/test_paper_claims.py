@@ -12,7 +12,7 @@ from rippletwin.learning import paper_claims
 from rippletwin.learning.paper_claims import (
     cells_of,
     claims_markdown,
-    comparisons,
+    compare_cells,
     difference_over_recordings,
     judge_claim,
     judge_claims,
@@ -85,7 +85,7 @@ def test_made_results_are_judged_as_made():
         }
     )
     cells = cells_of(made, NONE, UNSEEN)
-    compared = comparisons(cells, UNSEEN)
+    compared = compare_cells(cells, UNSEEN)
     table = judge_claims(compared, cells, 3072 / 9).set_index(["claim", "score"]).verdict
     assert table[paper_claims.KERNELS_IN_TIME.text, "strict"] == "reproduced"
     assert table[paper_claims.KERNELS_IN_IMAGES.text, "strict"] == "not"
@@ -101,7 +101,7 @@ def test_calibration_compares_a_network_with_itself():
     made = pd.concat(
         [results({"cnn1d_3_1": [90, 90]}), results({"cnn1d_3_1": [40, 40]}, dataset="CFD-P")]
     )
-    compared = comparisons(cells_of(made, NONE, UNSEEN), UNSEEN)
+    compared = compare_cells(cells_of(made, NONE, UNSEEN), UNSEEN)
     (row,) = compared.query("score == 'strict'").itertuples()
     assert (row.claim, row.difference, row.worse) == (paper_claims.CALIBRATION, 50, "CFD-P")
 
@@ -136,7 +136,7 @@ def test_recordings_are_the_unit():
     assert (shares["resnet34_1d", "CFD-MOC-P"] == 50.0).all()
     nothing = results({"cnn1d_3_1": [0, 0]})
     cells = cells_of(nothing, NONE, shares)
-    compared = comparisons(cells, shares).query("score == @paper_claims.RECORDINGS")
+    compared = compare_cells(cells, shares).query("score == @paper_claims.RECORDINGS")
     table = compared.set_index(["better", "worse"])
     over_3, over_150 = (table.loc["CNN1D (341@100)", f"CNN1D ({k})"] for k in ("3@1", "150@50"))
     assert over_3.difference == pytest.approx(600 / 11) and over_3.verdict == "supports"
@@ -164,7 +164,7 @@ def test_the_papers_own_table():
     recordings; kernels in time are not a clean sweep, since 3@1 beats 150@50 on CFD-P, but 341@100
     beats 3@1 on two of three datasets with certainty."""
     cells = cells_of(results({"cnn1d_3_1": [1, 2]}), PAPER, UNSEEN)
-    compared = comparisons(cells, UNSEEN)
+    compared = compare_cells(cells, UNSEEN)
     table = judge_claims(compared, cells, 3072 / 9).set_index(["claim", "score"]).verdict
     assert table[paper_claims.CALIBRATION, paper_claims.PAPER] == "reproduced"
     assert table[paper_claims.LEARNABLE, paper_claims.PAPER] == "reproduced"
@@ -178,7 +178,7 @@ def test_comparisons_with_trainings_that_did_not_converge_are_marked():
     made = results({"cnn1d_341_100": [95, 96], "cnn1d_150_50": [60, 61], "cnn1d_3_1": [30, 31]})
     made["converged"] = [True, True, True, False, True, True]
     cells = cells_of(made, NONE, UNSEEN)
-    compared = comparisons(cells, UNSEEN)
+    compared = compare_cells(cells, UNSEEN)
     own = compared[compared.score == "strict"]
     assert dict(zip(own.worse, own.converged)) == {"CNN1D (3@1)": True, "CNN1D (150@50)": False}
     judged = judge_claims(compared, cells, 3072 / 9)
@@ -186,14 +186,14 @@ def test_comparisons_with_trainings_that_did_not_converge_are_marked():
     assert "| CNN1D (150@50) | +35.0 † |" in page and "| CNN1D (3@1) | +65.0 |" in page
     assert "; 1 with trainings that did not converge" in page and "convergence rule" in page
     made["converged"] = True
-    compared = comparisons(cells_of(made, NONE, UNSEEN), UNSEEN)
+    compared = compare_cells(cells_of(made, NONE, UNSEEN), UNSEEN)
     assert "converge" not in claims_markdown(judge_claims(compared, cells, 3072 / 9), compared)
 
 
 def test_page_names_every_verdict():
     made = results({"cnn1d_341_100": [95, 96], "cnn1d_3_1": [60, 61]})
     cells = cells_of(made, PAPER, UNSEEN)
-    compared = comparisons(cells, UNSEEN)
+    compared = compare_cells(cells, UNSEEN)
     page = claims_markdown(judge_claims(compared, cells, 3072 / 9), compared)
     assert "**reproduced**" in page and "**untested**" in page
     assert "| CNN1D (341@100) | CNN1D (3@1) | +35.0 |" in page

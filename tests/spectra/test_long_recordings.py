@@ -14,8 +14,8 @@ from rippletwin.spectra import case_summary, noise, speed_regression
 from rippletwin.spectra.angular_resampling import cut_revolutions
 from rippletwin.spectra.speed_regression import (
     MAX_BLOCK_REVOLUTIONS,
-    harmonics_at_mean_speed,
     mean_speed,
+    regress_to_mean_speed,
 )
 
 MEAN_HZ, DELAY_S, NOISE = 1000 / 60, 60e-3, 0.05
@@ -46,7 +46,7 @@ def test_blocks_are_as_good_as_one_regression(monkeypatch):
     errors = []
     for most in (speed_regression.MAX_REVOLUTIONS_TOGETHER, 1000):
         monkeypatch.setattr(speed_regression, "MAX_REVOLUTIONS_TOGETHER", most)
-        values, covariance = harmonics_at_mean_speed(spectra, speed, orders)
+        values, covariance = regress_to_mean_speed(spectra, speed, orders)
         error = np.abs(values[0] - true) ** 2
         assert np.mean(error / covariance[:, 0, 0].real) == pytest.approx(1.0, abs=0.5)
         errors.append(np.sqrt(np.mean(error)))
@@ -69,7 +69,7 @@ def test_no_matrix_is_larger_than_a_block(monkeypatch):
     speed, spectra, true = delayed(2000, 1)
     tracemalloc.start()
     try:
-        values, _ = harmonics_at_mean_speed(
+        values, _ = regress_to_mean_speed(
             spectra, speed, np.full(COPIES, ORDER), lambda *step: steps.append(step)
         )
         peak = tracemalloc.get_traced_memory()[1]

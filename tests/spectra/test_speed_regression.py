@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from rippletwin.spectra.response_covariance import factor_covariance
-from rippletwin.spectra.speed_regression import _kernel, harmonics_at_mean_speed, mean_speed
+from rippletwin.spectra.speed_regression import _kernel, mean_speed, regress_to_mean_speed
 
 MEAN_HZ, STEPS_PER_REVOLUTION, COUNT = 25.0, 50, 80
 POLE = -np.pi + 2j * np.pi * 140.02 * MEAN_HZ  # a resonance 1 Hz wide, quality 3500
@@ -54,7 +54,7 @@ def test_the_side_of_a_resonance_is_read_at_the_mean_speed(order, seed):
     than a quarter of the error of the mean over the revolutions, and within its covariance."""
     mean, speed, response = driven(order, 2e-4, seed)
     true = -np.pi / (POLE - 2j * np.pi * order * mean)
-    values, covariance = harmonics_at_mean_speed(
+    values, covariance = regress_to_mean_speed(
         noisy(response, 1e-4 * abs(true), seed), speed, np.full(40, order)
     )
     plain, found = abs(response.mean() - true), abs(values.mean() - true)
@@ -69,7 +69,7 @@ def test_on_a_resonance_the_error_is_stated(seed):
     over the revolutions errs by a third to two thirds. The rest is in the covariance."""
     mean, speed, response = driven(140, 3e-4, seed)
     true = -np.pi / (POLE - 2j * np.pi * 140 * mean)
-    values, covariance = harmonics_at_mean_speed(
+    values, covariance = regress_to_mean_speed(
         noisy(response, 1e-3 * abs(true), seed), speed, np.full(40, 140)
     )
     error = np.abs(values[0] - true)
@@ -84,7 +84,7 @@ def test_independence_of_the_speed_costs_no_variance(size):
     rng = np.random.default_rng(3)
     speed = MEAN_HZ * (1 + drift(60, size, 3))
     noise = rng.standard_normal((60, 2, 160)) + 1j * rng.standard_normal((60, 2, 160))
-    values, covariance = harmonics_at_mean_speed(5.0 + noise, speed, np.arange(1, 161))
+    values, covariance = regress_to_mean_speed(5.0 + noise, speed, np.arange(1, 161))
     variance = np.einsum("fss->sf", covariance).real
     assert np.mean(variance) == pytest.approx(2 / 60, rel=0.1)
     assert np.mean(np.abs(values - 5.0) ** 2 / variance) == pytest.approx(1.0, abs=0.2)
@@ -118,6 +118,6 @@ def test_few_revolutions_are_averaged():
     """By definition: below eight revolutions the value is their mean."""
     rng = np.random.default_rng(4)
     spectra = rng.standard_normal((5, 2, 3)) + 1j
-    values, covariance = harmonics_at_mean_speed(spectra, MEAN_HZ * np.ones(5), np.arange(1, 4))
+    values, covariance = regress_to_mean_speed(spectra, MEAN_HZ * np.ones(5), np.arange(1, 4))
     np.testing.assert_allclose(values, spectra.mean(0), rtol=1e-12)
     assert np.all(np.linalg.eigvalsh(covariance) > 0)

@@ -21,7 +21,7 @@ results, recordings = (
 )
 shares = recording_shares(recordings)
 cells = paper_claims.cells_of(results, pd.read_csv(snakemake.input.paper), shares)
-compared = paper_claims.comparisons(cells, shares)
+compared = paper_claims.compare_cells(cells, shares)
 judged = paper_claims.judge_claims(
     compared, cells, snakemake.params.samples_per_revolution / pistons
 )

@@ -17,9 +17,9 @@ from rippletwin.calibration.frequency_continuation import (
     continuation_limits,
     fit_by_continuation,
 )
-from rippletwin.calibration.laplace import UNCONVERGED_GAIN, Mode, laplace
+from rippletwin.calibration.laplace import UNCONVERGED_GAIN, Mode, approximate_posterior
 from rippletwin.calibration.likelihood import EVENNESS, Likelihood
-from rippletwin.calibration.misfit import Misfit, misfit
+from rippletwin.calibration.misfit import Misfit, measure_misfit
 from rippletwin.calibration.shaft_angles import fit_shaft_angles
 from rippletwin.spectra.frequency_selection import check_sources
 from rippletwin.twin.twin import Twin
@@ -102,7 +102,7 @@ def calibrate(
     model = Likelihood(twin, observations, settings.max_frequency_hz, evenness=EVENNESS)
 
     def report(limit: float, fits: int, part: ErrorModel, theta: np.ndarray) -> None:
-        best = misfit(part, theta).relative
+        best = measure_misfit(part, theta).relative
         progress(f"below {limit:.0f} Hz: {fits} starts, best misfit {best:.2%}")
 
     model, theta = fit_by_continuation(
@@ -120,8 +120,8 @@ def conclude(model: Likelihood, theta: np.ndarray, settings: Settings = DEFAULTS
     The shaft angles of the nominal twin are fitted below the first limit.
     """
     twin = model.twin
-    mode = laplace(model, theta)
-    fitted, after = twin.with_(theta=theta), misfit(model, theta)
+    mode = approximate_posterior(model, theta)
+    fitted, after = twin.with_(theta=theta), measure_misfit(model, theta)
     first = continuation_limits(model.observations, settings.limits_hz)[0]
     nominal = fit_shaft_angles(model.below(first), twin.theta)
     return Calibration(
@@ -131,7 +131,7 @@ def conclude(model: Likelihood, theta: np.ndarray, settings: Settings = DEFAULTS
         model_error=model.model_error,
         source_sd=model.source_sd,
         objective=mode.objective,
-        before=misfit(model, nominal),
+        before=measure_misfit(model, nominal),
         after=after,
         warnings=_warnings(fitted, mode, after),
         observations=tuple(model.observations),

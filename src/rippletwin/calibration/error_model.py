@@ -49,13 +49,14 @@ class ErrorModel(Protocol):
     max_model_error: float
 
     @property
-    def needs_full_jacobian(self) -> bool: ...
+    def needs_full_jacobian(self) -> bool:
+        """Whether a descent needs the exact derivatives of `use_full_jacobian`."""
 
     def below(self, max_frequency_hz: float) -> Self:
-        """The same error model of the data at and below a frequency."""
+        """The same error model of the data at and below a frequency, Hz."""
 
     def predict(self, theta: np.ndarray) -> Prediction:
-        """Predictions of all observations."""
+        """Predictions of all observations at theta (P,)."""
 
     def by_observation(self, prediction: Prediction) -> list[ObservedRipple]:
         """Measurement and prediction, one observation at a time."""
@@ -66,7 +67,7 @@ class ErrorModel(Protocol):
     def estimate_errors(
         self, prediction: Prediction, theta: np.ndarray, near: bool = False
     ) -> None:
-        """Set the standard deviations of the errors to their most likely values.
+        """Set the relative sizes of the errors to their most likely values.
 
         With `near` values next to the present ones suffice.
         """
@@ -75,7 +76,7 @@ class ErrorModel(Protocol):
         """Set what else is estimated of the source beside the sizes of its errors."""
 
     def objective(self, theta: np.ndarray, prediction: Prediction) -> float:
-        """Minus the log posterior but for a constant; infinite where it is not valid."""
+        """Minus the log posterior at theta (P,) but for a constant; infinite if not valid."""
 
     def linearise(self, theta: np.ndarray, prediction: Prediction) -> tuple[np.ndarray, np.ndarray]:
         """Whitened residual r (N,) with unit variances and its Jacobian J (N, P).
@@ -84,4 +85,4 @@ class ErrorModel(Protocol):
         """
 
     def use_full_jacobian(self, theta: np.ndarray) -> None:
-        """From here on derivatives near theta are exact there, at a cost."""
+        """From here on derivatives near theta (P,) are exact there, at a cost."""

@@ -39,7 +39,7 @@ class ErrorSizes(NamedTuple):
     model: float
 
 
-def most_likely_sizes(
+def find_most_likely_sizes(
     costs: Costs, present: ErrorSizes, any_nominal: bool, near: bool
 ) -> ErrorSizes:
     """The sizes of least cost.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rippletwin.calibration.laplace import laplace
+from rippletwin.calibration.laplace import approximate_posterior
 from rippletwin.calibration.likelihood import Likelihood
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.twin.effects.base import Effect, Place
@@ -78,12 +78,12 @@ class Fit:
         return " + ".join(f"{effect.name}, {place}" for effect, place in self.hypothesis)
 
 
-def laplace_fit(model: Posterior | Likelihood, hypothesis: Hypothesis, theta: np.ndarray) -> Fit:
+def conclude_fit(model: Posterior | Likelihood, hypothesis: Hypothesis, theta: np.ndarray) -> Fit:
     """The fit at a mode theta (P,), with its evidence and covariance.
 
     Where no start leads to a valid prediction, the evidence is minus infinity.
     """
-    mode, twin = laplace(model, theta), model.twin.with_(theta=theta)
+    mode, twin = approximate_posterior(model, theta), model.twin.with_(theta=theta)
     if not np.isfinite(mode.evidence):
         return Fit(hypothesis, twin, np.inf, -np.inf, mode.covariance, np.inf, 0.0, 0.0)
     return Fit(

@@ -6,7 +6,7 @@ harmonics has many local modes. Two rules lead to the right one:
 1. All operating points are fitted together and in absolute frequency, first below 800 Hz, then
    higher.
 2. Every hypothesis is fitted that way from the data sheet, with its effects in the model from the
-   first step. A fit without a necessary effect has bent the other parameters.
+   first step. A fit without a necessary effect has biased the other parameters.
 
 The nonlinear compliance of the line takes long to solve. During continuation it is omitted or
 frozen, then frozen again at each new point. It is solved exactly only from the final mode.
@@ -22,7 +22,7 @@ from typing import TypeVar
 import numpy as np
 
 from rippletwin.calibration.error_model import ErrorModel
-from rippletwin.calibration.fit import Fit, Hypothesis, laplace_fit
+from rippletwin.calibration.fit import Fit, Hypothesis, conclude_fit
 from rippletwin.calibration.levenberg_marquardt import (
     CONVERGED,
     FIRST_DAMPING,
@@ -35,8 +35,8 @@ from rippletwin.calibration.multistart import (
     MAX_MODEL_ERROR_BELOW_LIMIT,
     State,
     choose_starts,
-    distinct_modes,
     draw_around_modes,
+    select_distinct_modes,
 )
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.score_test import ScoreTest
@@ -134,7 +134,7 @@ def fit_hypothesis(
     """
     model = _error_model(base, hypothesis, observations, source_free, plain)
     model, theta = fit_by_continuation(model, starts, draws, exact=plain)
-    return laplace_fit(model, hypothesis, theta)
+    return conclude_fit(model, hypothesis, theta)
 
 
 def refine(
@@ -166,7 +166,7 @@ def refine(
     steps, converged = (MAX_STEPS[-1], ROUGHLY_CONVERGED) if rough else (MAX_LAST_STEPS, CONVERGED)
     modes = [descend(model, theta, steps, converged=converged) for theta in thetas]
     best = min(modes, key=lambda mode: mode[1])[0]
-    return laplace_fit(model, hypothesis, _unfreeze_and_refit(model, best, rounds))
+    return conclude_fit(model, hypothesis, _unfreeze_and_refit(model, best, rounds))
 
 
 def _follow_best(model: ErrorModel, thetas: Sequence[np.ndarray]) -> list[np.ndarray]:
@@ -191,7 +191,7 @@ def _error_model(
 def _kept(modes: Sequence[State], stage: int, last: bool, many: bool) -> list[State]:
     """The modes from which the next limit is begun."""
     kept = STARTS_KEPT[many]
-    return distinct_modes(modes)[: 1 if last else kept[min(stage, len(kept) - 1)]]
+    return select_distinct_modes(modes)[: 1 if last else kept[min(stage, len(kept) - 1)]]
 
 
 def _with_frozen_compliance(model: Model, limit: float) -> Model:

@@ -36,7 +36,7 @@ class Mode(NamedTuple):
     expected_gain: float
 
 
-def laplace(model: ErrorModel, theta: np.ndarray) -> Mode:
+def approximate_posterior(model: ErrorModel, theta: np.ndarray) -> Mode:
     """Covariance and evidence at a mode theta (P,); sets the errors of `model` to those there.
 
         log Z = log posterior at the mode - 1/2 log det H,

@@ -36,7 +36,7 @@ from rippletwin.calibration.whitening import (
 )
 from rippletwin.spectra.frequency_selection import select_below
 from rippletwin.twin.forward_jacobian import STEP, DifferentiableForward
-from rippletwin.twin.forward_model import characteristic_impedance, reflection
+from rippletwin.twin.reflection import stated_unit, to_reflection
 
 EVENNESS = 0.5
 """Evenness g with which `calibrate` works. Where physics is missing, the weak upper harmonics are
@@ -95,16 +95,17 @@ class Likelihood:
         self.count = 2 * sum(g.values.size - int(np.sum(g.free)) for g in self._groups)
 
     def below(self, max_frequency_hz: float) -> Likelihood:
-        """The same error model of the data at and below a frequency."""
+        """The same error model of the data at and below a frequency, Hz."""
         return Likelihood(self.twin, self.observations, max_frequency_hz, self._evenness)
 
     def predict(self, theta: np.ndarray) -> list[np.ndarray]:
-        """Predictions (S, F): pressures of all observations side by side, then reflections."""
+        """Predictions (S, F) at theta (P,): pressures of all observations side by side, Pa, then
+        reflection coefficients."""
         predicted = self.forward(theta)
         return [np.concatenate([predicted[k] for k in m], axis=1) for m in self._members]
 
     def by_observation(self, prediction: Sequence[np.ndarray]) -> list[ObservedRipple]:
-        """Measurement and prediction, one observation at a time."""
+        """Measurement and prediction (S, F), one observation at a time."""
         parts: list[ObservedRipple | None] = [None] * len(self.observations)
         for members, group, h in zip(self._members, self._groups, prediction):
             for k, part in zip(members, group.slices):
@@ -116,7 +117,8 @@ class Likelihood:
         return self.forward.solved and all(np.all(np.isfinite(h)) for h in prediction)
 
     def objective(self, theta: np.ndarray, prediction: Sequence[np.ndarray]) -> float:
-        """Minus the log posterior at the present errors but for a constant; inf if not valid."""
+        """Minus the log posterior at theta (P,) and the present errors but for a constant; inf
+        where the prediction is not valid."""
         if not self.is_valid(prediction):
             return np.inf
         total = 0.5 * float(np.sum(theta[self.prior] ** 2))
@@ -161,7 +163,8 @@ class Likelihood:
     def estimate_errors(
         self, prediction: Sequence[np.ndarray], theta: np.ndarray, near: bool = False
     ) -> None:
-        """Set model error and source error to their most likely values given the residuals.
+        """Set model error and source error, both relative, to their most likely values given the
+        residuals of a prediction at theta (P,).
 
         The sum of squares is scaled up for the degrees of freedom that the parameters take.
         """
@@ -187,7 +190,7 @@ class Likelihood:
         """Nothing: an error of the source is integrated out at every prediction."""
 
     def use_full_jacobian(self, theta: np.ndarray) -> None:
-        """From here on derivatives near theta include those of nonlinear load and compliance."""
+        """From here on derivatives near theta (P,) have those of nonlinear load and compliance."""
         if self._pressures and self.forward.has_nonlinear_compliance:
             self.forward.use_full_jacobian(theta)
         else:
@@ -272,16 +275,16 @@ class _Group:
 def to_predicted_quantity(observation, rig):
     """The observation in the quantity that `ForwardModel` predicts.
 
-    An input impedance becomes a reflection coefficient (see `reflection`), its
+    An input impedance becomes a reflection coefficient (see `twin.reflection`), its
     covariance with it: dR = 2 dz/(z + 1)^2 with z over the data sheet's rho a/A. The rest stays.
     """
     if observation.kind != "input_impedance":
         return observation
-    unit = 1.0 if observation.normalised else characteristic_impedance(rig.fluid, rig.line[0])
+    unit = stated_unit(observation, rig)
     z = observation.values / unit
     slope = np.abs(2.0 / (z[0] + 1.0) ** 2) ** 2 / unit**2
     return replace(
         observation,
-        values=reflection(z),
+        values=to_reflection(z),
         covariance=observation.covariance * slope[:, None, None],
     )

@@ -21,7 +21,7 @@ import numpy as np
 from rippletwin.calibration.error_model import ErrorModel
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.posterior import Posterior
-from rippletwin.calibration.shaft_angles import best_turn, fit_shaft_angles
+from rippletwin.calibration.shaft_angles import find_best_turn, fit_shaft_angles
 from rippletwin.twin.corrected_ripple import CorrectedRipple
 
 
@@ -36,17 +36,17 @@ class Misfit:
 
 
 def relative_misfit(measured: np.ndarray, predicted: np.ndarray) -> float:
-    """|measured - predicted| / |measured| of arrays of one shape."""
+    """|measured - predicted| / |measured| of arrays of one shape and unit."""
     return float(np.linalg.norm(measured - predicted) / np.linalg.norm(measured))
 
 
-def theil(measured: np.ndarray, predicted: np.ndarray) -> float:
-    """Theil's U1 of arrays of one shape; 0 where both vanish."""
+def theil_coefficient(measured: np.ndarray, predicted: np.ndarray) -> float:
+    """Theil's U1, from 0 to 1, of arrays of one shape and unit; 0 where both vanish."""
     total = np.linalg.norm(measured) + np.linalg.norm(predicted)
     return float(np.linalg.norm(measured - predicted) / total) if total else 0.0
 
 
-def misfit(model: ErrorModel, theta: np.ndarray) -> Misfit:
+def measure_misfit(model: ErrorModel, theta: np.ndarray) -> Misfit:
     """Misfits of the observations of `model` at theta (P,).
 
     A free source gets its most likely amplitude at each frequency, so the misfit then is that of
@@ -61,9 +61,9 @@ def misfit(model: ErrorModel, theta: np.ndarray) -> Misfit:
     everything = [np.concatenate(x) for x in zip(*joined.values())]
     return Misfit(
         relative_misfit(*everything),
-        theil(*everything),
+        theil_coefficient(*everything),
         {name: relative_misfit(*p) for name, p in joined.items()},
-        {name: theil(*p) for name, p in joined.items()},
+        {name: theil_coefficient(*p) for name, p in joined.items()},
     )
 
 
@@ -106,7 +106,7 @@ def score_fit(
     h = posterior.best_source(posterior.predict(theta))
     if ripple is not None:
         h = predict_with_ripple(posterior, h, ripple, turn)
-    return Score(relative_misfit(posterior.values, h), theil(posterior.values, h))
+    return Score(relative_misfit(posterior.values, h), theil_coefficient(posterior.values, h))
 
 
 def predict_with_ripple(
@@ -124,6 +124,6 @@ def predict_with_ripple(
         h = corrected[:, part] * ripple.at(o.label, orders)
         if turn:
             weighted = np.sum(np.conj(h) * posterior.values[:, part], axis=0)
-            h = h * np.exp(1j * orders * best_turn(weighted, orders)[0])
+            h = h * np.exp(1j * orders * find_best_turn(weighted, orders)[0])
         corrected[:, part] = h
     return corrected

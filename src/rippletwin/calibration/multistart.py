@@ -87,7 +87,7 @@ def draw_around_modes(
     return sorted(states, key=lambda g: g[0])[:count]
 
 
-def distinct_modes(modes: Sequence[State]) -> list[State]:
+def select_distinct_modes(modes: Sequence[State]) -> list[State]:
     """Modes in order, the best first, without those that ended near a better one."""
     kept: list = []
     for mode in sorted(modes, key=lambda m: m[0]):

@@ -71,7 +71,7 @@ class Posterior:
 
     @property
     def model_error(self) -> float:
-        """delta."""
+        """delta: error of the model, relative to each measured harmonic's rms over the sensors."""
         return self._errors.sizes.model
 
     @model_error.setter
@@ -80,7 +80,7 @@ class Posterior:
 
     @property
     def source_sd(self) -> float:
-        """sigma."""
+        """sigma: relative error of the source, independent from frequency to frequency."""
         return self._errors.sizes.source
 
     @source_sd.setter
@@ -89,7 +89,7 @@ class Posterior:
 
     @property
     def smooth_sd(self) -> float:
-        """tau."""
+        """tau: relative error of the source, smooth in frequency."""
         return self._errors.sizes.smooth
 
     @smooth_sd.setter
@@ -97,7 +97,10 @@ class Posterior:
         self._errors.sizes = self._errors.sizes._replace(smooth=value)
 
     def make_errors_independent(self, prediction: np.ndarray) -> None:
-        """Add the smooth part of the source's error to the independent part, at a prediction."""
+        """Add the smooth part of the source's error to the independent part.
+
+        prediction   (S, F) at which that is done
+        """
         self._errors.make_independent(self._rotate(prediction))
 
     def with_values(self, values: np.ndarray) -> Posterior:
@@ -109,22 +112,23 @@ class Posterior:
         return other
 
     def below(self, max_frequency_hz: float) -> Posterior:
-        """The same error model of the data at and below a frequency."""
+        """The same error model of the data at and below a frequency, Hz."""
         return Posterior(self.twin, self.observations, max_frequency_hz, self.source_free)
 
     def predict(self, theta: np.ndarray) -> np.ndarray:
-        """Predictions of all observations side by side, (S, F)."""
+        """Predictions of all observations side by side, (S, F), at theta (P,): pressures in Pa, or
+        reflection coefficients."""
         return np.concatenate(self.forward(theta), axis=1)
 
     def by_observation(self, prediction: np.ndarray) -> list[ObservedRipple]:
-        """Measurement and prediction, one observation at a time."""
+        """Measurement and prediction (S, F), one observation at a time."""
         return [
             ObservedRipple(self.values[:, part], prediction[:, part], self.power[part])
             for part in self.forward.slices
         ]
 
     def is_valid(self, prediction: np.ndarray) -> bool:
-        """Whether the last prediction is finite and its nonlinear equations were solved.
+        """Whether the last prediction (S, F) is finite and its nonlinear equations were solved.
 
         That of a line without loss is infinite at its resonance. With a strong nonlinear compliance
         no steady state may be found.
@@ -134,7 +138,7 @@ class Posterior:
     def objective(self, theta: np.ndarray, prediction: np.ndarray) -> float:
         """Minus the log posterior at the present errors but for a constant; inf if not valid.
 
-        prediction   that of theta, the last that was made
+        prediction   (S, F) that of theta (P,), the last that was made
         """
         if not self.is_valid(prediction):
             return np.inf
@@ -154,7 +158,7 @@ class Posterior:
         return whitening.apply(self._errors.residual(h)), whitening.log_determinant
 
     def draw(self, prediction: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Values (S, F) drawn from the error model around a prediction.
+        """Values (S, F), in the unit of the data, drawn from the error model around a prediction.
 
         A free source keeps its most likely amplitude.
         """
@@ -169,7 +173,8 @@ class Posterior:
     def estimate_errors(
         self, prediction: np.ndarray, theta: np.ndarray, near: bool = False
     ) -> None:
-        """Set model error and source errors to their most likely values given the residuals.
+        """Set model error and source errors to their most likely values given the residuals that a
+        prediction (S, F) at theta (P,) leaves.
 
         The sum of squares is scaled up for the degrees of freedom that the parameters take. With
         `near` only values next to the present ones are tried: on the way of a descent they move
@@ -183,7 +188,7 @@ class Posterior:
         self._errors.estimate(self._rotate(prediction), scale, near, self.max_model_error)
 
     def follow_source(self, prediction: np.ndarray) -> None:
-        """Set the most likely source to that of a prediction; the sizes of the errors stay."""
+        """Set the most likely source to that of a prediction (S, F); sizes of the errors stay."""
         self._errors.follow(self._rotate(prediction))
 
     @property
@@ -192,7 +197,7 @@ class Posterior:
         return self._pressures and self.forward.has_nonlinear_compliance
 
     def use_full_jacobian(self, theta: np.ndarray) -> None:
-        """From here on derivatives near theta include those of the nonlinear compliance."""
+        """From here on derivatives near theta (P,) include those of the nonlinear compliance."""
         if self.needs_full_jacobian:
             self.forward.use_full_jacobian(theta)
 
@@ -212,7 +217,7 @@ class Posterior:
         return r, np.concatenate([columns.T, np.eye(len(theta), len(slopes))[self.prior]])
 
     def slopes(self, theta: np.ndarray, prediction: np.ndarray) -> np.ndarray:
-        """Derivatives (P, S, F) of the prediction at theta (P,)."""
+        """Derivatives (P, S, F) of the prediction (S, F) by the coordinates theta (P,)."""
         if self._pressures:
             return self.forward.derivatives(theta)
         moved = [self.predict(theta + STEP * e) for e in np.eye(len(theta))]

@@ -64,11 +64,11 @@ from typing import NamedTuple
 import numpy as np
 
 from rippletwin.calibration.error_costs import error_costs
-from rippletwin.calibration.error_sizes import ErrorSizes, most_likely_sizes
+from rippletwin.calibration.error_sizes import ErrorSizes, find_most_likely_sizes
 from rippletwin.calibration.smooth_source import SmoothSourceError, SourceExpansion
 from rippletwin.calibration.source_expansion import (
     SourceData,
-    most_likely_expansion,
+    find_most_likely_expansion,
     whiten_with_source,
 )
 from rippletwin.calibration.whitening import TINY, NoiseBasis, Whitening, best_amplitude
@@ -135,7 +135,7 @@ class ReadingErrors:
         self._kept: tuple[ErrorSizes, Whitening] | None = None  # whitening at some sizes
 
     def with_values(self, values: np.ndarray, power: np.ndarray) -> ReadingErrors:
-        """The same errors of other readings (S, F)."""
+        """The same errors of other readings (S, F) with mean squares `power` (F,)."""
         other = copy(self)
         other.values, other.power, other._kept = values, power, None
         return other
@@ -150,23 +150,24 @@ class ReadingErrors:
         return self._kept[1]
 
     def residual(self, h: np.ndarray) -> np.ndarray:
-        """Readings less the expected ones (..., S, F)."""
+        """Readings less the expected ones, in their unit, for predictions h; both (..., S, F)."""
         if self._held is None:
             return self.values - self._expansion.mean * h
         return self.values - self._held.offset - self._held.source * h
 
     def variance(self) -> np.ndarray:
-        """Variance (S, F) of the readings without the share of the source."""
+        """Variance (S, F) of the readings, their unit squared, without the share of the source."""
         return self.variances + self.products + self.sizes.model**2 * self.power
 
     def smooth_source(self, h: np.ndarray) -> np.ndarray:
-        """Most likely source (F,) over the nominal one, without its independent error."""
+        """Most likely source (F,) over the nominal one, without its independent error, for
+        predictions h (S, F)."""
         if self._held is not None:
             return self._held.source
         return self._source(h, independent=False)
 
     def most_likely_source(self, h: np.ndarray) -> np.ndarray:
-        """Most likely source (F,) over the nominal one."""
+        """Most likely source (F,) over the nominal one, for predictions h (S, F)."""
         return self._source(h, independent=True)
 
     def free_amplitudes(self, h: np.ndarray) -> np.ndarray:
@@ -184,6 +185,7 @@ class ReadingErrors:
     def estimate(self, h: np.ndarray, scale: float, near: bool, max_model_error: float) -> None:
         """Set the sizes and the smooth error to their most likely values, and hold them.
 
+        h       (S, F) predictions
         scale   of the sum of squares, for the degrees of freedom that parameters take
         near    whether to go on from the present values
         """
@@ -196,15 +198,15 @@ class ReadingErrors:
         self._hold(h)
 
     def follow(self, h: np.ndarray) -> None:
-        """Move the smooth error to its most likely value at a prediction, and hold it: the sizes
-        stay. Nothing before the first estimate."""
+        """Move the smooth error to its most likely value at predictions h (S, F), and hold it: the
+        sizes stay. Nothing before the first estimate."""
         if self._held is not None:
             self._held = self._kept = None
             self._expand(h)
             self._hold(h)
 
     def make_independent(self, h: np.ndarray) -> None:
-        """Add the smooth part of the source's error to the independent part."""
+        """Add the smooth part of the source's error to the independent part, at h (S, F)."""
         total = float(np.hypot(self.sizes.source, self.sizes.smooth))
         self.sizes = ErrorSizes(0.0, total, self.sizes.model)
         self._expansion = self._smooth.without_error()
@@ -251,7 +253,7 @@ class ReadingErrors:
         """Move the expansion to the most likely smooth error."""
         if len(self._smooth.frequencies) and self.sizes.smooth > 0.0:
             data = self._source_data(h)
-            self._expansion = most_likely_expansion(data, self._expansion, SOURCE_STEPS)
+            self._expansion = find_most_likely_expansion(data, self._expansion, SOURCE_STEPS)
 
     def _estimate_sizes(self, h: np.ndarray, scale: float, near: bool) -> None:
         """Set the sizes to their most likely values at the present expansion."""
@@ -274,7 +276,7 @@ class ReadingErrors:
             )
 
         any_nominal = len(self._smooth.frequencies) > 0
-        self.sizes = most_likely_sizes(costs, self.sizes, any_nominal, near)
+        self.sizes = find_most_likely_sizes(costs, self.sizes, any_nominal, near)
 
     def _source_data(self, h: np.ndarray) -> SourceData:
         return SourceData(

@@ -14,7 +14,7 @@ import numpy as np
 
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.posterior import Posterior
-from rippletwin.calibration.shaft_angles import best_turn
+from rippletwin.calibration.shaft_angles import find_best_turn
 from rippletwin.twin.corrected_ripple import CorrectedRipple
 
 
@@ -37,5 +37,5 @@ def correct_ripple(fit: Fit, observations: Sequence) -> CorrectedRipple:
             first = next(iter(ratios))
             common, a, b = np.intersect1d(orders[first], orders[o.label], return_indices=True)
             weighted = posterior.power[part][b] * np.conj(ratios[o.label][b]) * ratios[first][a]
-            turns[o.label] = best_turn(weighted, common)[0]
+            turns[o.label] = find_best_turn(weighted, common)[0]
     return CorrectedRipple(orders, ratios, turns)

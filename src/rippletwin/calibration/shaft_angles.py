@@ -40,7 +40,7 @@ def align_shaft_angles(
         if index is not None and not model.source_free:
             orders = np.asarray(o.orders, int)
             order = np.gcd.reduce(orders)
-            turn, match = best_turn(weighted, orders, between)
+            turn, match = find_best_turn(weighted, orders, between)
             parameter = twin.parameters[index]
             angle = parameter.value(theta[index]) + turn
             angle = (angle + np.pi / order) % (2 * np.pi / order) - np.pi / order
@@ -49,7 +49,7 @@ def align_shaft_angles(
     return misfit / count, theta
 
 
-def best_turn(
+def find_best_turn(
     weighted: np.ndarray, orders: np.ndarray, between: bool = True
 ) -> tuple[float, float]:
     """Angle where Re sum_k weighted_k exp(-j k angle) is greatest, and the maximum.

@@ -52,7 +52,7 @@ class SmoothSourceError:
         self._size_sd, self._count = size_sd, len(nominal)
 
     def sds(self, tau) -> np.ndarray:
-        """Standard deviations (..., J) of the amplitudes for tau (...)."""
+        """Standard deviations (..., J), relative, of the amplitudes for tau (...)."""
         sds = np.empty((*np.shape(tau), len(self.basis)))
         sds[..., :-1] = np.asarray(tau)[..., None]
         sds[..., -1] = self._size_sd
@@ -64,7 +64,7 @@ class SmoothSourceError:
         return self.sds(tau) ** 2 * (self.basis @ pull[self.frequencies])
 
     def error(self, amplitudes: np.ndarray) -> np.ndarray:
-        """eps (F,) of amplitudes (J,); 0 at a frequency without a smooth error."""
+        """eps (F,), relative, of amplitudes (J,); 0 at a frequency without a smooth error."""
         error = np.zeros(self._count, complex)
         error[self.frequencies] = amplitudes @ self.basis
         return error

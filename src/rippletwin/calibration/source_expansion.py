@@ -35,7 +35,9 @@ class SourceData(NamedTuple):
     tau: float
 
 
-def most_likely_expansion(data: SourceData, start: SourceExpansion, steps: int) -> SourceExpansion:
+def find_most_likely_expansion(
+    data: SourceData, start: SourceExpansion, steps: int
+) -> SourceExpansion:
     """The expansion about the most likely smooth error after at most `steps` steps."""
     here = start
     for _ in range(steps):

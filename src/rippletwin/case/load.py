@@ -25,7 +25,7 @@ from rippletwin.case.plausibility import unusual_values
 from rippletwin.case.pressure_units import PASCALS
 from rippletwin.case.readers.layout import Layout
 from rippletwin.case.readers.registry import read_signals
-from rippletwin.case.rig_yaml import faults, find_sheet, parse_sheet
+from rippletwin.case.rig_yaml import find_sheet, find_sheet_faults, parse_sheet
 from rippletwin.case.sheet_checks import missing_files
 from rippletwin.case.signal_checks import sampling_rate, signal_errors
 from rippletwin.errors import InputError, raise_any
@@ -67,7 +67,7 @@ def load_case(
     sheet_path = find_sheet(folder)
     folder = sheet_path.parent
     sheet = parse_sheet(sheet_path)
-    raise_any([*faults(sheet_path, sheet), *missing_files(sheet_path, sheet)])
+    raise_any([*find_sheet_faults(sheet_path, sheet), *missing_files(sheet_path, sheet)])
     rig = rig_of(folder, sheet)
     recordings, errors = [], []
     chosen = [

@@ -35,11 +35,11 @@ def read_sheet(path: Path) -> dict:
     Whether the files exist that it names is another question (`sheet_checks.missing_files`).
     """
     sheet = parse_sheet(path)
-    raise_any(faults(path, sheet))
+    raise_any(find_sheet_faults(path, sheet))
     return sheet
 
 
-def faults(path: Path, sheet: dict) -> list[InputError]:
+def find_sheet_faults(path: Path, sheet: dict) -> list[InputError]:
     """Everything that is wrong with a sheet: against its schema, with itself, and with physics."""
     return [
         *schema_errors(path, sheet),

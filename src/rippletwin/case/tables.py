@@ -12,8 +12,8 @@ from rippletwin.case.readers.layout import similar_name
 from rippletwin.case.readers.text_tables import (
     TextFormat,
     find_format,
-    floats,
     open_rows,
+    parse_floats,
     parse_reason,
 )
 from rippletwin.errors import InputError
@@ -45,7 +45,7 @@ def read_table(path: Path, columns: list[str]) -> np.ndarray:
         raise InputError(
             path, "file", f"cannot be read as a table ({reason})", f"Columns: {','.join(columns)}"
         ) from error
-    values = np.array([floats(table.iloc[:, place], form) for place in places])
+    values = np.array([parse_floats(table.iloc[:, place], form) for place in places])
     for column, row in zip(columns, values):
         bad = np.flatnonzero(~np.isfinite(row))
         if bad.size:

@@ -14,7 +14,7 @@ from scipy.ndimage import uniform_filter1d
 
 from rippletwin.case.model import FlowRipple
 from rippletwin.diagnosis.drifting_line import DriftingLine
-from rippletwin.diagnosis.pump_flow import healthy_flow
+from rippletwin.diagnosis.pump_flow import simulate_healthy_pump
 from rippletwin.harmonics import flow_harmonics
 from rippletwin.twin.twin import Twin
 
@@ -72,16 +72,16 @@ def make_anchor(
         healthy.speed_hz, observation.speed_hz, healthy.load_pressure, observation.load_pressure
     )
     pump, fluid = twin.rig.pump, twin.rig.fluid
-    here = healthy_flow(pump, fluid, speed_rpm, pressure)
+    here = simulate_healthy_pump(pump, fluid, speed_rpm, pressure)
     there = here
     if apart:
         pressure = healthy.load_pressure or pressure
-        there = healthy_flow(pump, fluid, 60.0 * healthy.speed_hz, pressure)
+        there = simulate_healthy_pump(pump, fluid, 60.0 * healthy.speed_hz, pressure)
     response = DriftingLine(twin, healthy, there).response()
     simulated = even_flow(there, orders, pump["pistons"])
-    flow, rest = flow_at_pump(response, healthy.values)
+    flow, rest = estimate_flow_at_pump(response, healthy.values)
     pitch = 2 * np.pi / pump["pistons"]
-    angle = alignment(response * simulated, healthy.values, orders, pitch)
+    angle = find_alignment(response * simulated, healthy.values, orders, pitch)
     turned = simulated * np.exp(1j * orders * angle)
     left = healthy.values - response * turned
     misfit = relative_misfit(left, healthy.values, orders, pump["pistons"])
@@ -112,15 +112,16 @@ def make_anchor(
 
 
 def scale_of_rest(sensors: int) -> float:
-    """The power of an error at all sensors over what of it no flow explains."""
+    """The power of an error at all sensors over what of it no flow explains, a ratio."""
     return sensors / max(sensors - 1, 1)  # a flow takes one in `sensors`
 
 
 def without_recording(
     anchor: Anchor, simulated: np.ndarray, response: np.ndarray, pistons: int
 ) -> Anchor:
-    """The anchor that the twin alone is: its own flow, simulated (F,), through its line, a response
-    (S, F), as wrong about each order as the recording of `anchor` shows it to be."""
+    """The anchor that the twin alone is: its own flow, simulated (F,), m3/s, through its line, a
+    response (S, F), Pa s/m3, as wrong about each order as the recording of `anchor` shows it to
+    be."""
     turned = simulated * np.exp(1j * anchor.orders * anchor.angle)
     own, sensors = anchor.orders % pistons == 0, len(anchor.rest)
     along, across = response * (anchor.flow - turned), np.sqrt(scale_of_rest(sensors)) * anchor.rest
@@ -141,22 +142,25 @@ def without_recording(
     )
 
 
-def alignment(here: np.ndarray, there: np.ndarray, orders: np.ndarray, pitch: float) -> float:
+def find_alignment(here: np.ndarray, there: np.ndarray, orders: np.ndarray, pitch: float) -> float:
     """The angle, rad in [0, pitch), by which turning `here` (S, F) comes nearest to `there`."""
-    score = correlation(here, there, orders)
+    score = correlate(here, there, orders)
     score = score[: int(np.ceil(ANGLES * pitch / (2 * np.pi)))]
     return float(2 * np.pi * np.argmax(score) / ANGLES)
 
 
-def correlation(here, there, orders, weight=1.0, count: int = ANGLES) -> np.ndarray:
-    """Re sum w conj(h exp(j n x)) t at `count` even angles x of a revolution, (..., count)."""
+def correlate(here, there, orders, weight=1.0, count: int = ANGLES) -> np.ndarray:
+    """Re sum w conj(h exp(j n x)) t at `count` even angles x of a revolution, (..., count), of
+    spectra h = `here` and t = `there` (..., S, F) at shaft orders n (F,)."""
     product = np.sum(weight * np.conj(here) * there, axis=-2)
     spectrum = np.zeros((*product.shape[:-1], count), complex)
     spectrum[..., orders] = product
     return np.fft.fft(spectrum, axis=-1).real
 
 
-def flow_at_pump(response: np.ndarray, readings: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def estimate_flow_at_pump(
+    response: np.ndarray, readings: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """The flow (F,) at the pump, m3/s, that comes nearest to readings (S, F) through a response
     (S, F), and what it leaves of them (S, F)."""
     flow = np.sum(np.conj(response) * readings, 0) / np.sum(np.abs(response) ** 2, 0)

@@ -8,7 +8,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from rippletwin.calibration.likelihood import Likelihood
-from rippletwin.calibration.misfit import misfit
+from rippletwin.calibration.misfit import measure_misfit
 from rippletwin.calibration.shaft_angles import fit_shaft_angles
 from rippletwin.case.model import Case, Recording, Rig
 from rippletwin.diagnosis.anchor import distance
@@ -141,7 +141,7 @@ def healthy_misfit(twin: Twin, observations: Sequence) -> float:
     theta = np.zeros(len(turned.theta))
     theta[[turned.index[name] for name in fitted.index]] = fitted.theta
     model = Likelihood(turned, data, evenness=1.0)
-    return misfit(model, fit_shaft_angles(model, theta)).relative
+    return measure_misfit(model, fit_shaft_angles(model, theta)).relative
 
 
 def select_recordings(case: Case, labels: Sequence[str] = ()) -> list[Recording]:

@@ -57,7 +57,7 @@ def gather(d: Diagnosis) -> DiagnosedNumbers:
     """The numbers behind the figures of a diagnosis."""
     model, best = d.model, d.best
     model.linearise_line(best.mode)
-    parts = model.parts(best.mode)
+    parts = model.predict(best.mode)
     at_sensors, variance = model.division.at_sensors, model.variance(parts, best.errors)
     leaks = {}
     for name, density in best.areas.items():

@@ -17,9 +17,9 @@ from rippletwin.diagnosis.faults.library import state_name, states_of
 from rippletwin.diagnosis.observation_model import ObservationModel
 from rippletwin.diagnosis.pump_flow import (
     ORDERS,
-    healthy_flow,
-    leak_flow,
     load_pressure_of,
+    simulate_healthy_pump,
+    simulate_leak_flow,
     with_fitted_pump,
 )
 from rippletwin.diagnosis.unlike import judge_residual
@@ -58,7 +58,7 @@ class Diagnoser:
         if labels not in self._learned:  # recordings of one operating point share it
             self._learned[labels] = self._learn_errors(healthy)
         prior, repeats = self._learned[labels]
-        model = self.model(observation, healthy[0], start, repeats)
+        model = self.make_model(observation, healthy[0], start, repeats)
         weighed = weigh_states(model, states_of(self.faults), prior)
         probabilities = _probabilities(weighed)
         best = max(weighed, key=lambda w: probabilities[state_name(w.state)])
@@ -72,11 +72,11 @@ class Diagnoser:
             expected_gain=self.expected_gain,
         )
 
-    def model(
+    def make_model(
         self, observation, healthy, start: float = 0.0, repeats: Sequence[np.ndarray] = ()
     ) -> ObservationModel:
         """The observation model of an observation, anchored to a healthy one, at the orders that
-        both have, `ORDERS` at most. `repeats` as in `ObservationModel`."""
+        both have, `ORDERS` at most. `start` and `repeats` as in `ObservationModel`."""
         count = min(len(healthy.orders), len(observation.orders), ORDERS)
         healthy, observation = (select_frequencies(o, slice(count)) for o in (healthy, observation))
         pressure = _rounded(load_pressure_of(self.twin, observation))
@@ -85,14 +85,15 @@ class Diagnoser:
         mean_flow = None if given is None else float(np.mean(given.flow))
         twin = with_fitted_pump(self.twin, mean_flow, healthy.speed_hz)
         pump, fluid = twin.rig.pump, twin.rig.fluid
-        ripple = healthy_flow(pump, fluid, speed_rpm, pressure)
+        ripple = simulate_healthy_pump(pump, fluid, speed_rpm, pressure)
         line = DriftingLine(twin, observation, ripple)
         anchor = make_anchor(twin, healthy, observation, line, speed_rpm, pressure)
         if not self.anchored:
             simulated = even_flow(ripple, anchor.orders, pump["pistons"])
             anchor = without_recording(anchor, simulated, line.response(), pump["pistons"])
         flows = {
-            fault.name: leak_flow(pump, fluid, speed_rpm, pressure, fault) for fault in self.faults
+            fault.name: simulate_leak_flow(pump, fluid, speed_rpm, pressure, fault)
+            for fault in self.faults
         }
         return ObservationModel(observation, anchor, line, flows, repeats, start)
 
@@ -103,15 +104,15 @@ class Diagnoser:
         if not self.anchored:  # the twin's errors, which repeats share, are in the anchor
             return prior, []
         first, *others = healthy
-        repeats = [o for o in others if not between(o, first)][:MOST_REPEATS]
-        found = [compare_healthy(self.model(o, first), prior) for o in repeats]
+        repeats = [o for o in others if not distance_between(o, first)][:MOST_REPEATS]
+        found = [compare_healthy(self.make_model(o, first), prior) for o in repeats]
         scatters = [scatter for scatter, _ in found]
         scatter = float(np.exp(np.mean(np.log([prior.scatter, *scatters]))))
         return replace(prior, scatter=scatter), [change for _, change in found]
 
 
-def between(one, other) -> float:
-    """Distance of the operating points of two observations."""
+def distance_between(one, other) -> float:
+    """Distance of the operating points of two observations, relative, as `anchor.distance`."""
     return distance(one.speed_hz, other.speed_hz, one.load_pressure, other.load_pressure)
 
 

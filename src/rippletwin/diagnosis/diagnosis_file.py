@@ -8,8 +8,8 @@ from pathlib import Path
 
 from rippletwin import store
 from rippletwin.diagnosis.diagnosis import Diagnosis
-from rippletwin.diagnosis.doubts import doubts
-from rippletwin.diagnosis.sentence import sentence
+from rippletwin.diagnosis.doubts import find_doubts
+from rippletwin.diagnosis.sentence import describe_diagnosis
 
 
 def diagnosis_dict(diagnoses: Sequence[Diagnosis]) -> dict:
@@ -33,8 +33,8 @@ def entry_of(d: Diagnosis) -> dict:
             "where": {"orders": list(d.unlikeness.orders), "element": d.unlikeness.element},
         },
         "networks": {},
-        "sentence": sentence(d),
-        "doubts": doubts(d),
+        "sentence": describe_diagnosis(d),
+        "doubts": find_doubts(d),
     }
 
 

@@ -22,17 +22,19 @@ class Division:
         self._rows = np.conj(np.swapaxes(basis, 1, 2))
 
     def divide(self, readings: np.ndarray) -> np.ndarray:
-        """Readings (..., S, F) of the sensors, divided."""
+        """Readings (..., S, F) of the sensors, divided: the same shape and unit."""
         return np.einsum("fts,...sf->...tf", self._rows, readings)
 
     def at_sensors(self, divided: np.ndarray) -> np.ndarray:
-        """Divided readings (..., S, F) as the sensors have them."""
+        """Divided readings (..., S, F) as the sensors have them, in the same unit."""
         return np.einsum("fts,...tf->...sf", self._rows.conj(), divided)
 
     def divide_variance(self, variance: np.ndarray) -> np.ndarray:
-        """Variance (S, F) of divided readings where the sensors' errors are independent."""
+        """Variance (S, F) of divided readings where the sensors' errors of `variance` (S, F) are
+        independent."""
         return np.einsum("fts,sf->tf", np.abs(self._rows) ** 2, variance)
 
     def variance_at_sensors(self, variance: np.ndarray) -> np.ndarray:
-        """Variance (S, F) of the sensors' readings where errors of the rows are independent."""
+        """Variance (S, F) of the sensors' readings where errors of the rows, of `variance` (S, F),
+        are independent."""
         return np.einsum("fts,tf->sf", np.abs(self._rows) ** 2, variance)

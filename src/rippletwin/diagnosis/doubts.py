@@ -6,7 +6,7 @@ from rippletwin.calibration.laplace import UNCONVERGED_GAIN
 from rippletwin.diagnosis.diagnosis import Diagnosis
 
 
-def doubts(d: Diagnosis) -> list[str]:
+def find_doubts(d: Diagnosis) -> list[str]:
     """Half sentences, each a reason for doubt; none where the diagnosis may be taken as it is."""
     found = []
     if not all(flow.periodic for flow in d.model.flows.values()):

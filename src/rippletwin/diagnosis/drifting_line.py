@@ -57,7 +57,7 @@ class DriftingLine:
         return self._forward.unit_response(self._theta(drift, theta))[0]
 
     def slopes(self, drift: np.ndarray) -> np.ndarray:
-        """Derivatives (D, S, F) of `response` at `drift`."""
+        """Derivatives (D, S, F), Pa s/m3, of `response` by the standard deviations `drift` (D,)."""
         base = self.response(drift)
         moved = [self.response(drift + STEP * e) for e in np.eye(len(drift))]
         return (np.array(moved).reshape(len(drift), *base.shape) - base) / STEP

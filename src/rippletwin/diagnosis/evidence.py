@@ -36,12 +36,12 @@ class ErrorPrior:
     change_sd: float = 0.6
 
     def log_weights(self) -> np.ndarray:
-        """Log probabilities (len(SCATTERS), len(CHANGES)) on the grid of both."""
+        """Log probabilities (A, B) on the grid of A SCATTERS and B CHANGES."""
         a = -0.5 * (np.log(SCATTERS / self.scatter) / self.scatter_sd) ** 2
         return (a - logsumexp(a))[:, None] + self.log_weights_of_change()
 
     def log_weights_of_change(self) -> np.ndarray:
-        """Log probabilities (len(CHANGES),)."""
+        """Log probabilities (B,) of the B CHANGES."""
         b = -0.5 * (np.log(CHANGES / self.change) / self.change_sd) ** 2
         return b - logsumexp(b)
 
@@ -70,19 +70,19 @@ def weigh_states(
     ranked = {}
     for state in states:
         if not state:
-            ranked[state] = screen.healthy()
+            ranked[state] = screen.screen_healthy()
         elif len(state) == 1:
-            ranked[state] = screen.one(state[0])
+            ranked[state] = screen.screen_one(state[0])
         else:
-            ranked[state] = screen.two(ranked[state[:1]], ranked[state[1:]])
+            ranked[state] = screen.screen_two(ranked[state[:1]], ranked[state[1:]])
     return [_weigh(model, candidates, prior) for candidates in ranked.values() if candidates]
 
 
 def compare_healthy(model: ObservationModel, prior: ErrorPrior) -> tuple[float, np.ndarray]:
     """Relative scatter that a recording known to be healthy shows against its anchor, and the
     change (F,) of the pump's flow from there, m3/s, as the anchor's shaft stands."""
-    mode = _hypothesis(Screen(model).healthy()[0], np.zeros(len(model.line.drifts)))
-    mode = model.followed(mode, Errors(prior.scatter, prior.change), LIMITS_HZ)
+    mode = _hypothesis(Screen(model).screen_healthy()[0], np.zeros(len(model.line.drifts)))
+    mode = model.fit_turn_and_drift(mode, Errors(prior.scatter, prior.change), LIMITS_HZ)
     return _best_errors(model, mode, prior)[0].scatter, model.change_of_flow(mode)
 
 
@@ -93,10 +93,10 @@ def _weigh(
     candidates, mode = _at_best_pitch(model, candidates, errors)
     best = candidates[0]
     for _ in range(ROUNDS):
-        mode = model.followed(mode, errors, LIMITS_HZ)
+        mode = model.fit_turn_and_drift(mode, errors, LIMITS_HZ)
         mode = _at_best_areas(model, mode, errors)
         errors, _ = _best_errors(model, mode, prior)
-    mode = model.followed(mode, errors, LIMITS_HZ[-1:])
+    mode = model.fit_turn_and_drift(mode, errors, LIMITS_HZ[-1:])
     errors, over_errors = _best_errors(model, mode, prior)
     over_areas, areas = _over_areas(model, mode, errors, prior)
     scores = np.array([c.score for c in candidates])
@@ -110,7 +110,7 @@ def _weigh(
     }
     cut_off = {name: density.cut_off for name, density in areas.items()}
     # A twin that errs by so much about a change errs by as much about its size.
-    areas = {name: density.widened(model.usual_error) for name, density in areas.items()}
+    areas = {name: density.widen(model.usual_error) for name, density in areas.items()}
     return StateEvidence(best.state, float(log_evidence), mode, errors, areas, cut_off, pistons)
 
 
@@ -122,7 +122,7 @@ def _at_best_pitch(
     scored again by the likelihood, with the drift of the first."""
     first = candidates[0]
     mode = _hypothesis(first, np.zeros(len(model.line.drifts)))
-    drift = model.followed(mode, errors, LIMITS_HZ).drift
+    drift = model.fit_turn_and_drift(mode, errors, LIMITS_HZ).drift
     scored: dict[int, float] = {}  # what to add to the scores of a pitch
     pitches = [
         round((c.turn - first.turn) * model.pistons / (2.0 * np.pi)) % model.pistons

@@ -25,7 +25,7 @@ class Hypothesis:
     drift: np.ndarray
 
     def beside(self, k: int) -> tuple[float, ...]:
-        """Areas of the other leaks."""
+        """Areas, m2, of the other leaks than number k."""
         return self.areas[:k] + self.areas[k + 1 :]
 
 
@@ -56,7 +56,7 @@ class Parts:
 
     @cached_property
     def change(self) -> np.ndarray:
-        """What all leaks add (S, F)."""
+        """What all leaks add (S, F), Pa."""
         return self.leaks.sum(axis=0)
 
 
@@ -72,8 +72,8 @@ class Errors:
 
 
 def coherence(error: np.ndarray) -> np.ndarray:
-    """Share of a predicted change that is to be expected, 1/(1 + e^2) for a relative error e of the
-    prediction (Carroll, Ruppert, Stefanski and Crainiceanu 2006, Measurement Error in Nonlinear
-    Models, section 4.1). The rest of its power is error: where the twin knows nothing, a change
-    says nothing of its size."""
+    """Share of a predicted change that is to be expected, 1/(1 + e^2) for a relative error e, any
+    shape, of the prediction (Carroll, Ruppert, Stefanski and Crainiceanu 2006, Measurement Error in
+    Nonlinear Models, section 4.1). The rest of its power is error: where the twin knows nothing, a
+    change says nothing of its size."""
     return 1.0 / (1.0 + error**2)

@@ -20,7 +20,7 @@ NEGLIGIBLE = -2.0  # log density at an end, below the greatest, from which the e
 
 @dataclass(frozen=True)
 class Density:
-    """A density over the logarithm of an area: nodes (A,), ascending, and log density (A,)."""
+    """A density over the logarithm of an area in m2: nodes, ascending, and log density, (A,)."""
 
     nodes: np.ndarray
     log_density: np.ndarray
@@ -37,7 +37,7 @@ class Density:
 
     @property
     def width(self) -> float:
-        """Distance of the outer nodes."""
+        """Distance of the outer nodes, in logarithms of an area."""
         return float(self.nodes[-1] - self.nodes[0])
 
     @property
@@ -54,14 +54,16 @@ class Density:
         return top + float(np.log(np.trapezoid(np.exp(log_density - top), nodes)))
 
     def quantiles(self, shares) -> np.ndarray:
-        """Logarithms of areas below which there are these shares of the density."""
+        """Logarithms of areas, m2, of the shape of `shares`, below which there are these shares of
+        the density."""
         nodes, log_density = self._dense
         weight = np.exp(log_density - np.max(log_density))
         below = cumulative_trapezoid(weight, nodes, initial=0.0)
         return np.interp(shares, below / below[-1], nodes)
 
-    def widened(self, sd: float) -> Density:
-        """The density with an independent Gaussian error of the logarithm beside it."""
+    def widen(self, sd: float) -> Density:
+        """The density with an independent Gaussian error of the logarithm, of standard deviation
+        `sd`, beside it."""
         step = sd / PER_SD
         grid = np.arange(self.nodes[0] - 4.0 * sd, self.nodes[-1] + 4.0 * sd, step)
         nodes, log_density = self._dense

@@ -73,7 +73,7 @@ def diagnose_changed(
     kept = Path(folder) / FOLDER
     beside = healthy_beside(case, recordings)
     read = ReadOnce(case.rig)
-    of_twin = digest(program(), case.rig, _plain_twin(twin), _effect_files(twin), beside)
+    of_twin = digest(digest_program(), case.rig, _plain_twin(twin), _effect_files(twin), beside)
     of_all = digest(of_twin, [_plain_fault(fault) for fault in faults])
     answers = []
     diagnoser = None
@@ -153,7 +153,7 @@ def _plain_fault(fault: Fault) -> list:
 
 
 @cache
-def program() -> str:
+def digest_program() -> str:
     """Digest of this program's source and of the versions of the libraries it calculates with."""
     package = Path(rippletwin.__file__).parent
     sources = [(str(p.relative_to(package)), p.read_bytes()) for p in sorted(package.rglob("*.py"))]

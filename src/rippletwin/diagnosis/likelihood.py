@@ -21,7 +21,7 @@ class Marginal(NamedTuple):
     square: float
 
 
-def marginal(
+def marginalise(
     residual: np.ndarray, variance: np.ndarray, columns: np.ndarray, alike: float = 1.0
 ) -> Marginal:
     """Of residuals (S, F) with errors of `variance` (S, F) and directions `columns` (J, S, F).

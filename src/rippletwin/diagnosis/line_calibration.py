@@ -14,11 +14,11 @@ from dataclasses import replace
 
 from rippletwin.calibration.calibrate import calibrate
 from rippletwin.calibration.likelihood import EVENNESS, Likelihood
-from rippletwin.calibration.misfit import misfit
+from rippletwin.calibration.misfit import measure_misfit
 from rippletwin.diagnosis.pump_flow import (
-    healthy_flow,
     load_pressure_of,
     rebuild,
+    simulate_healthy_pump,
     with_fitted_pump,
 )
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
@@ -38,7 +38,7 @@ def calibrate_line(twin: Twin, healthy: Sequence) -> Twin:
     ]
     line = rebuild(fitted, fitted.rig, free)
     found = calibrate(line, free)
-    before = misfit(Likelihood(line, free, evenness=EVENNESS), fitted.theta)
+    before = measure_misfit(Likelihood(line, free, evenness=EVENNESS), fitted.theta)
     if not found.after.relative < before.relative:
         return fitted
     return fitted.with_(theta=found.twin.theta)
@@ -48,4 +48,4 @@ def _ripple(twin: Twin, observation):
     """The pump's own, whose mean flow settles the orifice."""
     speed_rpm = 60.0 * observation.speed_hz
     pressure = load_pressure_of(twin, observation)
-    return healthy_flow(twin.rig.pump, twin.rig.fluid, speed_rpm, pressure)
+    return simulate_healthy_pump(twin.rig.pump, twin.rig.fluid, speed_rpm, pressure)

@@ -71,7 +71,7 @@ def ask_networks(
         recording.label: {
             name: judge_windows(
                 kept.classes,
-                *kept.answers(windows_of(recording, rig, kept.samples_per_revolution)),
+                *kept.answers(cut_windows(recording, rig, kept.samples_per_revolution)),
             )
             for name, kept in networks.items()
             if is_at_their_point(recording, kept)
@@ -93,8 +93,8 @@ def judge_windows(classes: Sequence[str], said: np.ndarray, p_values: np.ndarray
     return {"state": state, "share": share, "unlike": unlike}
 
 
-def windows_of(recording: Recording, rig: Rig, samples: int) -> np.ndarray:
-    """Windows (R, S, M) of one revolution each, without their means."""
+def cut_windows(recording: Recording, rig: Rig, samples: int) -> np.ndarray:
+    """Windows (R, S, M), Pa, of one revolution each at M even shaft angles, without their means."""
     return remove_mean(revolutions_of(recording, rig, samples).windows)
 
 

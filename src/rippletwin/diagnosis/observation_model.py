@@ -16,14 +16,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from rippletwin.diagnosis.anchor import Anchor
 from rippletwin.diagnosis.division import Division
 from rippletwin.diagnosis.drifting_line import DriftingLine
 from rippletwin.diagnosis.faults.base import Fault
 from rippletwin.diagnosis.hypothesis import Errors, Hypothesis, Parts, coherence
-from rippletwin.diagnosis.likelihood import Marginal, complex_columns, marginal
+from rippletwin.diagnosis.likelihood import Marginal, complex_columns, marginalise
+from rippletwin.diagnosis.local_power import explained_power, local_power
 from rippletwin.diagnosis.pump_flow import LeakFlow
 
 TURN_SD = 0.02  # rad, of a shaft angle that has been found already
@@ -37,7 +37,6 @@ MIN_CHANGE_ERROR = 0.04  # relative, of the change by a leak behind the best of 
 MAX_SHARE = 2.0  # of a measured change over the predicted one, up to which errors grow with it
 MAX_USUAL_ERROR = 0.3  # relative, of a leak's change behind the worst of twins
 ALIKE = 8.0  # readings whose errors go together: those of a line are as wide as its resonances
-NEIGHBOURS = 9  # shaft orders over which a power is averaged
 WHOLE = slice(None)
 BETWEEN = 0.01  # share of a power whose errors show at orders that have none of it
 
@@ -89,7 +88,7 @@ class ObservationModel:
         return np.array(found).reshape(len(found), len(self.orders))
 
     def leak_change(self, fault: Fault, area: float, piston: int) -> np.ndarray:
-        """The same (F,) of one leak."""
+        """The same (F,) of one leak of `area`, m2, at `piston`, counted from 0."""
         return self._turned(self.flows[fault.name].harmonics(area), piston)
 
     def _turned(self, harmonics: np.ndarray, piston: int) -> np.ndarray:
@@ -115,7 +114,8 @@ class ObservationModel:
         return float(np.log(low)), float(np.log(high))
 
     def state_of_line(self, hypothesis: Hypothesis) -> np.ndarray:
-        """Drift (D,) with what the leaks' change of mean flow makes of an orifice set anew."""
+        """Drift (D,), standard deviations, with what the leaks' change of mean flow makes of an
+        orifice set anew."""
         gained = sum(
             self.flows[fault.name].harmonics(area)[0].real / self.flows[fault.name].mean
             for fault, area in zip(hypothesis.state, hypothesis.areas)
@@ -125,7 +125,7 @@ class ObservationModel:
     def change_of_flow(self, hypothesis: Hypothesis) -> np.ndarray:
         """Change (F,) of the pump's flow from that of the hypothesis to the recording's, m3/s, as
         the anchor's shaft stands; the line is that of the last linearisation."""
-        parts = self.parts(hypothesis)
+        parts = self.predict(hypothesis)
         left = (self.values - parts.healthy - parts.change)[0] / self.response[0]
         return left * np.exp(-1j * self.orders * hypothesis.turn)
 
@@ -144,8 +144,8 @@ class ObservationModel:
         noise = self.anchor.variance + self.observation.variance
         self.noise = self.division.divide_variance(noise)
 
-    def parts(self, hypothesis: Hypothesis) -> Parts:
-        """The prediction of a hypothesis, divided."""
+    def predict(self, hypothesis: Hypothesis) -> Parts:
+        """The prediction of a hypothesis, divided, Pa."""
         slopes = self._slopes
         moved = self.response + np.tensordot(self.state_of_line(hypothesis) - self._at, slopes, 1)
         leaks = self.change(hypothesis)
@@ -162,7 +162,7 @@ class ObservationModel:
             pump=moved * self._pump_slopes(hypothesis)[:, None] * turn,
             spread=local_power(moved) * np.mean(np.abs(leaks.sum(axis=0)) ** 2),
             measured=self._measured_share(healthy, added.sum(axis=0)),
-            explained=_explained_power(self.values - healthy, added.sum(axis=0)),
+            explained=explained_power(self.values - healthy, added.sum(axis=0)),
         )
 
     # likelihood
@@ -177,11 +177,11 @@ class ObservationModel:
         """Marginal likelihood of the recording below a frequency, or of a part of the divided
         readings. The first amplitudes are those of the shaft angle, in `TURN_SD`, and of the
         drift."""
-        return self._evaluate(self.parts(hypothesis), hypothesis.drift, errors, highest_hz, part)
+        return self._evaluate(self.predict(hypothesis), hypothesis.drift, errors, highest_hz, part)
 
     def log_likelihoods(self, hypothesis: Hypothesis, errors: Sequence[Errors]) -> np.ndarray:
-        """Log likelihoods (len(errors),) under errors of different sizes."""
-        parts = self.parts(hypothesis)
+        """Log likelihoods (E,) of the recording under E `errors` of different sizes."""
+        parts = self.predict(hypothesis)
         found = [self._evaluate(parts, hypothesis.drift, each) for each in errors]
         return np.array([each.log_likelihood for each in found])
 
@@ -200,7 +200,7 @@ class ObservationModel:
         residual = self.values - expected + sure * np.tensordot(drift, parts.slopes, 1)
         variance = self.variance(parts, errors)
         columns = columns[:, part, below]
-        return marginal(residual[part, below], variance[part, below], columns, ALIKE)
+        return marginalise(residual[part, below], variance[part, below], columns, ALIKE)
 
     def variance(self, parts: Parts, errors: Errors) -> np.ndarray:
         """Variance (S, F), Pa2, of the divided readings' independent errors. What the twin says of
@@ -222,7 +222,7 @@ class ObservationModel:
         return self.noise + self._in_rows(self.sensors * flow, across)
 
     def expected_reading(self, parts: Parts, errors: Errors) -> np.ndarray:
-        """The reading (S, F) to expect: changes count by as much as they are sure."""
+        """The divided reading (S, F), Pa, to expect: changes count by as much as they are sure."""
         changed = parts.drifted + parts.change
         return parts.healthy - parts.drifted + self._sure(errors) * changed
 
@@ -249,12 +249,14 @@ class ObservationModel:
         return min(float(np.linalg.norm(self.values - healthy) / predicted), MAX_SHARE)
 
     def scatter_power(self, healthy: np.ndarray) -> np.ndarray:
-        """Power (F,) to which the scatter of repeated healthy recordings is in proportion."""
+        """Power (F,), Pa2, to which the scatter of repeated healthy recordings is in proportion, of
+        readings `healthy` (S, F), Pa."""
         own, all_orders = self.power_by_class(healthy), local_power(healthy)
         return own + BETWEEN * all_orders
 
     def power_by_class(self, readings: np.ndarray) -> np.ndarray:
-        """Local power (F,) of readings (S, F), of pistons' orders and of all others apart."""
+        """Local power (F,), Pa2, of readings (S, F), Pa, of pistons' orders and of all others
+        apart."""
         out = np.empty(len(self.orders))
         even = self.orders % self.pistons == 0
         for which in (even, ~even):
@@ -262,11 +264,12 @@ class ObservationModel:
                 out[which] = local_power(readings[:, which])
         return out
 
-    def followed(
+    def fit_turn_and_drift(
         self, hypothesis: Hypothesis, errors: Errors, limits_hz: Sequence[float]
     ) -> Hypothesis:
-        """The hypothesis with its shaft angle and drift at their most likely values, found below
-        one frequency after the other: phases at high ones would be lost at first."""
+        """The hypothesis with its shaft angle, rad, and drift, standard deviations, at their most
+        likely values, found below one of `limits_hz` after the other: at high frequencies the phase
+        may be off by more than half a turn at first."""
         for limit in limits_hz:
             self.linearise_line(hypothesis)
             amplitudes = self.evaluate(hypothesis, errors, limit).amplitudes
@@ -296,23 +299,6 @@ class ObservationModel:
             leak * parts.pump,
         )
         return np.concatenate([*known, *smooth])
-
-
-def _explained_power(measured: np.ndarray, predicted: np.ndarray) -> np.ndarray:
-    """Local power (F,) of a measured change (S, F), times the share of it that the predicted one
-    explains at the best size: their coherence."""
-    powers = [np.sum(np.abs(x) ** 2) for x in (measured, predicted)]
-    if not all(powers):
-        return np.zeros(measured.shape[1])
-    share = np.abs(np.vdot(predicted, measured)) ** 2 / np.prod(powers)
-    return share * local_power(measured)
-
-
-def local_power(readings: np.ndarray) -> np.ndarray:
-    """Mean square (F,) of readings (S, F) over sensors and neighbouring orders: a zero of one
-    sensor, or of one order, is no place where an error is small."""
-    power = np.mean(np.abs(readings) ** 2, axis=0)
-    return uniform_filter1d(power, min(NEIGHBOURS, len(power)), mode="nearest")
 
 
 def _cosines(frequency_hz: np.ndarray, count: int) -> np.ndarray:

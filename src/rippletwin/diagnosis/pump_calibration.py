@@ -16,13 +16,13 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from rippletwin.case.model import Fluid
-from rippletwin.diagnosis.anchor import alignment, even_flow, flow_at_pump
+from rippletwin.diagnosis.anchor import estimate_flow_at_pump, even_flow, find_alignment
 from rippletwin.diagnosis.drifting_line import DriftingLine
 from rippletwin.diagnosis.pump_flow import (
     TIMING_SD_DEG,
-    healthy_flow,
     load_pressure_of,
     rebuild,
+    simulate_healthy_pump,
     with_fitted_pump,
 )
 from rippletwin.pump.geometry import Geometry
@@ -120,9 +120,9 @@ def one_each_point(observations: Sequence) -> list:
 
 def _measured_flow(twin: Twin, observation) -> _Flow:
     speed_rpm, pressure = 60.0 * observation.speed_hz, load_pressure_of(twin, observation)
-    ripple = healthy_flow(twin.rig.pump, twin.rig.fluid, speed_rpm, pressure)
+    ripple = simulate_healthy_pump(twin.rig.pump, twin.rig.fluid, speed_rpm, pressure)
     response = DriftingLine(twin, observation, ripple).response()
-    flow, _ = flow_at_pump(response, observation.values)
+    flow, _ = estimate_flow_at_pump(response, observation.values)
     orders = np.asarray(observation.orders)
     used = (orders % twin.rig.pump["pistons"] == 0) & (observation.frequency_hz <= HIGHEST_HZ)
     flow = flow[used]
@@ -134,9 +134,9 @@ def _measured_flow(twin: Twin, observation) -> _Flow:
 def _residual(numbers: dict, fluid, flow: _Flow, scale: float) -> np.ndarray:
     """Real residuals (2 F,) over their errors, at the best shaft angle."""
     pistons, orders = numbers["pistons"], flow.orders
-    ripple = healthy_flow(numbers, fluid, flow.speed_rpm, flow.pressure)
+    ripple = simulate_healthy_pump(numbers, fluid, flow.speed_rpm, flow.pressure)
     simulated = scale * even_flow(ripple, orders, pistons)
-    angle = alignment(simulated[None], flow.values[None], orders, 2 * np.pi / pistons)
+    angle = find_alignment(simulated[None], flow.values[None], orders, 2 * np.pi / pistons)
     for _ in range(ALIGNMENT_ROUNDS):  # the grid of angles is too coarse for differences
         turned = simulated * np.exp(1j * orders * angle)
         slope, left = 1j * orders * turned / flow.error, (flow.values - turned) / flow.error

@@ -153,7 +153,9 @@ class LeakFlow:
         return area * self._slopes(np.log(np.clip(area, first, last)))
 
 
-def healthy_flow(pump: Mapping, fluid: Fluid, speed_rpm: float, pressure: float) -> PumpRipple:
+def simulate_healthy_pump(
+    pump: Mapping, fluid: Fluid, speed_rpm: float, pressure: float
+) -> PumpRipple:
     """Ripple of the healthy pump at r/min into a pressure, Pa; simulations are kept.
 
     Raises ArithmeticError where the chamber equations cannot be solved.
@@ -161,7 +163,7 @@ def healthy_flow(pump: Mapping, fluid: Fluid, speed_rpm: float, pressure: float)
     return _simulated(_key(pump), fluid, float(speed_rpm), float(pressure), None, 0.0)
 
 
-def leaking_flow(
+def simulate_leaking_pump(
     pump: Mapping, fluid: Fluid, speed_rpm: float, pressure: float, fault: Fault, area: float
 ) -> PumpRipple:
     """Ripple of the pump with a fault of this leak area, m2, at piston 0; simulations are kept.
@@ -182,7 +184,7 @@ def leak_velocity(pump: Mapping, fluid: Fluid, pressure: float) -> float:
     return coefficient * np.sqrt(2.0 * pressure / fluid.density)
 
 
-def leak_flow(
+def simulate_leak_flow(
     pump: Mapping, fluid: Fluid, speed_rpm: float, pressure: float, fault: Fault
 ) -> LeakFlow:
     """`LeakFlow` of a fault at r/min into a pressure, Pa; it is kept.
@@ -197,7 +199,7 @@ def _leak_flow(
     key: tuple, fluid: Fluid, speed_rpm: float, pressure: float, fault: Fault
 ) -> LeakFlow:
     pump = dict(key)
-    mean = peak_amplitudes(healthy_flow(pump, fluid, speed_rpm, pressure).flow)[0].real
+    mean = peak_amplitudes(simulate_healthy_pump(pump, fluid, speed_rpm, pressure).flow)[0].real
     one_piston = mean / pump["pistons"] / leak_velocity(pump, fluid, pressure)
     areas = one_piston * np.geomspace(fault.smallest, fault.largest, NODES)
 
@@ -205,7 +207,10 @@ def _leak_flow(
 
     def change(numbers: Mapping, at: np.ndarray) -> np.ndarray:
         point = numbers, fluid, speed_rpm, pressure
-        runs = [healthy_flow(*point), *(leaking_flow(*point, fault, a) for a in at)]
+        runs = [
+            simulate_healthy_pump(*point),
+            *(simulate_leaking_pump(*point, fault, a) for a in at),
+        ]
         periodic.extend(run.converged for run in runs)
         healthy, *leaking = (peak_amplitudes(run.flow) for run in runs)
         return (np.array(leaking) - healthy)[:, : ORDERS + 1] / at[:, None]

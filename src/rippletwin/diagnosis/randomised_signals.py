@@ -18,15 +18,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rippletwin.diagnosis.anchor import flow_at_pump, make_anchor
+from rippletwin.diagnosis.anchor import estimate_flow_at_pump, make_anchor
 from rippletwin.diagnosis.drifting_line import DriftingLine
 from rippletwin.diagnosis.faults.library import FAULTS
 from rippletwin.diagnosis.observation_model import SOURCE_DRIFT, TURN_SD
 from rippletwin.diagnosis.pump_flow import (
     NUMBERS,
     ORDERS,
-    healthy_flow,
-    leak_flow,
+    simulate_healthy_pump,
+    simulate_leak_flow,
     with_fitted_pump,
 )
 from rippletwin.diagnosis.uncertain_pump import UncertainPump, number_slopes
@@ -87,7 +87,7 @@ class SignalSource:
         self._point = 60.0 * speed_hz, load_pressure
         self._pump, self._fluid = fitted.rig.pump, fitted.rig.fluid
         observed = _observation(healthy, self.orders, speed_hz, load_pressure)
-        ripple = healthy_flow(self._pump, self._fluid, *self._point)
+        ripple = simulate_healthy_pump(self._pump, self._fluid, *self._point)
         self._line = DriftingLine(fitted, observed, ripple)
         self._healthy = observed.values
         anchor = make_anchor(fitted, observed, observed, self._line, *self._point)
@@ -120,7 +120,7 @@ class SignalSource:
         """`count` signals of each class, each class with the same twins. Leak areas are log-uniform
         in `bins`; a class without a bin is healthy."""
         leaks = {
-            name: leak_flow(self._pump, self._fluid, *self._point, FAULTS[FAULT_OF[name]])
+            name: simulate_leak_flow(self._pump, self._fluid, *self._point, FAULTS[FAULT_OF[name]])
             for name in classes
             if name in bins
         }
@@ -137,7 +137,7 @@ class SignalSource:
             theta, numbers = self._draw_twin(rng)
             known = None
             if anchored:
-                known = flow_at_pump(self._line.response(theta=theta), self._healthy)
+                known = estimate_flow_at_pump(self._line.response(theta=theta), self._healthy)
             for c, name in enumerate(classes):
                 change, gained = self._leak(leaks.get(name), areas[c, k], numbers, rng)
                 moved = self._line.response(self._draw_drift(gained, rng), theta)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rippletwin.diagnosis.anchor import correlation
+from rippletwin.diagnosis.anchor import correlate
 from rippletwin.diagnosis.faults.base import Fault
 from rippletwin.diagnosis.hypothesis import Hypothesis
 from rippletwin.diagnosis.observation_model import ObservationModel
@@ -56,7 +56,7 @@ class Screen:
         self.model = model
         nothing = Hypothesis((), (), (), 0.0, np.zeros(len(model.line.drifts)))
         model.linearise_line(nothing)
-        parts = model.parts(nothing)
+        parts = model.predict(nothing)
         healthy, slopes = parts.healthy, parts.slopes
         self._response, self._values = model.response, model.values
         drifted = np.sum(np.abs(slopes) ** 2, axis=(0, 1))
@@ -72,20 +72,20 @@ class Screen:
         self._healthy = self._term(healthy)
         # Pitches are counted from the shaft angle at which the pistons' orders are alike.
         even = self._weight * (model.orders % model.pistons == 0)
-        score = correlation(healthy, self._values, model.orders, even, self._count)
+        score = correlate(healthy, self._values, model.orders, even, self._count)
         first = int(np.argmax(score[:ANGLES]))
         self._start = first - ANGLES // 2
         self._leaks: dict[str, list[tuple[float, _Term]]] = {}
 
-    def healthy(self) -> list[Candidate]:
+    def screen_healthy(self) -> list[Candidate]:
         """The healthy state at each of the pistons' pitches, the best first."""
         return _sorted(self._at_pitches((), (), (), self._healthy.gain, self._healthy.square))
 
-    def one(self, fault: Fault) -> list[Candidate]:
+    def screen_one(self, fault: Fault) -> list[Candidate]:
         """One fault at every piston and pitch, each at its best leak area, the best first."""
         return _sorted(self._added(fault, None))
 
-    def two(self, first: list[Candidate], second: list[Candidate]) -> list[Candidate]:
+    def screen_two(self, first: list[Candidate], second: list[Candidate]) -> list[Candidate]:
         """Two faults together: the other one added to the best candidates of either."""
         found: dict[tuple[tuple[int, ...], int], Candidate] = {}
         for base, other in ((first, second), (second, first)):
@@ -127,7 +127,7 @@ class Screen:
         model = self.model
         return _Term(
             reading,
-            correlation(reading, self._values, model.orders, self._weight, self._count),
+            correlate(reading, self._values, model.orders, self._weight, self._count),
             float(np.sum(self._weight * np.abs(reading) ** 2)),
         )
 

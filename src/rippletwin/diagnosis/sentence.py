@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from rippletwin.case.quantities import plain, unit_of, write_quantity
 from rippletwin.diagnosis.diagnosis import Diagnosis
-from rippletwin.diagnosis.doubts import doubts
+from rippletwin.diagnosis.doubts import find_doubts
 
 ORDINALS = {1: "first", 2: "second", 3: "third"}
 MARGIN = 0.01  # probability of another state that is worth mentioning
 
 
-def sentence(diagnosis: Diagnosis) -> str:
+def describe_diagnosis(diagnosis: Diagnosis) -> str:
     """The diagnosis in words."""
     d = diagnosis
     if d.state == "unlike":
@@ -27,7 +27,7 @@ def sentence(diagnosis: Diagnosis) -> str:
     text += f"; compared with {d.anchor.label}"
     if d.anchor.distance:
         text += ", which is of another operating point, so that less can be told"
-    for doubt in doubts(d):
+    for doubt in find_doubts(d):
         text += f"; {doubt}"
     return f"{d.label}: {text}."
 

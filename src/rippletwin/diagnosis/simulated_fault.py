@@ -14,9 +14,9 @@ import numpy as np
 from rippletwin.diagnosis.faults.base import Fault
 from rippletwin.diagnosis.faults.library import find_fault
 from rippletwin.diagnosis.pump_flow import (
-    healthy_flow,
     leak_velocity,
-    leaking_flow,
+    simulate_healthy_pump,
+    simulate_leaking_pump,
     with_fitted_pump,
 )
 from rippletwin.errors import InputError
@@ -61,8 +61,8 @@ def simulate_fault(
     pump, fluid = twin.rig.pump, twin.rig.fluid
     point = pump, fluid, speed_rpm, load_pressure
     try:
-        healthy = healthy_flow(*point)
-        ripple = healthy if fault is None else leaking_flow(*point, fault, area)
+        healthy = simulate_healthy_pump(*point)
+        ripple = healthy if fault is None else simulate_leaking_pump(*point, fault, area)
         capacitance = healthy.source_capacitance(pump["pistons"] * speed_rpm / 60.0)
         run = propagate(
             twin, ripple.flow, healthy.flow, speed_rpm / 60.0, load_pressure, capacitance

@@ -2,7 +2,7 @@
 
 To first order: a standard deviation of a number moves the healthy ripple by 6 to 26 % and a leak's
 change by 1 to 7 %, and the second order is a few times smaller. So a thousand pumps cost no more
-simulations than `leak_flow` has made.
+simulations than `simulate_leak_flow` has made.
 
 Flow is told in the frame of the port plate. Another timing turns it by as much, which says nothing,
 since the shaft angle of a recording is unknown, but is far from linear at high orders.
@@ -19,8 +19,8 @@ from rippletwin.diagnosis.pump_flow import (
     TIMING_SD_DEG,
     UNCERTAIN,
     LeakFlow,
-    healthy_flow,
     moved_pumps,
+    simulate_healthy_pump,
 )
 from rippletwin.pump.ripple_sensitivity import KEYS
 from rippletwin.twin.twin import Twin
@@ -46,7 +46,9 @@ class UncertainPump:
         turns[NUMBERS.index("port_timing_deg")] = np.exp(1j * np.radians(TIMING_SD_DEG) * orders)
         self._turns = turns
         self._healthy, *moved = (
-            even_flow(healthy_flow(each, fluid, speed_rpm, pressure), orders, pump["pistons"])
+            even_flow(
+                simulate_healthy_pump(each, fluid, speed_rpm, pressure), orders, pump["pistons"]
+            )
             for each in (pump, *moved_pumps(pump))
         )
         self._slopes = turns * np.array(moved) - self._healthy

@@ -28,6 +28,7 @@ class Unlikeness:
 
     @property
     def unlike(self) -> bool:
+        """Whether the recording is unlike everything that was tried."""
         return self.p_value < UNLIKE
 
 
@@ -43,7 +44,7 @@ def judge_residual(model: ObservationModel, best: StateEvidence, prior: ErrorPri
     p = min(of_pump, of_line)
     if p >= UNLIKE:
         return Unlikeness(p)
-    parts = model.parts(best.mode)
+    parts = model.predict(best.mode)
     residual = model.values - model.expected_reading(parts, best.errors)
     usual = model.variance(parts, Errors(prior.scatter, prior.change))
     size = np.sqrt(np.mean(np.abs(residual) ** 2 / usual, axis=0))
@@ -79,7 +80,7 @@ def _of_residual(
     counted in. What it would be under larger and smaller errors is a gamma distribution of that
     mean, whose freedom allows for residuals that go together.
     """
-    medians, parts = Errors(prior.scatter, prior.change), model.parts(best.mode)
+    medians, parts = Errors(prior.scatter, prior.change), model.predict(best.mode)
     misfit = model.evaluate(best.mode, medians, part=part).square
     usual = model.variance(parts, medians)[part]
     count = 2.0 * usual.size

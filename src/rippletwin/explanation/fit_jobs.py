@@ -150,8 +150,8 @@ def run_fit_job(base: Twin, observations: Sequence, job: FitJob) -> Fit:
 
 
 def score_extension(base: Twin, observations: Sequence, job: FitJob) -> tuple[float, FitJob]:
-    """What the newest effect of a job that starts near a fit promises, and the job with the
-    starts that promise most (`ScoreTest`); for `Workers.map`."""
+    """What log evidence the newest effect of a job that starts near a fit promises, and the job
+    with the starts that promise most (`ScoreTest`); for `Workers.map`."""
     posterior = Posterior(base.with_(effects=job.hypothesis), observations, None, job.source_free)
     assert isinstance(job.start, NearFit)
     thetas = job.start.all_thetas(base, job.hypothesis, observations)

@@ -14,12 +14,13 @@ WEAK_COORDINATE = -2.0  # of a weak effect's strength, in prior standard deviati
 
 
 def scan_starts(rig, hypothesis: Hypothesis) -> list[dict[str, float]]:
-    """Starts for the newest effect of a hypothesis: all combinations of its parameters' scans."""
+    """Starts for the newest effect of a hypothesis, coordinates by name: all combinations of its
+    parameters' scans."""
     return _combined(rig, hypothesis, lambda parameter: parameter.scan)
 
 
 def weak_effect_starts(rig, hypothesis: Hypothesis, positions: int) -> list[dict[str, float]]:
-    """Starts for a newest effect of small strength.
+    """Starts, coordinates by name, for a newest effect of small strength.
 
     Positive parameters without a scan start at WEAK_COORDINATE. A position starts at `positions`
     points along the line: near a good fit the modes are narrow.

@@ -18,7 +18,7 @@ from rippletwin.calibration.fit import posterior_at_fit
 from rippletwin.calibration.misfit import predict_with_ripple
 from rippletwin.case.words import name_effect, name_hypothesis
 from rippletwin.explanation.checks.profile_intervals import effect_intervals
-from rippletwin.explanation.localise.missing_immittance import missing_immittance
+from rippletwin.explanation.localise.missing_immittance import find_missing_immittance
 from rippletwin.explanation.localise.residual_bands import residual_map
 from rippletwin.explanation.localise.source_free_fits import compare_evidence
 from rippletwin.explanation.verdict.explanation import Explanation
@@ -207,7 +207,7 @@ def _missing(e: Explanation) -> list[Missing]:
     """Of every accepted effect that changes a quantity by more than rounding."""
     fit, shown = e.decision.accepted, []
     for k, (effect, place) in enumerate(fit.hypothesis):
-        m = missing_immittance(fit, e.observations, k)
+        m = find_missing_immittance(fit, e.observations, k)
         if m is None or (m.unit == "1" and np.max(np.abs(m.law)) < MIN_RELATIVE_CHANGE):
             continue
         order = np.argsort(m.frequency_hz)

@@ -51,12 +51,12 @@ def score(
     return {
         "accuracy": float(strict.mean()),
         "accuracy_either": float(either.mean()),
-        "confusion": confusion(truth, predicted),
+        "confusion": count_confusions(truth, predicted),
         "n": truth.size,
     }
 
 
-def confusion(truth: np.ndarray, predicted: np.ndarray) -> np.ndarray:
+def count_confusions(truth: np.ndarray, predicted: np.ndarray) -> np.ndarray:
     """Counts (3 true states, 4 predicted classes); C1 and C2 of known severity count as C."""
     truth = np.asarray(truth, dtype=str)
     counts = np.zeros((len(TRUE_STATES), len(CLASSES)), dtype=int)

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from rippletwin.learning.architectures import CLASSES
-from rippletwin.learning.grad_cam import alignment, attention_density, attention_map
+from rippletwin.learning.grad_cam import attention_density, attention_map, measure_alignment
 from rippletwin.learning.networks import Classifier
 from rippletwin.learning.training import predict
 
@@ -25,7 +25,7 @@ def fault_attention(
     attended, blind = [], []
     for fault, region in regions.items():
         heat = attention_map(network, inputs[fault], CLASSES.index(fault))
-        share = alignment(heat, region)[0]
+        share = measure_alignment(heat, region)[0]
         attended.append(_mean_of_known(share))
         blind.append(np.isnan(share).mean())
     return np.array(attended), np.array(blind)

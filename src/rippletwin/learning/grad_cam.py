@@ -86,7 +86,7 @@ def fault_region(healthy: np.ndarray, faulty: np.ndarray, energy: float = 0.5) -
     return inside
 
 
-def alignment(heat: np.ndarray, region: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def measure_alignment(heat: np.ndarray, region: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Share of the attention that falls into the region, and share that the region is of all.
 
     heat : ``attention``, (n, M) or (n, rows, columns); region : booleans of ``fault_region``,

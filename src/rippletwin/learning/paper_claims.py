@@ -131,7 +131,7 @@ def judge_claim(verdicts: list[str]) -> str:
     return "reproduced" if clear else "partly"
 
 
-def comparisons(cells: pd.DataFrame, shares: pd.DataFrame) -> pd.DataFrame:
+def compare_cells(cells: pd.DataFrame, shares: pd.DataFrame) -> pd.DataFrame:
     """Every comparison that the cells (``cells_of``) allow; shares : ``recording_shares``.
 
     Columns claim, score, dataset, better, worse (labels), difference, low, high (per cent of the
@@ -167,7 +167,7 @@ def comparisons(cells: pd.DataFrame, shares: pd.DataFrame) -> pd.DataFrame:
 def judge_claims(compared: pd.DataFrame, cells: pd.DataFrame, period: float) -> pd.DataFrame:
     """One row a claim and score: claim, score, verdict, evidence (a sentence).
 
-    compared : of ``comparisons``; cells : of ``cells_of``; period : samples between two pistons.
+    compared : of ``compare_cells``; cells : of ``cells_of``; period : samples between two pistons.
     """
     kernel = ARCHITECTURES["cnn1d_341_100"].kernel
     spans = "reproduced" if abs(kernel - period) <= 1 else "not"

@@ -26,20 +26,22 @@ from rippletwin.case.model import ATMOSPHERE
 SMOOTHING = 1e3  # Pa, the drop below which an orifice is linear
 GAMMA = 1.0 - np.sqrt(0.5)  # share of a step at its first stage
 NEWTON_TOLERANCE = 1e-11  # of a Newton step, relative to the largest pressure
-TANGENT_STEPS = 10  # Newton steps with the true slopes; then steeper ones, see `orifice`
+TANGENT_STEPS = 10  # Newton steps with the true slopes; then steeper ones, see `orifice_flow`
 MAX_NEWTON = 80
 
 
 @njit(cache=True)
 def compression(p, bulk_modulus, air):
-    """c(p), and dc/dp in 1/Pa."""
+    """c(p), and dc/dp in 1/Pa, of liquid with the volume fraction `air` of free air; `p` in Pa
+    absolute, `bulk_modulus` in Pa."""
     gas = air * ATMOSPHERE / p
     return p / bulk_modulus - gas, 1.0 / bulk_modulus + gas / p
 
 
 @njit(cache=True)
-def orifice(conductance, drop, tangency):
-    """Flow through a smoothed orifice, m3/s, and a slope; `conductance` = Cd A sqrt(2/rho).
+def orifice_flow(conductance, drop, tangency):
+    """Flow through a smoothed orifice, m3/s, and a slope, m3/(Pa s), at a pressure `drop`, Pa;
+    `conductance` = Cd A sqrt(2/rho), m3/s/sqrt(Pa).
 
     The slope is the tangent's for `tangency` 1 and the chord's from the origin for 0. On a square
     root Newton's method alternates between +drop and -drop; a slope in between converges.
@@ -94,23 +96,23 @@ def solve_stage(p, rate, target, step, tables, pump, case_leak, cross_leak, c_pl
         for k in range(n):
             rate[k] = -tables[1, k]
         for k in range(n):
-            q, slope = orifice(tables[2, k], p[k] - p[n], tangency)
+            q, slope = orifice_flow(tables[2, k], p[k] - p[n], tangency)
             delivered += q
             slopes += slope
             inflow = -q
             matrix[k, k] += slope
             matrix[k, n] = -slope
             matrix[n, k] = -impedance * slope
-            q, slope = orifice(tables[3, k], p[k] - suction_pressure, tangency)
+            q, slope = orifice_flow(tables[3, k], p[k] - suction_pressure, tangency)
             inflow -= q
             matrix[k, k] += slope
-            q, slope = orifice(case_leak[k], p[k] - suction_pressure, tangency)
+            q, slope = orifice_flow(case_leak[k], p[k] - suction_pressure, tangency)
             inflow -= q + laminar * (p[k] - suction_pressure)
             matrix[k, k] += slope + laminar
             rate[k] += inflow
             if cross_leak[k] > 0.0:
                 m = (k + 1) % n
-                q, slope = orifice(cross_leak[k], p[k] - p[m], tangency)
+                q, slope = orifice_flow(cross_leak[k], p[k] - p[m], tangency)
                 rate[k] -= q
                 rate[m] += q
                 matrix[k, k] += slope
@@ -140,7 +142,7 @@ def solve_stage(p, rate, target, step, tables, pump, case_leak, cross_leak, c_pl
 
 
 @njit(cache=True)
-def revolution(
+def simulate_revolution(
     p,
     tables,
     stage_tables,
@@ -165,7 +167,8 @@ def revolution(
     line_p/_q     (cells + 1,) state of the line, empty where the outlet's pressure is given
     sensors       (S, 5): first of four neighbouring nodes, and their weights
     outlet        (K,) the outlet's pressure at the end of each step, Pa; empty with a line
-    Returns flow (K,), pressures (K, n + 1) and sensor pressures (K, S), each at a step's end.
+    Returns flow (K,), m3/s, pressures (K, n + 1) and sensor pressures (K, S), Pa, each at a step's
+    end.
     """
     steps, _, n = tables.shape
     zc, half, k_v, behind = line

@@ -24,7 +24,11 @@ class Cylinder:
 
 
 def leak_conductances(geometry, fluid, fault):
-    """Conductances (pistons,) from each chamber to the case and to the next chamber."""
+    """Conductances, m3/s/sqrt(Pa), from each chamber to the case and to the next one, both
+    (pistons,).
+
+    `fault` is one of `Slipper` and `Cylinder`, several of them, or None.
+    """
     faults = [] if fault is None else [fault] if isinstance(fault, Slipper | Cylinder) else fault
     case_leak, cross_leak = np.zeros((2, geometry.pistons))
     for item in faults:
@@ -34,5 +38,5 @@ def leak_conductances(geometry, fluid, fault):
 
 
 def orifice_conductance(geometry, fluid, area):
-    """Cd A sqrt(2/rho), m3/s/sqrt(Pa)."""
+    """Cd A sqrt(2/rho), m3/s/sqrt(Pa), of an orifice of `area` A, m2."""
     return geometry.discharge_coefficient * area * np.sqrt(2 / fluid.density)

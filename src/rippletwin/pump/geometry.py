@@ -35,7 +35,8 @@ class Geometry:
 
     @classmethod
     def from_dict(cls, pump: dict) -> Geometry:
-        """Geometry from rig.yaml's `pump`; ValueError names an unknown key or impossible value."""
+        """Geometry from rig.yaml's `pump`. Raises ValueError for an unknown key and an impossible
+        value."""
         known = [field.name for field in fields(cls)]
         unknown = sorted(set(pump) - set(known))
         if unknown:
@@ -73,19 +74,19 @@ class Geometry:
         return self.pistons * self.stroke_volume
 
     def volume(self, phi: np.ndarray) -> np.ndarray:
-        """Chamber volume at angle `phi` (rad), m3."""
+        """Chamber volume, m3, at angles `phi`, rad, same shape."""
         return self.dead_volume + 0.5 * self.stroke_volume * (1 + np.cos(phi))
 
     def volume_slope(self, phi: np.ndarray) -> np.ndarray:
-        """dV/dphi at angle `phi` (rad), m3/rad."""
+        """dV/dphi, m3/rad, at angles `phi`, rad, same shape."""
         return -0.5 * self.stroke_volume * np.sin(phi)
 
     def delivery_area(self, phi: np.ndarray) -> np.ndarray:
-        """Area of the delivery port at angle `phi` (rad), m2: open between the dead centres."""
+        """Area of the delivery port, m2, at angles `phi`, rad: open between the dead centres."""
         return self.port_area * self._opening(phi)
 
     def suction_area(self, phi: np.ndarray) -> np.ndarray:
-        """Area of the suction port at angle `phi` (rad), m2: half a revolution later."""
+        """Area of the suction port, m2, at angles `phi`, rad: half a revolution later."""
         return self.port_area * self._opening(phi - np.pi)
 
     def _opening(self, phi):

@@ -37,6 +37,9 @@ class Pipe:
     which K_v follows, or K_v itself as `orifice` (m3/s/sqrt(Pa)): a faulty pump meets the orifice
     that the healthy one left. p0 is `back_pressure`, Pa. Sensors at `sensor_positions` (m from the
     pump).
+
+    Raises ValueError unless one of both is given, for a load pressure that is not above the back
+    pressure, and for a sensor outside the pipe.
     """
 
     segment: Segment
@@ -55,11 +58,17 @@ class Pipe:
 
 
 def choose_steps(pistons, period, outlet, least):
-    """Steps a revolution and cells of the pipe.
+    """Steps a revolution, and cells of the pipe, 0 where the outlet is none.
+
+    pistons   of the pump
+    period    of a revolution, s
+    outlet    `ConstantPressure`, `PressureWave` or `Pipe`
+    least     steps a revolution at least
 
     The steps are a multiple of the pistons, so that all of these have the same angles, and such
     that a wave takes a whole number of steps through the pipe: the method of characteristics then
-    needs neither interpolation nor an altered wave speed.
+    needs neither interpolation nor an altered wave speed. Raises ValueError for a pipe that is too
+    short for so few steps.
     """
     first = -(-least // pistons) * pistons
     if not isinstance(outlet, Pipe):
@@ -79,9 +88,12 @@ def orifice_coefficient(outlet: Pipe, mean_flow: float) -> float:
 
 
 def pipe_state(fluid, outlet, step, cells, mean_flow):
-    """Constants of the line, its steady state at `mean_flow`, and the sensors' nodes and weights.
+    """Constants of the line, its steady state at `mean_flow`, m3/s, and the sensors' nodes.
 
-    Sensors between nodes read a cubic through the four nearest ones.
+    Returns (characteristic impedance and half the friction of a cell in Pa s/m3, K_v of the orifice
+    in m3/s/sqrt(Pa)), pressure, Pa, and flow, m3/s, (cells + 1,), and (S, 5) the first of four
+    nodes and their weights: sensors between nodes read a cubic through the four nearest ones. All
+    are empty or zero without cells.
     """
     if not cells:
         empty = np.zeros(0)
@@ -109,7 +121,8 @@ def pipe_state(fluid, outlet, step, cells, mean_flow):
 
 
 def pressure_at_steps(pressure, steps):
-    """The outlet's pressure at the end of each step, (steps,)."""
+    """The outlet's pressure, Pa, at the end of each step, (steps,), of one number or of a period at
+    even angles (M,)."""
     if np.ndim(pressure) == 0:
         return np.full(steps, float(pressure))
     return np.roll(resample_period(np.asarray(pressure, float), steps), -1)

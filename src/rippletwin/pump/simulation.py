@@ -130,7 +130,7 @@ def simulate(
 
     previous, change = None, np.inf
     for revolutions in range(1, MAX_REVOLUTIONS + 1):  # noqa: B007 (reported)
-        flow, pressures, readings = chambers.revolution(
+        flow, pressures, readings = chambers.simulate_revolution(
             state, end_of_step, first_stage, period / steps, constants, case_leak[:simulated],
             cross_leak[:simulated], (zc, half, k_v, behind), line_p, line_q, sensors, given,
         )  # fmt: skip

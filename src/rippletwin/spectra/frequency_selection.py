@@ -64,7 +64,7 @@ def check_sources(observations: Sequence) -> None:
 
 
 def select_frequencies(observation, keep: np.ndarray | slice):
-    """The observation at the frequencies of a mask or slice."""
+    """The observation at the frequencies of a mask (F,), of indices or of a slice."""
     return replace(
         observation,
         frequency_hz=observation.frequency_hz[keep],
@@ -75,7 +75,7 @@ def select_frequencies(observation, keep: np.ndarray | slice):
 
 
 def select_below(observation, max_frequency_hz: float | None = None, pistons: int = 1):
-    """The observation at and below a frequency, and at multiples of `pistons` shaft orders.
+    """The observation at and below a frequency, Hz, and at multiples of `pistons` shaft orders.
 
     At least its lowest frequency is kept.
     """

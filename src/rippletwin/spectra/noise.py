@@ -26,7 +26,7 @@ def noise_mad(signal: np.ndarray) -> np.ndarray:
 
 
 def noise_cycle_scatter(windows: np.ndarray) -> np.ndarray:
-    """Standard deviation (S,) of what does not repeat in `windows` (R, S, M).
+    """Standard deviation (S,) of what does not repeat in `windows` (R, S, M), in their unit.
 
     Everything that varies from one revolution to the next counts, not only sensor noise.
     """

@@ -14,7 +14,7 @@ from rippletwin.errors import InputError
 from rippletwin.harmonics import peak_amplitudes
 from rippletwin.spectra.angular_resampling import Revolutions, cut_revolutions
 from rippletwin.spectra.frequency_selection import select_frequencies
-from rippletwin.spectra.speed_regression import harmonics_at_mean_speed, mean_speed
+from rippletwin.spectra.speed_regression import mean_speed, regress_to_mean_speed
 from rippletwin.spectra.transfer_function import coherent_spectra
 
 MAX_SAMPLING_SHARE = 0.4  # of the sampling rate, up to which frequencies are kept
@@ -54,7 +54,8 @@ class Observation:
 
     @property
     def variance(self) -> np.ndarray:
-        """Variance (S, F) of the complex errors of values, each sensor and frequency alone."""
+        """Variance (S, F) of the complex errors of values, in their unit squared, each sensor and
+        frequency alone."""
         return np.einsum("fss->sf", self.covariance).real
 
 
@@ -122,7 +123,7 @@ def _observe_periodic(
     windows = revolutions.windows
     spectra = np.stack([peak_amplitudes(window)[:, orders] for window in windows])
     spectra -= spectra_of_drift(windows.mean(axis=2), windows.shape[2], orders)
-    values, covariance = harmonics_at_mean_speed(spectra, revolutions.speed_hz, orders, progress)
+    values, covariance = regress_to_mean_speed(spectra, revolutions.speed_hz, orders, progress)
     if piston_harmonics_only:
         kept = orders % rig.pump["pistons"] == 0
         orders, values, covariance = orders[kept], values[:, kept], covariance[kept]

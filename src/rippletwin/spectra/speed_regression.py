@@ -41,7 +41,7 @@ MAX_BLOCK_REVOLUTIONS = 128
 MIN_SIZE = 1e-12  # of an eigenvalue, of responses of unit variance
 
 
-def harmonics_at_mean_speed(
+def regress_to_mean_speed(
     spectra: np.ndarray,
     speed_hz: np.ndarray,
     orders: np.ndarray,

@@ -26,7 +26,7 @@ class CorrectedRipple:
     turns: dict[str, float]
 
     def at(self, label: str, orders: np.ndarray) -> np.ndarray:
-        """Ratio (N,) at shaft orders (N,) of a recording.
+        """Complex ratio (N,) at shaft orders (N,) of a recording.
 
         A recording that was not fitted gets the mean of those that were, turned to the shaft angle
         of the first. Beyond the orders that were fitted the ratio is that of the nearest one.

@@ -59,7 +59,10 @@ class FlowSource:
         self._admittances = np.array([own for *_, own in self.changes])
 
     def at(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Flow and admittance (F,) at `theta`, with shaft angles of 0."""
+        """Flow (F,), m3/s, and admittance (F,), m3/(Pa s), at `theta` (P,).
+
+        Shaft angles are taken as 0: `turn` has them.
+        """
         if not self.changes:
             return self.flow.copy(), self.admittance.copy()
         u = theta[self._changing]
@@ -67,7 +70,8 @@ class FlowSource:
         return flow, self.admittance + u @ self._admittances
 
     def turn(self, theta: np.ndarray) -> np.ndarray:
-        """Phase factor (F,) of the shaft angles at the first samples: exp(j k angle) at order k."""
+        """Phase factor (F,) of the shaft angles in `theta` (P,) at the first samples:
+        exp(j k angle) at order k."""
         turn = np.ones(len(self.flow), complex)
         for part, orders, index in zip(self._slices, self._orders, self.angles):
             if index is not None:

@@ -67,8 +67,8 @@ class DifferentiableForward(ForwardModel):
         self.freeze_compliance, self._outflows = True, None
 
     def use_full_jacobian(self, theta: np.ndarray) -> None:
-        """Set `jacobian_correction` to what `derivatives` lack at theta because the outflows are
-        frozen. It serves at theta and about it, as long as it changes little."""
+        """Set `jacobian_correction` to what `derivatives` lack at theta (P,) because the outflows
+        are frozen. It serves at theta and about it, as long as it changes little."""
         self.jacobian_correction = None
         solver = self._extended_for_compliance[0].compliance_solver
         usual, solver.tolerance = solver.tolerance, SOLVED_TOLERANCE
@@ -83,9 +83,9 @@ class DifferentiableForward(ForwardModel):
         self.jacobian_correction, solver.tolerance = correction, usual
 
     def linear_load(self, theta: np.ndarray) -> np.ndarray | None:
-        """Readings (S, F) with a linear orifice and the outflows of theta; None without an orifice,
-        where they are those of the prediction."""
-        if self._orifice is None:
+        """Readings (S, F), Pa, with a linear orifice and the outflows of theta (P,); None without
+        an orifice, where they are those of the prediction."""
+        if self.load.orifice is None:
             return None
         self._solve_at(theta)
         network = self._linear(theta)
@@ -93,7 +93,8 @@ class DifferentiableForward(ForwardModel):
         return network.readings()
 
     def derivatives(self, theta: np.ndarray) -> np.ndarray:
-        """d readings/d theta, (P, S, F); rows S are the rig's sensors, F all frequencies."""
+        """d readings/d theta, (P, S, F), Pa per unit of a coordinate; rows S are the rig's sensors,
+        F all frequencies."""
         self._solve_at(theta)
         self._freeze = True
         base = self.network(theta)
@@ -152,7 +153,7 @@ class DifferentiableForward(ForwardModel):
         factor = self.twin.load_factor(theta)
         if self._freeze:
             self._set_frozen_outflows(network)
-            if self._orifice is not None:
+            if self.load.orifice is not None:
                 network.load_outflow = factor * self._remainder
             return
         linear = network.load_state()
@@ -164,7 +165,7 @@ class DifferentiableForward(ForwardModel):
         if network.outflows is not None:
             positions, outflow = network.outflows
             self._outflows = positions / network.length, outflow
-        if self._orifice is not None:
+        if self.load.orifice is not None:
             p, q = network.load[1]
             self._remainder = (q - linear[1] / linear[0] * p) / factor
 
@@ -218,7 +219,7 @@ class DifferentiableForward(ForwardModel):
             series=np.empty((n, *shape), complex),
             shunt=np.empty((n, *shape), complex),
             source_admittance=admittance,
-            load=self._load(v),
+            load=self.load.linear_relation(v),
             sensor_positions=v.positions,
             sensor_factor=v.gains,
         )
@@ -257,7 +258,7 @@ class DifferentiableForward(ForwardModel):
         if base.outflows is not None:
             at, outflow = base.outflows
             side_by_side.outflows = at, np.tile(outflow, count)
-        if self._orifice is not None:
+        if self.load.orifice is not None:
             side_by_side.load_outflow = flat(v.load * self._remainder)
         readings = side_by_side.readings().reshape(-1, *shape)
         return readings * np.broadcast_to(network.sensor_factor, readings.shape)

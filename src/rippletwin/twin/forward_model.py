@@ -18,11 +18,11 @@ import numpy as np
 
 from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.line.frequency_domain.nonlinear_compliance import NonlinearComplianceSolver
-from rippletwin.line.frequency_domain.orifice_load import OrificeLoad
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
 from rippletwin.twin.effects.base import LineState
 from rippletwin.twin.flow_source import FlowSource
-from rippletwin.twin.unknown_load import unknown_impedance
+from rippletwin.twin.line_load import LineLoad
+from rippletwin.twin.reflection import reference_impedance, to_reflection
 
 if TYPE_CHECKING:
     from rippletwin.twin.twin import Arrays, Twin
@@ -37,7 +37,7 @@ class ForwardModel:
 
     theta is in the coordinates of `twin.parameters`. Pressures are in Pa (peak). A free source has
     unit flow; the likelihood estimates its amplitude. An input impedance is predicted as the
-    reflection coefficient (1, F), see `reflection`.
+    reflection coefficient (1, F), see `twin.reflection`.
 
     observations may be `OperatingCondition`s. `slices` has each one's columns among all F; `solved`
     says whether orifice and nonlinear compliance of the last prediction are in a steady state.
@@ -63,41 +63,24 @@ class ForwardModel:
             [np.zeros(n) if o.orders is None else o.orders for o, n in zip(observations, sizes)]
         )
         points = [twin.operating_point(o) for o in self.observations]
-        self.speed_hz = column([np.nan if o.speed_hz is None else o.speed_hz for o in observations])
-        self.load_pressure = column([p.load_pressure for p in points])
         self.mean_flow = column([p.mean_flow for p in points])
-        self.coefficient = column([p.coefficient for p in points])
+        self._mean_pressure = np.nan_to_num(column([p.load_pressure for p in points]))
         self.source = FlowSource(twin, self.observations, points, self.slices)
-        self.back_pressure = rig.load.back_pressure
-        self._mean_pressure = np.nan_to_num(self.load_pressure)
-        self.load_impedance = None
-        if rig.load.kind == "impedance":
-            self.load_impedance = _interpolate(
-                self.frequency_hz, rig.load.frequency_hz, rig.load.impedance
-            )
+        self.load = LineLoad(rig, self.frequency_hz, points, self.slices, self.order)
         self._series_cache: dict[int, tuple] = {}
-        self._orifice = None
         self._ripples = [point.ripple for point in points]
         self._periodic = [r for r, ripple in enumerate(self._ripples) if ripple is not None]
         self.solved = True
         self._last_linear: tuple[bytes, FrequencyDomainLine] | None = None
         periodic = [self.slices[r] for r in self._periodic]
         self.compliance_solver = NonlinearComplianceSolver(periodic, self.order)
-        if rig.load.kind == "orifice" and self._periodic:
-            self._orifice = OrificeLoad(
-                periodic,
-                self.order,
-                np.array([points[r].load_pressure for r in self._periodic]) - self.back_pressure,
-                np.array([points[r].coefficient for r in self._periodic]),
-                rig.load.passes_flow,
-            )
 
     def __call__(self, theta: np.ndarray) -> list[np.ndarray]:
         return self._read(self.network(theta), theta)
 
     def unit_response(self, theta: np.ndarray) -> list[np.ndarray]:
-        """Predictions for a unit flow at every frequency, in the shaft's frame, and a ripple so
-        small that load and line are linear."""
+        """Predictions, list of (S, F), Pa s/m3, at theta (P,) for a unit flow at every frequency,
+        in the shaft's frame, and a ripple so small that load and line are linear."""
         network = self._linear(theta)
         network.source_flow = self.source.turn(theta)
         return self._read(network, theta)
@@ -110,8 +93,8 @@ class ForwardModel:
         for o, part, rows in zip(self.observations, self.slices, self.rows):
             if o.kind == "input_impedance":
                 impedance = network.input_impedance() if impedance is None else impedance
-                scale = self.twin.reference_impedance(theta, o)
-                predicted.append(reflection(impedance[None, part] / scale))
+                scale = reference_impedance(self.twin, theta, o)
+                predicted.append(to_reflection(impedance[None, part] / scale))
             else:
                 predicted.append(pressure[rows, part])
         return predicted
@@ -122,16 +105,16 @@ class ForwardModel:
         return bool(self._periodic and self._linear(self.twin.theta).nonlinear_compliances)
 
     def network(self, theta: np.ndarray) -> FrequencyDomainLine:
-        """The line with source, effects and load at `theta`; nonlinear load and compliance are
+        """The line with source, effects and load at `theta` (P,); nonlinear load and compliance are
         solved at full amplitude."""
         whole = None
-        if self._orifice is not None and self._orifice_is_exact:
+        if self.load.orifice is not None and self._orifice_is_exact:
             wide, seen = self._extended_for_orifice
             whole = wide._linear(theta)
             network = whole.at_frequencies(seen)
         else:
             network = self._linear(theta)
-        if self._orifice is not None or (network.nonlinear_compliances and self._periodic):
+        if self.load.orifice is not None or (network.nonlinear_compliances and self._periodic):
             self._balance(network, theta, whole)
         return network
 
@@ -167,7 +150,7 @@ class ForwardModel:
             shunt=shunt,
             source_flow=source * self.source.turn(theta),
             source_admittance=source_admittance,
-            load=self._load(v),
+            load=self.load.linear_relation(v),
             sensor_positions=v.positions,
             sensor_factor=v.gains,
         )
@@ -195,7 +178,7 @@ class ForwardModel:
         fluid = self.twin.rig.fluid
         resistance = None
         if self.twin.rig.load.kind == "orifice":
-            resistance = 1.0 / self._orifice_admittance(v.load)
+            resistance = 1.0 / self.load.orifice_admittance(v.load)
         return LineState(
             density=fluid.density,
             viscosity=v.viscosity,
@@ -214,15 +197,6 @@ class ForwardModel:
             effects=self.twin.effects,
         )
 
-    @cached_property
-    def _unit_orifice(self) -> np.ndarray:
-        """`_orifice_admittance` of the nominal coefficient."""
-        return self.coefficient / (2 * np.sqrt(self.load_pressure - self.back_pressure))
-
-    def _orifice_admittance(self, factor: float) -> np.ndarray:
-        """dq/dp of the orifice at the mean pressures, (F,) m3/(Pa s)."""
-        return factor * self._unit_orifice
-
     def _series(self, segment: int, diameter: float, viscosity: float) -> np.ndarray:
         last, value = self._series_cache.get(segment, (None, None))
         if last != (diameter, viscosity):
@@ -235,16 +209,6 @@ class ForwardModel:
             )
             self._series_cache[segment] = (diameter, viscosity), value
         return value
-
-    def _load(self, v: Arrays) -> tuple:
-        kind = self.twin.rig.load.kind
-        if kind == "orifice":
-            return "admittance", self._orifice_admittance(v.load)
-        if kind == "impedance":
-            return "impedance", v.load * self.load_impedance
-        if kind == "unknown":
-            return "impedance", unknown_impedance(self.s, v, self.twin.rig.fluid.density)
-        return kind, None
 
     def _balance(
         self, network: FrequencyDomainLine, theta: np.ndarray, whole: FrequencyDomainLine | None
@@ -261,45 +225,30 @@ class ForwardModel:
             whole.source_flow[seen] = network.source_flow
             solver = wide.compliance_solver
             tolerance = min(COUPLED_ORIFICE_TOLERANCE, solver.tolerance)
-            solve_load = wide._load_solver(whole, theta, tolerance=tolerance)
+            solve_load = wide.load.make_solver(
+                whole, self.twin.load_factor(theta), tolerance=tolerance
+            )
             state = [x[seen] for x in solver.solve(whole, solve_load)]
             self.solved = solver.solved and wide._orifice_is_solved
             positions, outflow = whole.outflows
             network.outflows = positions, outflow[:, seen]
-            if self._orifice is not None:
+            if self.load.orifice is not None:
                 network.load = "state", tuple(state)
         else:
             wide, seen = self._extended_for_orifice
-            state = wide._load_solver(whole, theta)(*whole.load_relation())
+            pressure, flow = wide.load.balance(whole, self.twin.load_factor(theta))
             self.solved = wide._orifice_is_solved
-            network.load = "state", tuple(x[seen] for x in state)
+            network.load = "state", (pressure[seen], flow[seen])
 
     def _balance_load(self, network: FrequencyDomainLine, theta: np.ndarray) -> None:
         """Set the full-amplitude state at the load of `network`, whose outflows are given."""
-        if self._orifice is not None:
-            state = self._load_solver(network, theta)(*network.load_relation())
-            network.load = "state", tuple(state)
+        if self.load.orifice is not None:
+            network.load = "state", tuple(self.load.balance(network, self.twin.load_factor(theta)))
         self.solved = self._orifice_is_solved
 
     @property
     def _orifice_is_solved(self) -> bool:
-        return self._orifice is None or self._orifice.solved
-
-    def _load_solver(self, network: FrequencyDomainLine, theta: np.ndarray, **accuracy: float):
-        """The function (a, b, c) -> (p, q) at the load of `network`, where a p + b q = c.
-
-        An orifice's linear part is the load of `network`, with what effects made of it.
-        """
-        p, q = network.load_state()
-        factor = self.twin.load_factor(theta)
-
-        def solve_load(a, b, c):
-            if self._orifice is not None:
-                return self._orifice.solve(a, b, c, q / p, factor, network.opening, **accuracy)
-            scale = c / (a * p + b * q)
-            return scale * p, scale * q
-
-        return solve_load
+        return self.load.orifice is None or self.load.orifice.solved
 
     @cached_property
     def _extended_for_compliance(self) -> tuple[ForwardModel, np.ndarray]:
@@ -324,27 +273,8 @@ class ForwardModel:
         return forward, np.concatenate(own)
 
 
-def characteristic_impedance(fluid, segment) -> float:
-    """rho a/A of a segment without loss, Pa s/m3."""
-    return fluid.density * segment.wave_speed / segment.area
-
-
-def reflection(impedance: np.ndarray) -> np.ndarray:
-    """R = (z - 1)/(z + 1) of an impedance z over its reference, same shape.
-
-    |R| <= 1 for anything passive. An impedance varies by orders of magnitude between resonance
-    and antiresonance, and its error with it. The error of R, the wave that returns over the one
-    sent, is about the same at all frequencies.
-    """
-    return (impedance - 1.0) / (impedance + 1.0)
-
-
 def _rows(observation, names: list[str]) -> list[int]:
     """Indices of an observation's sensors among the rig's."""
     if observation.kind == "input_impedance" or observation.sensors is None:
         return list(range(len(names)))
     return [names.index(getattr(s, "name", s)) for s in observation.sensors]
-
-
-def _interpolate(at, frequency_hz, values):
-    return np.interp(at, frequency_hz, values.real) + 1j * np.interp(at, frequency_hz, values.imag)

@@ -41,7 +41,7 @@ class Parameter:
 
     @property
     def nominal(self) -> float:
-        """Value at u = 0."""
+        """Value in `unit` at u = 0."""
         return float(self.prior.value(0.0))
 
     def value(self, u: float) -> float:
@@ -60,7 +60,7 @@ class Parameter:
 
 
 def values(parameters: Sequence[Parameter], u: np.ndarray) -> dict[str, float]:
-    """Values by name at coordinates u (P,)."""
+    """Values by name, each in its parameter's unit, at coordinates u (P,)."""
     return {p.name: float(p.value(x)) for p, x in zip(parameters, u, strict=True)}
 
 

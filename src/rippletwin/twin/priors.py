@@ -28,7 +28,7 @@ class Prior:
     scale: float | np.ndarray
 
     def value(self, u):
-        """Parameter at coordinate u, any shape."""
+        """Parameter, in its own unit, at coordinate u, any shape."""
         if self.kind == "normal":
             return self.centre + self.scale * u
         if self.kind == "lognormal":
@@ -38,7 +38,7 @@ class Prior:
         return self.centre + self.scale * ndtr(u)
 
     def coordinate(self, x):
-        """Inverse of `value`; a uniform's ends are clipped to finite coordinates.
+        """Inverse of `value`, any shape; a uniform's ends are clipped to finite coordinates.
 
         0 where the prior has no width: its parameter is exact, whatever x is.
         """

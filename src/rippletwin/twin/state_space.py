@@ -45,8 +45,8 @@ def line_response(twin: Twin, condition, frequency_hz: np.ndarray) -> np.ndarray
 
 
 def twin_state_space(twin: Twin, condition, lowest_hz: float, highest_hz: float) -> StateSpace:
-    """`StateSpace` from the pump's flow ripple to the pressure ripples at the pump outlet and as
-    the sensors read it, fitted between two frequencies."""
+    """`StateSpace` from the pump's flow ripple, m3/s, to the pressure ripples, Pa, at the pump
+    outlet and as the sensors read it, fitted between two frequencies, Hz."""
     arrays = twin.arrays(twin.theta)
     spacing = 0.5 / np.sum(arrays.lengths / arrays.wave_speeds)  # of the resonances
     count = max(FREQUENCIES, int(POINTS_PER_MODE * highest_hz / spacing))

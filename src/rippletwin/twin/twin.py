@@ -29,11 +29,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rippletwin.case.model import FlowRipple, Rig, Segment, Sensor
+from rippletwin.case.model import FlowRipple, Rig, Sensor
 from rippletwin.line.frequency_domain.pipe_immittance import FRICTION_LAWS
 from rippletwin.twin import parameters as coordinates
 from rippletwin.twin.corrected_ripple import CorrectedRipple
-from rippletwin.twin.forward_model import ForwardModel, characteristic_impedance
+from rippletwin.twin.forward_model import ForwardModel
 from rippletwin.twin.nominal_ripples import NominalRipples
 from rippletwin.twin.operating_point import (
     OperatingCondition,
@@ -56,7 +56,8 @@ SOURCE_SD = 0.05
 
 
 class Arrays(NamedTuple):
-    """The line at one theta: segments (n,), sensors (S,), viscosity and load factor scalars.
+    """The line at one theta, in SI units: segments (n,), sensors (S,); kinematic viscosity and load
+    factor are scalars.
 
     `reflection` has the Schur parameters of an unknown load, each (..., 1); `gains` (S, ..., 1) is
     what uncalibrated sensors read over the pressure.
@@ -150,11 +151,11 @@ class Twin:
     # parameters and their values
 
     def values(self, theta: np.ndarray | None = None) -> dict[str, float]:
-        """Physical values by name, at `theta` (default: the twin's own)."""
+        """Physical values by name, SI units, at `theta` (P,), by default the twin's own."""
         return coordinates.values(self.parameters, self.theta if theta is None else theta)
 
     def arrays(self, theta: np.ndarray) -> Arrays:
-        """The line's numbers at `theta` as arrays."""
+        """The line's numbers at `theta` (P,) as arrays, SI units."""
         n = len(self.rig.line)
         k = 3 * n + len(self.rig.sensors)
         u = self._line_priors.value(theta[: k + 1])
@@ -186,12 +187,12 @@ class Twin:
         return (gain * np.exp(1j * phase))[..., None]
 
     def load_factor(self, theta: np.ndarray) -> float:
-        """Factor on the load's coefficient at `theta`; 1 where it is no parameter."""
+        """Factor on the load's coefficient at `theta` (P,); 1 where it is no parameter."""
         k = self.index.get("load")
         return 1.0 if k is None else self.parameters[k].value(theta[k])
 
     def effect_values(self, theta: np.ndarray) -> list[tuple]:
-        """(effect, place, values by name) of each effect at `theta`."""
+        """(effect, place, values by name in SI units) of each effect at `theta` (P,)."""
         out, k = [], len(self.parameters) - sum(len(e) for e in self._effect_parameters)
         for (effect, place), own in zip(self.effects, self._effect_parameters):
             values = {p.name: p.prior.value(u) for p, u in zip(own, theta[k:])}
@@ -239,25 +240,16 @@ class Twin:
         load_pressure: float,
         orders: np.ndarray,
     ) -> np.ndarray:
-        """Sensors' pressure harmonics (S, F) at shaft `orders` (F,) for any flow ripple, angle 0.
+        """Sensors' pressure harmonics (S, F), Pa, at shaft `orders` (F,) for any flow ripple, at
+        shaft angle 0.
+
+        `speed_hz` in rev/s, `load_pressure` the mean before the load, Pa.
 
         This is how the ripple of a faulty pump is propagated in the frequency domain. Where the
         data sheet gives no orifice coefficient, it follows from the mean flow of `ripple`.
         """
         condition = OperatingCondition.at_orders(orders, speed_hz, load_pressure, ripple)
         return self.predict([condition])[0]
-
-    def reference_impedance(self, theta: np.ndarray, observation) -> float:
-        """Reference of an input impedance, Pa s/m3: rho a/A of the first segment.
-
-        A measurement given as a ratio remains one whatever the true bore, so its reference is the
-        model's own; one given in Pa s/m3 is divided by the data sheet's, as the data are.
-        """
-        first = self.rig.line[0]
-        if observation.normalised:
-            v = self.arrays(theta)
-            first = Segment(first.length, v.diameters[0], v.wave_speeds[0])
-        return characteristic_impedance(self.rig.fluid, first)
 
     # copies
 

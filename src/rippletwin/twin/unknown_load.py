@@ -32,7 +32,7 @@ def unknown_impedance(s: np.ndarray, v, density: float) -> np.ndarray:
 
 
 def unknown_reflection(s: np.ndarray, v) -> np.ndarray:
-    """Reflection coefficient (..., F) at `s` (F,)."""
+    """Reflection coefficient (..., F) of the load at `s` (F,), 1/s, with `v` of `Twin.arrays`."""
     return reflection_coefficient(s, v.reflection, 2.0 * np.pi * REFLECTION_HZ)
 
 

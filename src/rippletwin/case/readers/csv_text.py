@@ -17,8 +17,8 @@ from rippletwin.case.readers.signals import Signals
 from rippletwin.case.readers.text_tables import (
     TextFormat,
     find_format,
-    floats,
     open_rows,
+    parse_floats,
     parse_reason,
 )
 from rippletwin.errors import InputError, raise_any
@@ -94,7 +94,7 @@ def _columns(path: Path, layout: Layout, form: TextFormat) -> tuple[list[int], i
 
 def _floats(path: Path, name: str, column: pd.Series, before: int, form: TextFormat) -> np.ndarray:
     """A column as floats; `before` rows came earlier. Raises InputError at the first bad one."""
-    values = floats(column, form)
+    values = parse_floats(column, form)
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size:
         cell = column.iloc[bad[0]]

@@ -89,7 +89,7 @@ def _tried(
 ) -> tuple[tuple, TextFormat]:
     """The lines read in one way, after how well they read: the wanted names are there, rows are
     whole, fields are many."""
-    rows = [fields(line, separator) for line in lines]
+    rows = [split_fields(line, separator) for line in lines]
     named = next((k for k, row in enumerate(rows) if wanted and set(wanted) <= set(row)), None)
     if named is not None:
         header, first = named, _after_units(rows, named + 1, decimal)
@@ -143,7 +143,7 @@ def _check_rows(path: Path, lines: list[str], form: TextFormat) -> None:
     if form.names is None or form.rows_from is None:
         return
     for number, line in enumerate(lines[form.rows_from :], form.rows_from + 1):
-        found = fields(line, form.separator)
+        found = split_fields(line, form.separator)
         if len(found) <= form.columns or _whole(found, form.columns):
             continue
         halves = len(found) == 2 * form.columns  # every number was cut in two
@@ -156,7 +156,7 @@ def _check_rows(path: Path, lines: list[str], form: TextFormat) -> None:
         )
 
 
-def floats(column: pd.Series, form: TextFormat) -> np.ndarray:
+def parse_floats(column: pd.Series, form: TextFormat) -> np.ndarray:
     """A column of a table as floats; what is no number is NaN."""
     import pandas as pd
 
@@ -215,7 +215,7 @@ def first_lines(path: Path) -> list[str]:
     return _NEW_LINE.split(text)[:HEAD_LINES]
 
 
-def fields(line: str, separator: str) -> list[str]:
+def split_fields(line: str, separator: str) -> list[str]:
     """The fields of a line, quotes and spaces taken off."""
     if separator == " ":
         return line.split()

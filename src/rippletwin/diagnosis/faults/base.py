@@ -28,6 +28,8 @@ class Fault:
                   over the mean flow of one piston
     one_piston    whether it is at one piston; else all pistons are alike
     by_default    whether it is tried unless asked for otherwise
+
+    Raises ValueError unless 0 < smallest < largest.
     """
 
     name: str

@@ -1,10 +1,10 @@
 """Alarms: does the line without effects fail to explain the data?
 
-Refitting hides what is missing, so a good fit proves nothing. Four alarms look at the base fit:
-what a free correction of one element would add to it, the pull of the parameters away from the data
-sheet (where an absorbed effect shows), the disagreement between fits of single operating points,
-and drift within a recording. The verdict rests on the support of the effects; the alarms decide
-where no effect is accepted.
+Refitted parameters absorb what is missing, so a good fit proves nothing. Four alarms look at the
+base fit: what a free correction of one element would add to it, the pull of the parameters away
+from the data sheet (where an absorbed effect shows), the disagreement between fits of single
+operating points, and drift within a recording. The verdict rests on the support of the effects; the
+alarms decide where no effect is accepted.
 """
 
 from __future__ import annotations
@@ -18,11 +18,8 @@ from scipy.special import chdtrc
 from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit
 from rippletwin.explanation.fit_jobs import FitJob, FromTheta, Workers
-from rippletwin.explanation.localise.smooth_corrections import (
-    NONE,
-    SmoothCorrections,
-    elements_of,
-)
+from rippletwin.explanation.localise.elements import NONE, elements_of
+from rippletwin.explanation.localise.smooth_corrections import SmoothCorrections
 from rippletwin.explanation.thresholds import (
     DISAGREEMENT_ALARM,
     DRIFT_SIGNIFICANCE,

@@ -21,7 +21,7 @@ from rippletwin.explanation.fit_jobs import Workers
 from rippletwin.explanation.search.single_effects import fit_single_effects
 from rippletwin.explanation.search.stepwise_search import applicable_candidates
 from rippletwin.explanation.thresholds import FALSE_ALARM_RATE
-from rippletwin.twin.forward_model import characteristic_impedance
+from rippletwin.twin.reflection import stated_unit
 
 MIN_DRAWS = 10  # fewer do not determine the tail of the distribution
 
@@ -99,7 +99,7 @@ def _as_recorded(observation, rig, values: np.ndarray) -> np.ndarray:
     """Predicted values in the observed quantity: an impedance for a reflection coefficient."""
     if observation.kind != "input_impedance":
         return values
-    unit = 1.0 if observation.normalised else characteristic_impedance(rig.fluid, rig.line[0])
+    unit = stated_unit(observation, rig)
     return unit * (1.0 + values) / (1.0 - values)
 
 

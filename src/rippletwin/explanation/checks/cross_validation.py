@@ -188,7 +188,7 @@ def make_folds(workers: Workers, halves: Halves | None = None) -> list[Fold]:
 
 
 def predict_held_out(fit: Fit, observations: Sequence) -> tuple[Posterior, np.ndarray]:
-    """The posterior of observations that a fit was not made of, and its parameters for them.
+    """The posterior of observations that a fit was not made of, and theta (P,) for them.
 
     Shaft angles and the state of each recording are free, and the sizes of the errors are those
     that suit the observations best: another operating point has other errors.

@@ -144,7 +144,7 @@ def find_copied_recordings(a, b) -> str:
 
 
 def find_changed_state(early, late, delay: float) -> str:
-    """Two halves of a recording that differ by far more than noise."""
+    """Two halves of a recording that differ by far more than noise; `delay` (s) of the line."""
     if early.orders is None or drift_p_value([early], [late], delay)[0] > DRIFT_SIGNIFICANCE:
         return ""
     early, late = at_common_orders(early, late)
@@ -157,7 +157,7 @@ def find_changed_state(early, late, delay: float) -> str:
 
 
 def find_incompatible_recordings(observations: Sequence, delay: float) -> str:
-    """Recordings that differ from all others of their operating point.
+    """Recordings that differ from all others of their operating point; `delay` (s) of the line.
 
     The oil temperature is never the same twice, so a change of wave speed by WAVE_SPEED_DRIFT is
     allowed; its phase grows with frequency, and the low harmonics decide. Of two recordings it is
@@ -188,7 +188,7 @@ def find_incompatible_recordings(observations: Sequence, delay: float) -> str:
 
 
 def find_clipping_plateau(recording, sensor: str, row: np.ndarray) -> str:
-    """A clipped signal with noise: samples crowd at one end of the range.
+    """A clipped signal with noise: samples of `row` (N,), Pa, crowd at one end of the range.
 
     A sinusoid has 2.4 times as many samples in the outermost 2 % of its range as in the next 2 %
     (arcsine law), and noise has fewer.

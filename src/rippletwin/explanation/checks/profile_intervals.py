@@ -37,8 +37,8 @@ class ProfileJob:
 
     index                parameter that is fixed
     side                 -1 or 1
-    jacobian_correction  contribution of the nonlinear compliance to the Jacobian at the mode; None
-                         for a line without
+    jacobian_correction  (P, S, F) contribution of the nonlinear compliance to the Jacobian at the
+                         mode; None for a line without
     """
 
     fit: Fit
@@ -124,7 +124,8 @@ def trace_profile(base: Twin, observations: Sequence, job: ProfileJob) -> Profil
 
 
 def interpolate_crossing(distances: Sequence[float], rises: np.ndarray) -> float:
-    """The last distance at which `rises` cross INTERVAL_RISE; the last of all if they do not.
+    """The last of `distances` (N,) at which `rises` (N,) cross INTERVAL_RISE; the last of all if
+    they do not.
 
     The square root of the rise is interpolated linearly: for a parabola that is exact.
     """

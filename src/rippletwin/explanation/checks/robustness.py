@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rippletwin.explanation.localise.smooth_corrections import NONE
+from rippletwin.explanation.localise.elements import NONE
 
 
 @dataclass(frozen=True)

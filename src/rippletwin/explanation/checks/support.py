@@ -31,13 +31,13 @@ from rippletwin.explanation.checks.prior_sensitivity import WithoutEffect, fit_w
 from rippletwin.explanation.checks.robustness import Robustness, compare_beside_corrections
 from rippletwin.explanation.fit_jobs import FitJob, FromTheta, Workers, job_without_effect
 from rippletwin.explanation.fit_starts import transfer_theta
-from rippletwin.explanation.localise.smooth_corrections import (
+from rippletwin.explanation.localise.elements import (
     NONE,
-    SmoothCorrections,
     elements_of,
     own_element,
     position_spacing,
 )
+from rippletwin.explanation.localise.smooth_corrections import SmoothCorrections
 from rippletwin.explanation.search.stepwise_moves import extension_job
 from rippletwin.explanation.thresholds import (
     MAX_DISAGREEMENT,
@@ -115,13 +115,13 @@ def judge_beside_network(
     """
     while True:
         fits = _fit_without_beside(workers, network, judged)
-        lost = [
+        gains = [
             np.inf if _is_certain(judged.best, k) else network.evidence - fit.evidence
             for k, fit in enumerate(fits)
         ]
-        if min(lost, default=0.0) >= 0.0:
+        if min(gains, default=0.0) >= 0.0:
             break
-        k = int(np.argmin(lost))
+        k = int(np.argmin(gains))
         network, best = fits[k], judged.without[k].stated
         supports = judged.supports[:k] + judged.supports[k + 1 :]
         judged = Judged(best, supports, fit_without_each_effect(workers, base, best))
@@ -129,7 +129,7 @@ def judge_beside_network(
         replace(support, level="supported")
         if support.level == "established" and gain < MIN_LOG_BAYES_FACTOR
         else support
-        for support, gain in zip(judged.supports, lost)
+        for support, gain in zip(judged.supports, gains)
     )
     return network, replace(judged, supports=supports)
 
@@ -143,21 +143,21 @@ def withhold_what_is_in_doubt(
 
     * whose own parameters are not plausible in the explanation: a network moves them,
     * where the explanation leaves much or did not converge, but a usual effect,
-    * that has a rival in the data sheet, where the line does the work of physics that is left out:
-      a parameter contradicts the sheet, or held-out data leave much; but a usual effect.
+    * that has a rival in the data sheet, where the line's parameters are biased by physics that is
+      left out: one contradicts the sheet, or held-out data leave much; but a usual effect.
 
     held_out_error   model error, relative, of the explanation on data that were left out
     has_rivals       of each effect, whether other values of the data sheet do nearly as well
     """
     leaves_much = explanation.model_error > MUCH_MODEL_ERROR
     converged = explanation.expected_gain <= UNCONVERGED_GAIN  # else its evidence is not known
-    bent = largest_pull(explanation)[0] > PULL_ALARM or held_out_error > MUCH_MODEL_ERROR
+    biased = largest_pull(explanation)[0] > PULL_ALARM or held_out_error > MUCH_MODEL_ERROR
     rig = judged.best.twin.rig
     supports = []
     for support, (effect, place), has_rival in zip(
         judged.supports, judged.best.hypothesis, has_rivals, strict=True
     ):
-        is_doubtful_line = leaves_much or not converged or (bent and has_rival)
+        is_doubtful_line = leaves_much or not converged or (biased and has_rival)
         in_doubt = is_doubtful_line and not effect.usual(rig, place)
         if _pull_of_effect(explanation, f"{effect.name}@{place}.") > PULL_ALARM:
             in_doubt = True
@@ -251,7 +251,13 @@ def evaluate_without(base, observations: Sequence, job: tuple) -> list[dict[tupl
 def support_level(
     robustness: Robustness, held_out: float, pull: float, deviations: float = 0.0
 ) -> str:
-    """Level of an effect with these results of the checks."""
+    """Level of an effect with these results of the checks.
+
+    robustness   its log Bayes factors beside free corrections
+    held_out     log predictive probability of held-out data that it adds
+    pull         of its parameters, prior standard deviations
+    deviations   standard deviations between its parameters from parts of the data and from all
+    """
     if robustness.plain < MIN_LOG_BAYES_FACTOR or held_out <= 0.0:
         return "suggested"
     survives = robustness.least >= MIN_LOG_BAYES_FACTOR and robustness.own >= 0.0

@@ -20,7 +20,7 @@ import numpy as np
 
 from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit, posterior_at_fit
-from rippletwin.explanation.localise.missing_immittance import whitened_columns
+from rippletwin.explanation.localise.missing_immittance import whiten_columns
 from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR
 from rippletwin.line.frequency_domain.line_network import Insert
 
@@ -175,7 +175,7 @@ class _Scan:
     def compare(self, change: np.ndarray) -> tuple[float, float]:
         """Log Bayes factor of a free multiple of `change` per frequency, and the mean square of
         the whitened residual that it leaves."""
-        columns = whitened_columns(
+        columns = whiten_columns(
             self.posterior, self.prediction, self.prediction + PROBE_SHARE * change
         )
         return _log_bayes_factor(self.residual, self.jacobian, columns / PROBE_SHARE)

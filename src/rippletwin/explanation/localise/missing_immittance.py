@@ -20,7 +20,8 @@ from rippletwin.calibration.posterior import Posterior
 from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.line.frequency_domain.pipe_immittance import shunt_admittance
 from rippletwin.twin.effects.base import LineState
-from rippletwin.twin.forward_model import ForwardModel, reflection
+from rippletwin.twin.forward_model import ForwardModel
+from rippletwin.twin.reflection import reference_impedance, to_reflection
 
 PROBE_SHARE = 1e-4  # of the change by an effect, for finite differences
 RETARDATION_TIMES = np.geomspace(2e-5, 5e-3, 9)  # s, of a relaxing compliance
@@ -60,7 +61,7 @@ class MissingImmittance:
 def observable_of(
     posterior: Posterior, network: FrequencyDomainLine, theta: np.ndarray | None = None
 ) -> np.ndarray:
-    """The observed quantity of a network, (S, F): pressures, or reflection coefficients.
+    """The observed quantity of a network, (S, F): pressures, Pa, or reflection coefficients.
 
     `theta` (P,) are the parameters of the network, by default those of the posterior's twin.
     """
@@ -71,17 +72,17 @@ def observable_of(
     impedance = network.input_impedance()
     scale = np.concatenate(
         [
-            np.full(len(o.frequency_hz), twin.reference_impedance(theta, o))
+            np.full(len(o.frequency_hz), reference_impedance(twin, theta, o))
             for o in posterior.observations
         ]
     )
-    return reflection(impedance / scale)[None]
+    return to_reflection(impedance / scale)[None]
 
 
-def whitened_columns(
+def whiten_columns(
     posterior: Posterior, prediction: np.ndarray, moved: np.ndarray | Sequence
 ) -> np.ndarray:
-    """Whitened differences (..., S, F) of predictions `moved` (..., S, F) from `prediction`.
+    """Whitened differences (..., S, F) of predictions `moved` (..., S, F) from `prediction` (S, F).
 
     A free source keeps its most likely amplitude at `prediction`.
     """
@@ -91,7 +92,7 @@ def whitened_columns(
     return (r[1:] - r[0]).reshape(moved.shape)
 
 
-def missing_immittance(
+def find_missing_immittance(
     fit: Fit, observations: Sequence, effect_index: int = -1
 ) -> MissingImmittance | None:
     """What one effect of a fit adds to the line; None for a fit without effects.
@@ -112,7 +113,7 @@ def missing_immittance(
     whole = observable_of(posterior, changed)
     probe = observable_of(posterior, _interpolate_networks(without, changed, 1.0 + PROBE_SHARE))
     prediction = posterior.predict(theta)
-    column = whitened_columns(posterior, prediction, prediction + (probe - whole) / PROBE_SHARE)
+    column = whiten_columns(posterior, prediction, prediction + (probe - whole) / PROBE_SHARE)
     r = posterior.whitened(prediction)[0]
     weight = np.maximum(np.sum(np.abs(column) ** 2, axis=0), 1e-300)
     share = -np.sum(np.conj(column) * r, axis=0) / weight
@@ -218,7 +219,8 @@ def _interpolate_networks(
 def describe_law(
     frequency_hz: np.ndarray, immittance: np.ndarray, weight: np.ndarray | None = None
 ) -> str:
-    """What an immittance (F,) behaves like, in words: a noun, with its simple law in brackets.
+    """What an immittance (F,), SI units, behaves like over frequency_hz (F,), in words: a noun,
+    with its simple law in brackets.
 
     `weight` (F,) is 1/sqrt(w) by default.
     """

@@ -103,7 +103,8 @@ def fit_modulation(flow: OrderFlow, pistons: int, start: complex | None = None) 
 
 
 def spread_by_modulation(orders: np.ndarray, carriers: np.ndarray, b: complex) -> np.ndarray:
-    """Flow (F, C) at `orders` (F,) per unit of even flow at `carriers` (C,) by a modulation b."""
+    """Flow (F, C) at `orders` (F,) per unit of even flow at `carriers` (C,) by a modulation b,
+    rad."""
     m = np.subtract.outer(orders, carriers)
     turned = (1j * np.exp(1j * np.angle(b))) ** m
     return jv(m, carriers * abs(b)) * turned * np.divide.outer(orders, carriers)

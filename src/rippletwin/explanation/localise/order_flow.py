@@ -67,5 +67,5 @@ def with_shaft_orders(observations: Sequence, pistons: int, highest_hz: float) -
 
 
 def variance_about_twin(o) -> np.ndarray:
-    """Variance (S, F) of an observation about the twin: noise and LINE_MODEL_ERROR."""
+    """Variance (S, F), Pa2, of an observation about the twin: noise and LINE_MODEL_ERROR."""
     return o.variance + LINE_MODEL_ERROR**2 * np.mean(np.abs(o.values) ** 2, axis=0)

@@ -14,16 +14,13 @@ import numpy as np
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.misfit import score_fit
 from rippletwin.calibration.ripple_correction import correct_ripple
+from rippletwin.explanation.localise.elements import NONE, elements_of, unit_immittance
 from rippletwin.explanation.localise.missing_immittance import describe_law
 from rippletwin.explanation.localise.residual_bands import (
     residual_conditions,
     residual_frequency_bands,
 )
-from rippletwin.explanation.localise.smooth_corrections import (
-    NONE,
-    SmoothCorrections,
-    elements_of,
-)
+from rippletwin.explanation.localise.smooth_corrections import SmoothCorrections
 from rippletwin.explanation.thresholds import (
     EQUIVALENT_LOG_BAYES_FACTOR,
     GOOD_MODEL_ERROR,
@@ -100,5 +97,5 @@ def _law(corrections: SmoothCorrections, element: tuple) -> str | None:
     if element[0] in ("source", "sensor"):
         return None
     frequency_hz, correction, weight = corrections.most_likely(element)
-    unit = corrections.unit(element)
+    unit = unit_immittance(corrections.network, element)
     return describe_law(frequency_hz, correction * unit, weight / np.abs(unit) ** 2)

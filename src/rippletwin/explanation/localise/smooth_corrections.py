@@ -5,8 +5,9 @@ A correction is a complex Gaussian process g with
     <g(f) g(f')*> = a^2 exp(-(f - f')^2 / (2 l^2)).
 
 It multiplies the reading of a sensor, the pump's flow, or the impedance or admittance per metre of
-a segment, or it is a shunt or series element at a position. Fit, correction and residual enter to
-first order about a mode theta, so every amplitude is integrated out in closed form:
+a segment, or it is a shunt or series element at a position (`elements`). Fit, correction and
+residual enter to first order about a mode theta, so every amplitude is integrated out in closed
+form:
 
     r - J theta ~ N(0, I + J J^T + a^2 G G^T),
 
@@ -20,8 +21,8 @@ Processes for Machine Learning, eq. 2.30.)
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -29,8 +30,8 @@ from scipy.special import logsumexp
 
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.posterior import Posterior
+from rippletwin.explanation.localise.elements import NONE, correct_line, position_spacing
 from rippletwin.explanation.localise.missing_immittance import observable_of
-from rippletwin.line.frequency_domain.line_network import Insert
 
 PROBE_SHARE = 1e-3  # of a correction, for finite differences
 AMPLITUDES = np.geomspace(3e-3, 1.0, 6)
@@ -39,8 +40,6 @@ CORRELATION_HZ = 400.0  # l
 MODEL_ERRORS = np.geomspace(1e-3, 1.5, 13)
 ERRORS_BELOW, ERRORS_ABOVE = 5, 1  # grid values of the model error around that of the fit
 MIN_EIGENVALUE = 1e-3  # share of the kernel's largest; smaller ones are left out
-POSITIONS_PER_WAVELENGTH = 4
-"""Of the highest frequency: at so many places along the line an element is tried."""
 POSITIONS_SOLVED = 3  # of each kind of element, those that promise most
 STEP_SHARES = (1.0, 0.5, 0.25)
 """Of the way to the most likely correction, besides none of it. A linear step may overshoot: near a
@@ -48,8 +47,6 @@ sharp resonance a small correction changes the prediction by much."""
 NEGLIGIBLE = 3.0  # log likelihood below the best at which an amplitude no longer counts
 KEPT_PROMISE = 0.5  # log likelihood: a step that falls short by less is not shortened
 FLAT_SD = 1e3  # of a coordinate without a prior
-
-NONE = "nothing"
 
 
 class SmoothCorrections:
@@ -87,15 +84,15 @@ class SmoothCorrections:
         return expanded, 0.5 * float(r @ r + start @ start)
 
     def log_evidence(self, element: tuple = (NONE, None)) -> float:
-        """Log evidence if an element, as in `elements_of`, may have a smooth correction.
+        """Log evidence if an element, as in `elements`, may have a smooth correction.
 
         A constant that is common to all models of these data is left out.
         """
         return self._solve(element).log_evidence
 
     def most_likely(self, element: tuple) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Frequencies (F,), the most likely correction (F,) of an element, and how well each
-        frequency determines it: the power (F,) of what a unit of it changes, whitened."""
+        """Frequencies (F,), Hz, the most likely relative correction (F,) of an element, and how
+        well each frequency determines it: the power (F,) of what a unit of it changes, whitened."""
         solved = self._solve(element)
         power = self._posterior.power * solved.model_error**2
         weight = np.sum(np.abs(solved.change) ** 2, axis=0) / power
@@ -180,19 +177,6 @@ class SmoothCorrections:
                 break
         return least
 
-    def unit(self, element: tuple) -> np.ndarray:
-        """The immittance (F,) of which a correction is a multiple, of an element of the line.
-
-        In SI units: of a segment per metre, Pa s/m4 in series or m2/(Pa s) as a shunt; elsewhere
-        the characteristic impedance of the first segment, Pa s/m3, or its inverse.
-        """
-        kind, where = element
-        if kind.startswith("segment"):
-            per_metre = getattr(self.network, kind.split()[1])
-            return per_metre[where if isinstance(where, int) else where[0]]
-        characteristic = np.sqrt(self.network.shunt[0] / self.network.series[0])
-        return characteristic if kind == "shunt" else 1.0 / characteristic
-
     @cached_property
     def promises(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         """Positions (N,), m, along the whole line and the promise (N,) of a correction there, of
@@ -217,7 +201,7 @@ class SmoothCorrections:
 
     @property
     def frequency_hz(self) -> np.ndarray:
-        """Frequencies (F,) of all observations side by side."""
+        """Frequencies (F,), Hz, of all observations side by side."""
         return self._posterior.forward.frequency_hz
 
     def _promise(self, element: tuple) -> float:
@@ -247,12 +231,12 @@ class SmoothCorrections:
         return r, columns @ columns.T, columns @ r
 
     def by_element(self, elements: Sequence[tuple]) -> dict[tuple, float]:
-        """Log evidence with the correction of each of `elements`, keys as in `elements_of`."""
+        """Log evidence with the correction of each of `elements`; these are the keys."""
         return {e: self.log_evidence(e) for e in elements}
 
     def change(self, element: tuple) -> np.ndarray | None:
-        """Change (S, F) of the prediction that a unit correction of an element makes; None without
-        an element."""
+        """Change (S, F) of the prediction, in its unit, that a unit correction of an element makes;
+        None without an element."""
         if element[0] == NONE:
             return None
         moved = self._observe(self.network, element, PROBE_SHARE, self.theta)
@@ -261,17 +245,9 @@ class SmoothCorrections:
     def _observe(self, network, element: tuple, correction, theta: np.ndarray) -> np.ndarray:
         """What is observed (S, F) of a network at theta with a `correction`, (F,) or a number, of
         an element."""
-        (kind, where), line = element, {}
-        if kind in ("segment series", "segment shunt"):
-            name = kind.split()[1]
-            per_metre = getattr(network, name).copy()
-            rows = [where] if isinstance(where, int) else list(where)
-            per_metre[rows] = per_metre[rows] * (1.0 + correction)
-            line[name] = per_metre
-        elif kind in ("shunt", "series"):
-            at = float(np.clip(where, 0.0, network.length))
-            line["inserts"] = [*network.inserts, Insert(at, kind, correction * self.unit(element))]
-        observed = observable_of(self._posterior, replace(network, **line), theta)
+        kind, where = element
+        corrected = correct_line(network, element, correction, self.network)
+        observed = observable_of(self._posterior, corrected, theta)
         if kind == "source":
             return observed * (1.0 + correction)
         if kind == "sensor":
@@ -290,46 +266,9 @@ class _Solved:
     change: np.ndarray | None
 
 
-def elements_of(rig, observations: Sequence, own: Sequence[tuple] = ()) -> list[tuple]:
-    """The elements whose correction is tried: pairs (kind, where).
-
-    (NONE, None); ("source", None); ("sensor", index); ("segment series" or "segment shunt", index
-    or indices); ("shunt" or "series", position in m) at both ends. `own` are further ones. Which
-    positions between the ends matter depends on the model (`promising_positions`).
-    """
-    elements: list[tuple] = [(NONE, None)]
-    if not all(o.kind == "input_impedance" for o in observations):
-        elements += [("source", None), *(("sensor", k) for k in range(len(rig.sensors)))]
-    elements += [
-        (f"segment {kind}", k) for k in range(len(rig.line)) for kind in ("series", "shunt")
-    ]
-    elements += [(kind, float(x)) for x in (0.0, rig.length) for kind in ("shunt", "series")]
-    return [*elements, *(e for e in own if e not in elements)]
-
-
-def position_spacing(rig, frequency_hz: np.ndarray) -> float:
-    """Distance (m) of the positions that are tried: closer ones cannot be told apart."""
-    wavelengths = rig.delay * float(np.max(frequency_hz))
-    return float(rig.length) / (POSITIONS_PER_WAVELENGTH * wavelengths)
-
-
-def own_element(effect, place, values: Mapping[str, float], rig) -> tuple:
-    """The element at which an effect itself acts, with its fitted `values`."""
-    everywhere = tuple(range(len(rig.line))) if len(rig.line) > 1 else 0
-    if effect.element == "sensor":
-        return "sensor", place.index
-    if effect.element == "segment" and place.index is not None:
-        return "segment shunt", place.index
-    if place.element == "line":
-        return ("segment series" if effect.friction else "segment shunt"), everywhere
-    position = {"source": 0.0, "load": float(rig.length)}.get(effect.element)
-    if position is None:
-        position = float(values["position"])
-    return (place.form if place.form in ("shunt", "series") else "shunt"), position
-
-
 def smooth_basis(frequency_hz: np.ndarray) -> np.ndarray:
-    """Basis (K, F) of functions smooth in frequency with basis.T @ basis = kernel of unit size."""
+    """Basis (K, F) of functions smooth over frequency_hz (F,), with 2 basis.T @ basis = the kernel
+    of unit size."""
     f = np.asarray(frequency_hz, float) / CORRELATION_HZ
     values, vectors = np.linalg.eigh(np.exp(-0.5 * np.subtract.outer(f, f) ** 2))
     kept = values > MIN_EIGENVALUE * np.max(values)

@@ -2,9 +2,9 @@
 
 A network is a shunt, a series element or a short piece of another pipe, at a free place. It is
 added to the best explanation. Where that leaves the line badly fitted, the named effects may have
-bent it: the network is then begun anew as well, along the whole line and beside the usual effects
-only. Where no network fits the line, it may be in a wrong local mode: the best are fitted again
-from starts about their places. Several networks may stand in together.
+biased its parameters: the network is then fitted anew as well, along the whole line and beside the
+usual effects only. Where no network fits the line, it may be in a wrong local mode: the best are
+fitted again from starts about their places. Several networks may stand in together.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from rippletwin.explanation.fit_jobs import (
 )
 from rippletwin.explanation.search.single_effects import refined_starts
 from rippletwin.explanation.search.stepwise_moves import (
-    LOST_MODEL_ERROR,
     MIN_PROMISE,
+    WRONG_MODE_MODEL_ERROR,
     extension_job,
 )
 from rippletwin.explanation.search.stepwise_search import Search
@@ -32,10 +32,10 @@ from rippletwin.explanation.thresholds import (
 )
 from rippletwin.twin.effects import library
 
-BENT_MODEL_ERROR = 0.02
-"""Relative model error above which the line beside named effects may be in a wrong local mode. It
+BIASED_MODEL_ERROR = 0.02
+"""Relative model error above which named effects may have biased the parameters of the line. It
 saves work only."""
-LOST_FITS = 3  # of the best fits, in wrong local modes, that are fitted again
+WRONG_MODE_FITS = 3  # of the best fits: those in wrong local modes are fitted again
 MAX_NETWORKS = 3  # in one line
 
 
@@ -46,40 +46,40 @@ def fit_passive_networks(workers: Workers, best: Fit) -> list[Fit]:
         return []
     networks = library.candidates(workers.base.rig, named=False)
     jobs = [extension_job(best, network) for network in networks]
-    if best.model_error <= GOOD_MODEL_ERROR:  # only the ripple errs, which a network need not mend
+    if best.model_error <= GOOD_MODEL_ERROR:  # only the ripple errs: it may be the pump
         scored = workers.map(score_extension, jobs)
         jobs = [job for promise, job in scored if promise >= MIN_PROMISE]
         if not jobs:
             return []
     fits = workers.fit(jobs)
-    if not best.hypothesis or min(f.model_error for f in fits) > BENT_MODEL_ERROR:
+    if not best.hypothesis or min(f.model_error for f in fits) > BIASED_MODEL_ERROR:
         usual = tuple(
             member for member in best.hypothesis if member[0].usual(best.twin.rig, member[1])
         )
         fits += workers.fit([FitJob((*usual, network)) for network in networks])
     fits = rank_by_evidence(fits)
-    fits = _refit_lost(workers, best, fits)
+    fits = _refit_from_wrong_mode(workers, best, fits)
     if not fits or fits[0].evidence <= best.evidence + MIN_LOG_BAYES_FACTOR:
         return fits
     return [*_with_further_networks(workers, fits[0], networks), *fits]
 
 
-def _refit_lost(workers: Workers, best: Fit, fits: list[Fit]) -> list[Fit]:
+def _refit_from_wrong_mode(workers: Workers, best: Fit, fits: list[Fit]) -> list[Fit]:
     """`fits` and, where the first may be in a wrong local mode, refits about their places.
 
     A line in a wrong local mode leaves to the pump what it cannot fit: its model error is large, or
     the error of the ripple is larger than without networks.
     """
 
-    def is_lost(fit: Fit) -> bool:
+    def is_in_wrong_mode(fit: Fit) -> bool:
         ripple = fit.source_sd if fit.source_sd > best.source_sd else 0.0
-        return max(fit.model_error, ripple) > LOST_MODEL_ERROR
+        return max(fit.model_error, ripple) > WRONG_MODE_MODEL_ERROR
 
-    lost = [fit for fit in fits[:LOST_FITS] if is_lost(fit)]
-    if not lost or lost[0] is not fits[0]:
+    wrong = [fit for fit in fits[:WRONG_MODE_FITS] if is_in_wrong_mode(fit)]
+    if not wrong or wrong[0] is not fits[0]:
         return fits
     rig = workers.base.rig
-    jobs = [FitJob(f.hypothesis, Continuation(tuple(refined_starts(rig, f)))) for f in lost]
+    jobs = [FitJob(f.hypothesis, Continuation(tuple(refined_starts(rig, f)))) for f in wrong]
     return rank_by_evidence([*fits, *workers.fit(jobs)])
 
 

@@ -31,7 +31,7 @@ RANDOM_STARTS = 4  # around each mode below a frequency limit
 ROUNDING = 1e-9
 
 
-def tolerance_scale(fit: Fit) -> float:
+def estimate_tolerance_scale(fit: Fit) -> float:
     """The factor on a fit's tolerances of the data sheet with the greatest evidence.
 
     With the factor that the fit's rig has already it is one of SCALES at most. 1 where no factor
@@ -41,13 +41,13 @@ def tolerance_scale(fit: Fit) -> float:
     stated = [k for k, p in enumerate(parameters) if p.is_sheet_number]
     if not stated or not np.isfinite(fit.evidence):
         return 1.0
-    evidence = scale_evidence(fit.twin.theta[stated], fit.covariance[np.ix_(stated, stated)])
+    evidence = evidence_of_scales(fit.twin.theta[stated], fit.covariance[np.ix_(stated, stated)])
     within = SCALES * fit.twin.rig.tolerance_scale <= SCALES[-1] * (1.0 + ROUNDING)
     best = int(np.argmax(np.where(within, evidence, -np.inf)))
     return float(SCALES[best]) if evidence[best] >= EQUIVALENT_LOG_BAYES_FACTOR else 1.0
 
 
-def scale_evidence(mean: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+def evidence_of_scales(mean: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     """Log evidence of each of SCALES, less that of 1.
 
     mean, covariance   (P,), (P, P) of the posterior with priors N(0, 1)
@@ -71,10 +71,10 @@ def fit_with_wider_tolerances(workers: Workers, best: Fit) -> Fit | None:
     """The hypothesis of `best` with wider tolerances of the data sheet, where that adds as much
     evidence as tells two explanations apart; else None.
 
-    The factor is that of `tolerance_scale`, or WIDER where that is 1. The fit goes on from `best`,
-    and is begun anew with random starts.
+    The factor is that of `estimate_tolerance_scale`, or WIDER where that is 1. The fit goes on from
+    `best`, and is begun anew with random starts.
     """
-    scale = tolerance_scale(best)
+    scale = estimate_tolerance_scale(best)
     rig = scale_tolerances(best.twin.rig, WIDER if scale == 1.0 else scale)
     if rig.tolerance_scale > SCALES[-1] * (1.0 + ROUNDING):
         return None

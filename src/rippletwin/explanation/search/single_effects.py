@@ -24,7 +24,7 @@ from rippletwin.explanation.fit_jobs import (
 )
 from rippletwin.explanation.fit_starts import transfer_theta
 from rippletwin.explanation.search.stepwise_moves import (
-    LOST_MODEL_ERROR,
+    WRONG_MODE_MODEL_ERROR,
     fit_extensions,
     rank_at_exact_modes,
 )
@@ -116,7 +116,7 @@ def _refit_base(workers: Workers, base: Fit, fits: Sequence[Fit]) -> Fit:
     below each frequency limit.
     """
     jobs = []
-    if base.model_error > LOST_MODEL_ERROR and len(workers.observations) == 1:
+    if base.model_error > WRONG_MODE_MODEL_ERROR and len(workers.observations) == 1:
         jobs = [FitJob((), Continuation(draws=DRAWS_PER_MODE))]
     return _best_restart(workers, base, rank_by_evidence(fits)[:BASE_RESTARTS], jobs)
 
@@ -136,7 +136,9 @@ def refit_poor_fits(workers: Workers, fits: list[Fit]) -> list[Fit]:
     whole line also starts from random draws: it is as free as the line itself.
     """
     poor = [
-        f for f in fits[:POOR_FITS_REFITTED] if f.model_error > LOST_MODEL_ERROR and f.hypothesis
+        f
+        for f in fits[:POOR_FITS_REFITTED]
+        if f.model_error > WRONG_MODE_MODEL_ERROR and f.hypothesis
     ]
     jobs = []
     for fit in poor:

@@ -35,7 +35,7 @@ MAX_OF_ONE_EFFECT = 4  # at free positions
 SUBSTITUTES_TRIED = 10  # best single effects tried in the place of another
 MAX_MODEL_ERROR_FOR_EXACT_MODE = 10.0 * MIN_MODEL_ERROR
 """Relative model error below which derivatives of the nonlinear compliance lead to the mode."""
-LOST_MODEL_ERROR = 0.1
+WRONG_MODE_MODEL_ERROR = 0.1
 """Relative model error above which a line is probably in a wrong local mode."""
 PROMISING = 8
 """Candidates of a round that are fitted at most, those with the best score tests
@@ -69,9 +69,9 @@ def fit_extensions(workers: Workers, best: Fit, candidates: Sequence, progress) 
     fits = rank_by_evidence(fits)
     if fits and fits[0].model_error > GOOD_MODEL_ERROR:
         # What is missing may have led the line into a wrong local mode: start again from the data
-        # sheet with the effect in the model. A line that is lost says nothing of which effect.
-        lost = fits[0].model_error > LOST_MODEL_ERROR
-        again = fits if lost else fits[:RESTARTED]
+        # sheet with the effect in the model. A line in a wrong mode says nothing of which effect.
+        in_wrong_mode = fits[0].model_error > WRONG_MODE_MODEL_ERROR
+        again = fits if in_wrong_mode else fits[:RESTARTED]
         restarted = workers.fit([restart_job(best, f.hypothesis, rig) for f in again])
         better = [max(pair, key=lambda f: f.evidence) for pair in zip(again, restarted)]
         fits = rank_by_evidence([*better, *fits[len(again) :]])

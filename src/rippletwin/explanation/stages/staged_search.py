@@ -18,9 +18,9 @@ from rippletwin.explanation.localise.phase_modulation import (
 )
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders, analyse_shaft_orders
 from rippletwin.explanation.search.sheet_tolerance import (
+    estimate_tolerance_scale,
     fit_with_wider_tolerances,
     scale_tolerances,
-    tolerance_scale,
     with_coordinates_of,
 )
 from rippletwin.explanation.search.stepwise_search import Search, resume_search, search_effects
@@ -117,7 +117,7 @@ def _resume_search(
         with open_workers(base, data, processes) as workers:
             search = resume_search(workers, with_coordinates_of(search, base), progress)
         stage = Stage(base, data, stage.modulation)
-        scale = tolerance_scale(search.best)  # the response of the pump may have hidden it
+        scale = estimate_tolerance_scale(search.best)  # the response of the pump may have hidden it
         if scale == 1.0:
             break
     return stage, search
@@ -131,4 +131,4 @@ def _widen_tolerances(stage: Stage, search: Search, processes: int) -> tuple[Sea
     if wider is None:
         return search, 1.0
     factor = wider.twin.rig.tolerance_scale / stage.base.rig.tolerance_scale
-    return replace(search, best=wider), factor * tolerance_scale(wider)
+    return replace(search, best=wider), factor * estimate_tolerance_scale(wider)

@@ -26,7 +26,9 @@ SAME_POINT_DISTANCE = 0.05  # in logarithms of speed and pressure
 NEW_LABEL = "next recording"
 
 
-def candidate_recordings(twin: Twin, observations: Sequence) -> list[tuple[str, Rig, Observation]]:
+def list_candidate_recordings(
+    twin: Twin, observations: Sequence
+) -> list[tuple[str, Rig, Observation]]:
     """Possible next recordings: in words, the rig then, and an observation without values."""
     rig = twin.rig
     candidates = further_sensors(twin, observations) if len(rig.sensors) else []

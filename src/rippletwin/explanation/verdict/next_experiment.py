@@ -25,8 +25,8 @@ from rippletwin.calibration.posterior import Posterior
 from rippletwin.case.model import Rig
 from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR
 from rippletwin.explanation.verdict.candidate_recordings import (
-    candidate_recordings,
     further_sensors,
+    list_candidate_recordings,
 )
 from rippletwin.spectra.observation import Observation
 from rippletwin.twin.twin import Twin
@@ -63,7 +63,7 @@ def propose_recording(
     if not rivals:
         return None
     best = None
-    for recording, rig, observation in candidate_recordings(accepted.twin, observations):
+    for recording, rig, observation in list_candidate_recordings(accepted.twin, observations):
         loss = float(min(expected_loss(accepted, fit, rig, observation) for fit in rivals))
         if best is None or loss > best.loss:
             best = Proposal(recording, loss)

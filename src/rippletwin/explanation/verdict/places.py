@@ -28,7 +28,7 @@ def element_and_extent(rig, place, parameters: dict) -> tuple[str, list[float]]:
 
 
 def element_in_words(rig, element: tuple, interval) -> tuple[str, list[float]]:
-    """Element and interval along the line (m) of an element of `localise.smooth_corrections`."""
+    """Element and interval along the line (m) of an element as in `localise.elements`."""
     kind, where = element
     length = float(rig.length)
     if kind == "source":
@@ -48,7 +48,7 @@ def element_in_words(rig, element: tuple, interval) -> tuple[str, list[float]]:
 
 
 def stretch_between_sensors(rig, low: float, high: float) -> str:
-    """The stretch between pump, sensors and load that contains an interval."""
+    """The stretch between pump, sensors and load that contains an interval, m, in words."""
     marks = [("pump", 0.0), *((s.name, s.position) for s in rig.sensors), ("load", rig.length)]
     marks.sort(key=lambda mark: mark[1])
     left = [name for name, x in marks if x <= low] or ["pump"]
@@ -57,6 +57,6 @@ def stretch_between_sensors(rig, low: float, high: float) -> str:
 
 
 def extent_in_words(ends: Sequence[float]) -> str:
-    """An interval of the line in words, from the pump."""
+    """An interval of the line, m from the pump, in words."""
     low, high = (f"{end:.2f}" for end in ends)
     return f"{low} to {high} m from the pump" if low != high else f"{low} m from the pump"

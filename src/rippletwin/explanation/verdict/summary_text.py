@@ -53,7 +53,7 @@ LESSER = {
 """What it means that an effect is not established, by its support."""
 
 
-def summary_text(e: Explanation, result: dict, entries: Sequence[dict]) -> str:
+def describe_verdict(e: Explanation, result: dict, entries: Sequence[dict]) -> str:
     """What an engineer can act on, as paragraphs of short sentences, the most important first.
 
     result   the verdict's other keys (`verdict_file.verdict_dict`)

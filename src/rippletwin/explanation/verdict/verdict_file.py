@@ -10,40 +10,32 @@ from typing import Any
 import numpy as np
 
 from rippletwin import store
-from rippletwin.calibration.fit import Fit
-from rippletwin.explanation.checks.alarms import evidence_p_value
 from rippletwin.explanation.checks.profile_intervals import (
     effect_intervals,
     pump_intervals,
     sensor_intervals,
 )
 from rippletwin.explanation.checks.support import Support
-from rippletwin.explanation.localise import residual_bands
-from rippletwin.explanation.localise.missing_immittance import is_passive, missing_immittance
+from rippletwin.explanation.localise.missing_immittance import find_missing_immittance, is_passive
 from rippletwin.explanation.localise.shaft_orders import ShaftEffect
-from rippletwin.explanation.localise.source_free_fits import compare_evidence
 from rippletwin.explanation.verdict.decision import (
     equivalent_places,
     posterior_probabilities,
     rival_fits,
 )
 from rippletwin.explanation.verdict.explanation import Explanation
+from rippletwin.explanation.verdict.mismatch_entry import NOTHING_MISSING, describe_mismatch
 from rippletwin.explanation.verdict.next_experiment import (
     propose_recording,
     propose_sensor_position,
 )
-from rippletwin.explanation.verdict.places import (
-    element_and_extent,
-    element_in_words,
-    stretch_between_sensors,
-)
-from rippletwin.explanation.verdict.summary_text import summary_text
+from rippletwin.explanation.verdict.places import element_and_extent, element_in_words
+from rippletwin.explanation.verdict.summary_text import describe_verdict
 from rippletwin.twin import twin_file
 from rippletwin.twin.effects.library import generalisations
 from rippletwin.twin.unknown_load import load_curve
 
 WIDE_INTERVAL = 0.15  # of the line's length; a wider one asks for one more sensor
-NOTHING_MISSING = ("consistent", "calibration_only")
 
 
 def verdict_dict(explanation: Explanation) -> dict:
@@ -62,7 +54,7 @@ def verdict_dict(explanation: Explanation) -> dict:
     curve = load_curve(decision.accepted.twin, decision.accepted.covariance, e.observations)
     result = {
         "verdict": verdict,
-        "mismatch": _mismatch(e, verdict, entries),
+        "mismatch": describe_mismatch(e, verdict, entries, shaft_effects),
         "effects": effects,
         "remainder": _remainder(e, entries),
         "equivalents": [list(names) for names in (*decision.equivalents, *places)],
@@ -75,7 +67,7 @@ def verdict_dict(explanation: Explanation) -> dict:
         "warnings": list(e.warnings),
         "sentence": "",
     }
-    result["sentence"] = summary_text(e, result, entries)
+    result["sentence"] = describe_verdict(e, result, entries)
     return result
 
 
@@ -139,72 +131,6 @@ def _shaft_effect(effect: ShaftEffect, support: str) -> dict:
     }
 
 
-def _mismatch(e: Explanation, verdict: str, entries: list[dict]) -> dict:
-    """Whether something is missing, how surely, and where."""
-    search, null_distribution = e.search, e.null_distribution
-    singles, accepted = search.single_effect_fits, e.decision.accepted
-    is_present = verdict not in NOTHING_MISSING
-
-    def largest(fits: list[Fit]) -> float:
-        return max([0.0, *map(search.log_bayes_factor, fits)])
-
-    if null_distribution is None:
-        tried = [*singles, *search.rivals, *search.passive_networks, accepted]
-        count = len({frozenset(fit.hypothesis) for fit in tried})
-        p_value = evidence_p_value(largest([*singles, accepted]), count)
-    else:  # the draws are fitted with single effects only
-        p_value = null_distribution.p_value(largest(singles))
-    mismatch = {
-        "present": is_present,
-        "p_value": p_value,
-        "where": _where(e, entries) if is_present else None,
-    }
-    if null_distribution is not None:
-        mismatch["by_chance"] = {
-            "draws": len(null_distribution.log_bayes_factors),
-            "largest": max(null_distribution.log_bayes_factors),
-            "threshold": null_distribution.threshold,
-        }
-    return mismatch
-
-
-def _where(e: Explanation, entries: list[dict]) -> dict:
-    """Element, interval, frequency bands, angles and operating points of the mismatch."""
-    base, location = e.search.base, e.location
-    element, position = "line", [0.0, float(e.rig.length)]
-    if entries:
-        first = entries[0]
-        element, position = element_and_extent(e.rig, first["place"], first["parameters"])
-    elif any(effect["support"] == "established" for effect in _shaft_effects(e)):
-        element, position = "source", [0.0, 0.0]
-    elif location is not None:
-        element, position = location.element, list(location.position)
-        if element == "position":
-            element = stretch_between_sensors(e.rig, *position)
-    where: dict[str, Any] = {
-        "element": element,
-        "position_m": position,
-        "bands_hz": residual_bands.residual_frequency_bands(base, e.observations),
-        "crank_angle_deg": residual_bands.residual_crank_angles(base, e.observations),
-        "conditions": residual_bands.residual_conditions(base, e.observations),
-    }
-    if location is not None:
-        where["one_element_free"] = location.log_bayes_factors
-        if len(e.rig.sensors) > 2:
-            where["interior_misfit"] = {
-                which: [
-                    float(np.sqrt(np.mean(misfit**2)))
-                    for misfit in residual_bands.interior_misfit(fit, e.observations)
-                ]
-                for which, fit in (("before", base), ("after", e.decision.accepted))
-            }
-    if e.source_free_fits:
-        where["source_informed_and_free"] = compare_evidence(
-            e.search.leading_fits, e.source_free_fits
-        )
-    return where
-
-
 def _next_recording(e: Explanation, places: tuple) -> str | None:
     """The recording that discriminates between rivals, or narrows a passive network's position."""
     verdict, accepted = e.decision.verdict, e.decision.accepted
@@ -257,7 +183,7 @@ def _stand_in(e: Explanation, entries: list[dict], index: int) -> dict:
     if effect.describe is not None:
         follows = effect.describe(values)
     else:
-        missing = missing_immittance(accepted, e.observations, index)
+        missing = find_missing_immittance(accepted, e.observations, index)
         follows = None if missing is None else missing.law_in_words
     element, _ = element_and_extent(e.rig, entry["place"], entry["parameters"])
     return {

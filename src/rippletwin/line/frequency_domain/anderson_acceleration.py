@@ -30,7 +30,7 @@ class AndersonAcceleration:
         self._last = None
 
     def step(self, x: np.ndarray, value: np.ndarray) -> np.ndarray:
-        """The next x, same shape, after `value` = f(x)."""
+        """The next x, complex and of the same shape as x and `value`, after `value` = f(x)."""
         flat = np.ascontiguousarray(value).view(float).ravel()
         residual = flat - np.ascontiguousarray(x).view(float).ravel()
         if self._residuals is None:

@@ -132,7 +132,8 @@ class FrequencyDomainLine:
         return entry[0, 0] / entry[0, 1]
 
     def load_state(self) -> tuple[np.ndarray | complex, np.ndarray | complex]:
-        """A pair (p, q) in the load's ratio, each (F,) or scalar."""
+        """A pair (p, q) in the load's ratio, each (F,) or scalar. Raises ValueError for an unknown
+        kind of load."""
         kind, value = self.load
         if kind == "open":
             return 0.0, 1.0
@@ -149,7 +150,8 @@ class FrequencyDomainLine:
         raise ValueError(f"load must be one of {LOADS}, not {kind!r}")
 
     def load_relation(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(a, b, c), each (F,), with a p + b q = c at the load, whatever the load is.
+        """(a, b, c), each (F,), with a p + b q = c at the load, p in Pa, q in m3/s, whatever the
+        load is.
 
         This is Thévenin's theorem without its division, so it holds at resonance too.
         """
@@ -163,7 +165,7 @@ class FrequencyDomainLine:
         return c / a, b / a
 
     def transfer(self, start: float = 0.0, stop: float | None = None) -> np.ndarray:
-        """Matrix T (F, 2, 2) with [p, q](start) = T [p, q](stop), start <= stop, det T = 1.
+        """Matrix T (F, 2, 2) with [p, q](start) = T [p, q](stop), start <= stop in m, det T = 1.
 
         Inserts at `start` are inside; those at `stop` only where it is the end of the line (the
         default), so that T(0, x) T(x, l) = T(0, l). The elements grow as exp(gamma l): under
@@ -184,7 +186,8 @@ class FrequencyDomainLine:
         return (entry / decay).transpose(2, 1, 0)
 
     def respond(self, positions: np.ndarray | Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-        """Pressure and flow (S, F) at `positions` with the network's own source and load."""
+        """Pressure, Pa, and flow, m3/s, (S, F) at `positions`, m, with the network's own source and
+        load."""
         states = [self.load_state()]
         if self.load_outflow is not None:
             states.append((0.0, self.load_outflow))

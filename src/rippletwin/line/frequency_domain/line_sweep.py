@@ -14,7 +14,13 @@ ENTER, WALK, RECORD, SHUNT, SERIES, OUTFLOW = range(6)
 
 @njit(cache=True)
 def order_steps(lengths, at, what, index):
-    """The plan of steps `what` at the positions `at`; empty if one lies outside the line."""
+    """The plan (N, 3) of steps from the load to the pump; empty if one lies outside the line.
+
+    lengths   (n,) of the segments, m
+    at        (M,) positions of the steps, m
+    what      (M,) what each does: RECORD, SHUNT, SERIES or OUTFLOW
+    index     (M,) to which insert, position or outflow
+    """
     starts = np.cumsum(lengths) - lengths
     here = np.sum(lengths)
     order = np.argsort(-at, kind="mergesort")  # stable: steps at one place keep their order
@@ -42,7 +48,15 @@ def order_steps(lengths, at, what, index):
 
 @njit(cache=True, error_model="numpy")
 def sweep_line(series, shunt, plan, values, load, outflow, stops):
-    """Follow `plan` at every frequency for every load state; see `FrequencyDomainLine.sweep`."""
+    """Follow `plan` (N, 3) at every frequency for every load state; see
+    `FrequencyDomainLine.sweep`.
+
+    series, shunt   (n, F) impedance and admittance per metre, Pa s/m4 and m2/(Pa s)
+    values          (I, F) of the inserts, Pa s/m3 in series, m3/(Pa s) as a shunt
+    load            (m, 2, F) pressure and flow at the load
+    outflow         (K, F) prescribed outflows, m3/s
+    stops           number of positions that are recorded
+    """
     states, count = load.shape[0], load.shape[2]
     pressure = np.empty((stops, states, count), np.complex128)
     flow = np.empty((stops, states, count), np.complex128)

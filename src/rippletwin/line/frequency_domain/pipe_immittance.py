@@ -50,7 +50,10 @@ def shunt_admittance(
     wave_speed: float | np.ndarray,
     diameter: float | np.ndarray,
 ) -> np.ndarray:
-    """Shunt admittance Y'(s) = A s/(rho a^2) in m2/(Pa s); all arguments broadcast."""
+    """Shunt admittance Y'(s) = A s/(rho a^2) in m2/(Pa s).
+
+    `s` in 1/s, `density` in kg/m3, `wave_speed` in m/s, `diameter` in m; all broadcast.
+    """
     area = 0.25 * np.pi * diameter**2
     return np.asarray(s, dtype=complex) * (area / (density * wave_speed**2))
 

@@ -37,7 +37,7 @@ class FundamentalSolutions:
         )
 
     def pressure_under(self, load: tuple, outflow: np.ndarray) -> np.ndarray:
-        """Pressure (N, F) at the positions, for (p, q) at the load, each (F,)."""
+        """Pressure (N, F), Pa, at the positions, for (p, q) at the load, each (F,), Pa and m3/s."""
         first, second = self.pressure
         one = load[0] - self._sum_to_load(outflow * second)
         two = load[1] + self._sum_to_load(outflow * first)

@@ -24,8 +24,8 @@ MAX_PREWARPED = 0.5  # rad a half step: a faster resonance is hardly resolved
 SAME_POSITION = 1e-9  # m: positions closer than this are the same
 
 
-def bilinear(element: Element, dt: float) -> np.ndarray:
-    """(b0, b1, b2, a1, a2) of the element at steps of `dt` by the trapezoidal rule.
+def discretise_element(element: Element, dt: float) -> np.ndarray:
+    """(b0, b1, b2, a1, a2), (5,), of the element at steps of `dt`, s, by the trapezoidal rule.
 
     s = (2/dt)(z - 1)/(z + 1) keeps what is passive passive, hence stable (Dahlquist 1963). It would
     lower a resonance w to (2/dt) arctan(w dt/2): the coefficient of s^2 is divided by so much that
@@ -51,13 +51,17 @@ def bilinear(element: Element, dt: float) -> np.ndarray:
 
 
 def cells_of(pipe: Pipe, dt: float) -> float:
-    """Length of a pipe in cells, whole numbers freed of rounding."""
+    """Length of a pipe in cells, at steps of `dt`, s; whole numbers are freed of rounding."""
     cells = pipe.length / (pipe.wave_speed * dt)
     return round(cells) if abs(cells - round(cells)) < 1e-9 * max(cells, 1) else cells
 
 
 def discretise(line: TimeDomainLine, dt: float) -> tuple[list[Pipe], list[float], list[list]]:
-    """Divide the segments at the elements: pipes, their starts, and the rungs of each junction."""
+    """Divide the segments at the elements, for steps of `dt`, s.
+
+    Returns the pipes, their starts, m, and the rungs of each junction. Raises ValueError for an
+    element outside the line, and where pieces would be shorter than three steps.
+    """
     edges = np.concatenate([[0.0], np.cumsum([p.length for p in line.pipes])])
     if any(not 0.0 <= i.position <= edges[-1] * (1 + 1e-12) for i in line.inserts):
         raise ValueError(f"an element lies outside the line of {edges[-1]} m")

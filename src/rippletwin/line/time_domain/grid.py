@@ -9,7 +9,12 @@ import numpy as np
 
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
 from rippletwin.line.time_domain import moc_kernel, weighting_functions
-from rippletwin.line.time_domain.discretisation import SAME_POSITION, bilinear, cells_of, discretise
+from rippletwin.line.time_domain.discretisation import (
+    SAME_POSITION,
+    cells_of,
+    discretise,
+    discretise_element,
+)
 from rippletwin.line.time_domain.kernel_arrays import JunctionArrays, PipeArrays, StateArrays
 from rippletwin.line.time_domain.line_elements import ENDS, Branch, TimeDomainLine
 
@@ -39,7 +44,7 @@ class Grid:
         self.kinds = np.zeros((len(self.ladder), 2), dtype=np.int64)
         self.filters = np.zeros((len(self.ladder) + 1, 5))  # the last is the load's valve
         if self.line.end.valve is not None:
-            self.filters[-1] = bilinear(self.line.end.valve, self.dt)
+            self.filters[-1] = discretise_element(self.line.end.valve, self.dt)
         for r, rung in enumerate(self.ladder):
             if isinstance(rung, Branch):
                 self.kinds[r] = moc_kernel.BRANCH, len(self.pipes)
@@ -50,7 +55,7 @@ class Grid:
                 self.kinds[r, 0] = {"shunt": moc_kernel.SHUNT, "series": moc_kernel.SERIES}[
                     rung.kind
                 ]
-                self.filters[r] = bilinear(rung, self.dt)
+                self.filters[r] = discretise_element(rung, self.dt)
 
     def _lay_nodes(self):
         """Nodes of each pipe: its left end, N cells on, and its right end theta cells further."""
@@ -197,7 +202,7 @@ class Grid:
         self.filter_states[r] = y - b0 * u, b2 * u - a2 * y
 
     def advance(self, nodes):
-        """One period: pressure and flow (len(nodes), M) at `nodes`; the state is updated."""
+        """One period: pressure, Pa, and flow, m3/s, (N, M) at `nodes` (N,); updates the state."""
         flow = np.asarray(self.line.flow, dtype=float)
         return moc_kernel.advance(
             flow,
@@ -212,7 +217,8 @@ class Grid:
         return kind(*(getattr(self, name) for name in kind._fields))
 
     def locate(self, x):
-        """(pipe, nearest node, distance from it to x towards the load, m)."""
+        """(pipe, nearest node, distance from it to x, m, towards the load). Raises ValueError for x
+        outside the line."""
         if not -1e-12 <= x <= self.line.length * (1 + 1e-12):
             raise ValueError(f"position {x} m lies outside the line of {self.line.length} m")
         starts = np.array(self.starts[: self.main])
@@ -226,7 +232,8 @@ class Grid:
         return k, node, 0.0 if abs(offset) < SAME_POSITION else float(offset)
 
     def shift(self, k, offset, pressure, flow):
-        """Periodic pressure and flow (M,) a fraction of a cell further on, by the exact line."""
+        """Periodic pressure, Pa, and flow, m3/s, (M,) in pipe k, by `offset`, m, further on: a
+        fraction of a cell, by the exact line."""
         line, pipe = self.line, self.pipes[k].linear(self.line.density)
         p, q = np.fft.rfft(pressure), np.fft.rfft(flow)
         s = 2j * np.pi * np.arange(1, len(p)) / line.period

@@ -42,7 +42,7 @@ class Pipe:
         return replace(self, wave_speed=self.wave_speed / np.sqrt(more), creep=creep)
 
     def linear(self, density: float) -> Pipe:
-        """The pipe for a small ripple: `law` becomes a lower wave speed."""
+        """The pipe for a small ripple: with `density`, kg/m3, `law` becomes a lower wave speed."""
         if not self.law:
             return self
         added = density * self.wave_speed**2 * self.law[1] / self.law[0]

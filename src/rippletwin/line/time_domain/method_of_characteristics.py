@@ -50,12 +50,13 @@ class Transient:
     remainder: np.ndarray
 
     def harmonics(self, orders: np.ndarray) -> np.ndarray:
-        """Peak complex amplitudes (S, F) of the pressure at whole `orders` (F,) of the period."""
+        """Peak complex amplitudes (S, F), Pa, of the pressure at whole `orders` (F,)."""
         return peak_amplitudes(self.pressure)[:, orders]
 
 
 def steps_a_period(segments: Sequence[Pipe], period: float, at_least: int) -> int:
-    """Steps a period, from `at_least` to a tenth more, that leave the smallest remainders."""
+    """Steps a `period`, s, from `at_least` to a tenth more, that leave the smallest remainders of a
+    cell in the segments."""
     steps = np.arange(at_least, at_least + max(at_least // 10, 1))
     cells = np.array([p.length / p.wave_speed for p in segments])[:, None] * steps / period
     rest = cells % 1.0

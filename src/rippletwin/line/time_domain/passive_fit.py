@@ -37,7 +37,7 @@ class PassiveFit(NamedTuple):
     error: float
 
     def at(self, s: np.ndarray) -> np.ndarray:
-        """The function at `s` (F,)."""
+        """The function, in its own unit, at `s` (F,), 1/s."""
         total = np.zeros(np.shape(s), complex)
         for numerator, denominator in self.terms:
             total += np.polyval(numerator, s) / np.polyval(denominator, s)
@@ -69,14 +69,16 @@ def fit_passive_terms(s: np.ndarray, immittance: np.ndarray) -> PassiveFit:
 
 
 def first_poles(z: np.ndarray, order: int) -> np.ndarray:
-    """Lightly damped pairs spread over the frequencies, as vector fitting begins."""
+    """Lightly damped pairs, `order` poles, spread over the frequencies z (F,), as vector fitting
+    begins. All are over one rate, without unit."""
     w = np.geomspace(np.abs(z[0]), np.abs(z[-1]), order // 2)
     pairs = np.column_stack([-0.01 * w + 1j * w, -0.01 * w - 1j * w])
     return pairs.ravel()
 
 
 def partial_fractions(z: np.ndarray, poles: np.ndarray) -> np.ndarray:
-    """Partial fractions (F, N) whose real combinations are those of real functions."""
+    """Partial fractions (F, N) at z (F,) of `poles` (N,), complex ones in pairs: their real
+    combinations are those of real functions."""
     columns = []
     for p in poles:
         if p.imag == 0.0:
@@ -88,7 +90,10 @@ def partial_fractions(z: np.ndarray, poles: np.ndarray) -> np.ndarray:
 
 
 def relocate_poles(z, h, poles, weight) -> np.ndarray:
-    """One step of vector fitting: the zeros of the common denominator become the poles."""
+    """One step of vector fitting: the zeros (N,) of the common denominator become the `poles` (N,).
+
+    h (F,) is the function at z (F,), `weight` (F,) how much each point counts.
+    """
     parts = partial_fractions(z, poles)
     rows = np.column_stack([parts, np.ones_like(z), z, -h[:, None] * parts]) * weight[:, None]
     target = h * weight

@@ -184,13 +184,14 @@ def sensor_places(rig) -> tuple[Place, ...]:
 
 
 def position_parameter(rig) -> Parameter:
-    """Distance from the pump outlet, uniform over the line; fits start from twelve positions."""
+    """Distance from the pump outlet, m, uniform over the line; fits start from twelve positions."""
     prior = uniform(0.0, sum(s.length for s in rig.line))
     return Parameter("position", "m", prior, tuple(ndtri((np.arange(12) + 0.5) / 12)))
 
 
 def segment_at(lengths: np.ndarray, position) -> int:
-    """Index of the segment that holds `position` (the first set's, where there is a batch)."""
+    """Index of the segment that holds `position`, m, in a line of segments of `lengths` (n,), m; of
+    a batch the first set's."""
     ends = np.cumsum([np.ravel(length)[0] for length in lengths])
     return int(min(np.searchsorted(ends, np.ravel(position)[0]), len(ends) - 1))
 
@@ -210,7 +211,7 @@ def on_line(network, position):
 
 
 def scale_sensor(network, index: int, factor) -> None:
-    """Multiply the reading of sensor `index` by `factor` (..., F)."""
+    """Multiply the reading of sensor `index` by `factor` (..., F), of no unit."""
     ones = np.ones((len(network.sensor_positions), *np.shape(factor)), complex)
     factors = network.sensor_factor * ones
     factors[index] *= factor

@@ -25,7 +25,7 @@ REFERENCE_PRESSURE = 1e7  # Pa, at which the conductance is stated
 
 def leak_conductance(conductance, pressure_exponent, pressure):
     """dq/dp, m3/(Pa s), of a leak to the atmosphere from `pressure` (Pa); `conductance` is that at
-    10 MPa. It takes the load's mean pressure, wherever the leak is."""
+    10 MPa. It takes the load's mean pressure, wherever the leak is. All broadcast."""
     # Spectra may come without a mean pressure: then it is as at one atmosphere.
     relative = np.maximum(pressure, ATMOSPHERE) / REFERENCE_PRESSURE
     return conductance * relative ** (-pressure_exponent)
