@@ -72,6 +72,14 @@ NOT_RUN = {
         "it needs a finished trial",
         "python benchmarks/concealed_errors.py --help",
     ),
+    "python benchmarks/explain_time.py results/concealed/cases/*0": (
+        "it needs a finished trial",
+        "python benchmarks/explain_time.py --help",
+    ),
+    "python benchmarks/explain_time.py results/concealed/cases/*0 --profile": (
+        "it needs a finished trial",
+        "python benchmarks/explain_time.py --help",
+    ),
     "python benchmarks/bench_mesh.py --each 1": (
         "it takes minutes",
         "python benchmarks/bench_mesh.py --help",
