@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,6 +14,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+
+LAST_WRITES_S = (0.0, 0.1, 0.5, 2.0)  # pauses before a folder is removed again
 
 
 def save(dataset: xr.Dataset, path: str | Path, compressed: bool = True) -> None:
@@ -41,7 +44,17 @@ def save(dataset: xr.Dataset, path: str | Path, compressed: bool = True) -> None
     finally:
         if (scratch / "old").exists() and not path.exists():
             os.replace(scratch / "old", path)
-        shutil.rmtree(scratch, ignore_errors=True)
+        _remove(scratch)
+
+
+def _remove(folder: Path) -> None:
+    """Remove a folder that threads of zarr may still write into: those of other chunks go on after
+    one has failed."""
+    for pause in LAST_WRITES_S:
+        time.sleep(pause)
+        shutil.rmtree(folder, ignore_errors=True)
+        if not folder.exists():
+            break
 
 
 def load(path: str | Path) -> xr.Dataset:
