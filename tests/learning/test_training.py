@@ -13,6 +13,7 @@ from rippletwin.learning.dataset import augment
 from rippletwin.learning.networks import build
 from rippletwin.learning.training import (
     TrainingSettings,
+    initialise,
     predict,
     stopping_reason,
     stratified_split,
@@ -182,6 +183,7 @@ def test_prediction_is_the_same_in_any_batch():
     """Batch normalisation is frozen: a window's probabilities do not depend on its neighbours."""
     x, _ = ripples(5, 0)
     network = build("resnet18_1d", 1)
+    initialise(network, 0)
     together, alone = predict(network, x)[1], predict(network, x, batch_size=1)[1]
-    np.testing.assert_allclose(together, alone, atol=1e-5)
+    np.testing.assert_allclose(together, alone, atol=1e-4)  # float32, 18 layers
     assert not network.training
