@@ -7,10 +7,10 @@ Explains one case folder after the other and prints the seconds for each operati
 impedances count as one), their median, the 95 % quantile and the largest. Nothing else should run
 on the machine.
 
-With --profile one process explains, and a timer of its processor time looks every 5 ms where it is.
-The first table says in which step of `explain` (docs/explanation/explain.md), the second in which
-function of rippletwin; a compiled kernel counts for the function that calls it. The shares of the
-kernels are the bound: with all else for nothing, explaining would take as long as they do.
+With --profile one process explains, and what runs is sampled every 5 ms of its processor time. The
+first table has the stages of `explain`, the second the functions of rippletwin; a compiled kernel
+counts for the function that calls it. The share of the kernels is the bound: without the time of
+everything else, explaining would still take as long as they do.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from rippletwin.explanation.explain import explain
 INTERVAL_S = 0.005
 SHOWN = 15  # functions
 STEPS = {
-    "observe_all": "1, 2: observe the recordings",
-    "prepare_stage": "3: set up the twin",
-    "search_in_stages": "4 to 6: search",
-    "judge_effects": "7: support of each effect",
+    "observe_all": "observation of the recordings",
+    "prepare_stage": "the twin and the shaft's modulation",
+    "search_in_stages": "search",
+    "judge_effects": "support of each effect",
     "add_profile_intervals": "intervals by profiles",
     "fit_passive_networks": "passive networks",
     "cross_validate": "cross-validation",

@@ -12,8 +12,8 @@ from rippletwin.calibration.fit import Fit, Hypothesis
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.shaft_angles import align_shaft_angles
 from rippletwin.case.load import load_case
-from rippletwin.explanation.checks.cross_validation import Halves, score_held_out
-from rippletwin.explanation.fit_jobs import Continuation, FitJob, FromTheta, Workers
+from rippletwin.explanation.checks.cross_validation import score_held_out
+from rippletwin.explanation.fit_jobs import Continuation, FitJob, FromTheta, Workers, make_base
 from rippletwin.explanation.fit_starts import transfer_theta
 from rippletwin.explanation.search.stepwise_search import SHAFT_ORDER_EFFECTS
 from rippletwin.explanation.stages.preparation import observe_all, select_fitted_as
@@ -22,7 +22,6 @@ from rippletwin.twin.effects.base import Effect, Place
 from rippletwin.twin.effects.library import candidates, next_instance
 from rippletwin.twin.parameters import coordinates
 from rippletwin.twin.pump_line_coupling import couple_pump_to_line
-from rippletwin.twin.twin import Twin
 
 
 def fit_from_truth(case_folder: str | Path, truth: dict) -> dict:
@@ -115,15 +114,12 @@ def held_out_misfit(workers: Workers, fit: Fit, early: Sequence, late: Sequence)
     """
     coupled = couple_pump_to_line(fit.twin, workers.observations)
     if coupled is not None:
-        rig = workers.base.rig
-        workers = Workers(Twin(rig, coupled, uncertain_pump=True, changing_state=True), coupled)
+        workers = Workers(make_base(workers.base.rig, coupled), coupled)
         theta = transfer_theta(fit, fit.hypothesis, workers.base)
         (fit,) = workers.fit([FitJob(fit.hypothesis, FromTheta(theta))])
     data = workers.observations
-    halves: Halves | None = None
-    if len(data) == 1 and late:
-        (first,), (second,) = (select_fitted_as(h, fit.twin.rig, data) for h in (early, late))
-        halves = first, second
+    early, late = (select_fitted_as(half, fit.twin.rig, data) for half in (early, late))
+    halves = (early[0], late[0]) if len(data) == 1 and late else None
     return float(score_held_out(workers, fit, halves).misfit)
 
 

@@ -6,6 +6,8 @@ PRA and QR draw leaks and what else is not known.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from rippletwin.diagnosis.faults.library import FAULTS
@@ -54,12 +56,16 @@ class TaughtSignals:
         if kind in ("P", "Q"):
             signal = self._fixed_pressure if kind == "P" else self._fixed_flow
             once = np.array([self._one_revolution(signal(name)) for name in CLASSES])
-            return np.repeat(once[:, None], count, axis=1)
-        source = SignalSource(
+            return np.broadcast_to(once[:, None], (len(once), count, *once.shape[1:]))
+        drawn = self._source.draw(self._severities(), CLASSES, count, rng, anchored=kind == "PRA")
+        return drawn.flow if kind == "QR" else drawn.pressure
+
+    @cached_property
+    def _source(self) -> SignalSource:
+        """Of signals whose leaks are drawn."""
+        return SignalSource(
             self._twin, self._covariance, self._healthy, self._speed_hz, self._pressure
         )
-        drawn = source.draw(self._severities(), CLASSES, count, rng, anchored=kind == "PRA")
-        return drawn.flow if kind == "QR" else drawn.pressure
 
     def _fixed_pressure(self, name: str) -> np.ndarray:
         """Pressure (S, M') of a class, Pa."""

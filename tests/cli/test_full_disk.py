@@ -17,7 +17,7 @@ from made_results import DIAGNOSIS, VERDICT, made_change, write_results
 from rippletwin.case.load import load_case
 from rippletwin.cli import main
 from rippletwin.diagnosis import kept_answers, simulated_fault
-from rippletwin.diagnosis.pump_calibration import FittedTwin
+from rippletwin.diagnosis.pump_calibration import RecalibratedTwin
 from rippletwin.diagnosis.simulated_fault import SimulatedFault
 from rippletwin.explanation import explain
 from rippletwin.explanation.verdict import verdict_file
@@ -106,7 +106,7 @@ def test_answers_of_a_diagnosis_without_room(case, capsys, monkeypatch):
         return recording.label
 
     room = []
-    monkeypatch.setattr(kept_answers, "recalibrate_twin", lambda twin, *_: FittedTwin(twin))
+    monkeypatch.setattr(kept_answers, "recalibrate_twin", lambda twin, *_: RecalibratedTwin(twin))
     monkeypatch.setattr(kept_answers, "diagnose_one", diagnose)
     monkeypatch.setattr(kept_answers, "gather", made_change)
     monkeypatch.setattr(

@@ -18,7 +18,7 @@ from rippletwin.diagnosis import kept_answers
 from rippletwin.diagnosis.diagnose import select_recordings
 from rippletwin.diagnosis.faults.library import select_faults
 from rippletwin.diagnosis.kept_answers import diagnose_changed, digest
-from rippletwin.diagnosis.pump_calibration import FittedTwin
+from rippletwin.diagnosis.pump_calibration import RecalibratedTwin
 from rippletwin.twin.twin import Twin
 from run_script import run_script
 
@@ -48,7 +48,7 @@ def asked(monkeypatch):
 
     def refit(twin, healthy, read):
         done.append("twin")
-        return FittedTwin(twin)
+        return RecalibratedTwin(twin)
 
     def diagnose(diagnoser, recording, anchors, read):
         done.append(recording.label)
@@ -85,7 +85,7 @@ def test_how_far_the_fit_of_the_pump_converged_is_kept_with_the_twin(case, asked
     """A recording that is diagnosed later, by the twin that was kept, is doubted as the first."""
     gains = []
     monkeypatch.setattr(
-        kept_answers, "recalibrate_twin", lambda twin, *_: FittedTwin(twin, expected_gain=5.0)
+        kept_answers, "recalibrate_twin", lambda twin, *_: RecalibratedTwin(twin, expected_gain=5.0)
     )
 
     def diagnose(diagnoser, recording, *_):

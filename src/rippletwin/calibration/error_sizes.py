@@ -1,7 +1,7 @@
 """The most likely sizes of model error and source errors of `posterior`.
 
-They move without steps as the residual does. On a grid they would jump between two of its values,
-and a descent that estimates them anew after each of its steps would follow them to and fro.
+They change continuously with the residual. Sizes from a grid would jump between two of its values,
+and a descent that estimates them after each of its steps would then not converge.
 """
 
 from __future__ import annotations

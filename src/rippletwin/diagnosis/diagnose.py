@@ -17,7 +17,7 @@ from rippletwin.diagnosis.diagnosis import Diagnosis
 from rippletwin.diagnosis.faults.base import Fault
 from rippletwin.diagnosis.faults.library import select_faults
 from rippletwin.diagnosis.line_calibration import calibrate_line
-from rippletwin.diagnosis.pump_calibration import FittedTwin, calibrate_pump, one_each_point
+from rippletwin.diagnosis.pump_calibration import RecalibratedTwin, calibrate_pump, one_each_point
 from rippletwin.diagnosis.pump_flow import rebuild, with_fitted_pump
 from rippletwin.errors import InputError
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
@@ -60,7 +60,7 @@ def diagnose(
         if recalibrate:
             fitted = recalibrate_twin(twin, healthy_beside(case, recordings), read)
         else:
-            fitted = FittedTwin(twin)
+            fitted = RecalibratedTwin(twin)
         diagnoser = Diagnoser(fitted.twin, faults, anchored, fitted.expected_gain)
         for k, recording in enumerate(recordings):
             if progress:
@@ -94,7 +94,7 @@ def healthy_beside(case: Case, recordings: Sequence[Recording]) -> list[Recordin
     return [r for r in case.healthy if r.kind == "periodic" and r.label not in taken]
 
 
-def recalibrate_twin(twin: Twin, healthy: Sequence[Recording], read: ReadOnce) -> FittedTwin:
+def recalibrate_twin(twin: Twin, healthy: Sequence[Recording], read: ReadOnce) -> RecalibratedTwin:
     """The twin as it is, with its pump fitted to healthy recordings (`calibrate_pump`), or with its
     line fitted to them first (`calibrate_line`): whichever leaves least of the healthy ripples.
 
@@ -103,14 +103,14 @@ def recalibrate_twin(twin: Twin, healthy: Sequence[Recording], read: ReadOnce) -
     """
     observations = [read(each)[0] for each in healthy]
     if not observations or len(observations[0].values) < 2:
-        return FittedTwin(twin)
+        return RecalibratedTwin(twin)
     points = one_each_point(observations)
     # A line that is right already would lose what it owes to the ripple: ratios between sensors say
     # nothing of the way from the pump to the first sensor.
     own = with_fitted_pump(twin)
     again = calibrate_line(twin, observations)
     lines = [own] if np.array_equal(own.theta, again.theta) else [own, again]
-    tried = [FittedTwin(twin), *(calibrate_pump(line, points) for line in lines)]
+    tried = [RecalibratedTwin(twin), *(calibrate_pump(line, points) for line in lines)]
     return min(tried, key=lambda each: healthy_misfit(each.twin, observations))
 
 

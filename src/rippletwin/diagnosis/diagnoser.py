@@ -36,7 +36,7 @@ class Diagnoser:
     """A twin and the faults to try; called with observations of all shaft orders.
 
     Where it is not `anchored`, recordings are compared with the twin's own healthy ripple.
-    `expected_gain` is that of the pump's fit (`FittedTwin`).
+    `expected_gain` is that of the pump's fit (`RecalibratedTwin`).
     """
 
     def __init__(

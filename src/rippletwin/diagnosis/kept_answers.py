@@ -36,7 +36,7 @@ from rippletwin.diagnosis.diagnosed_numbers import DiagnosedNumbers, from_plain,
 from rippletwin.diagnosis.diagnoser import Diagnoser
 from rippletwin.diagnosis.diagnosis_file import entry_of
 from rippletwin.diagnosis.faults.base import Fault
-from rippletwin.diagnosis.pump_calibration import FittedTwin
+from rippletwin.diagnosis.pump_calibration import RecalibratedTwin
 from rippletwin.twin.twin import Twin
 from rippletwin.twin.twin_file import from_dict, to_dict
 
@@ -104,7 +104,7 @@ def warnings_of(case: Case, twin: Twin) -> list[str]:
 
 def _recalibrated(
     twin: Twin, healthy: Sequence[Recording], read: ReadOnce, kept: Path, key: str
-) -> FittedTwin:
+) -> RecalibratedTwin:
     """`recalibrate_twin`, or the twin that was kept of it."""
     data = _read_json(kept / TWIN, key)
     if data is None:
@@ -112,7 +112,7 @@ def _recalibrated(
         data = {"key": key, "twin": to_dict(found.twin), "expected_gain": found.expected_gain}
         store.write_text(kept / TWIN, json.dumps(data) + "\n")
     # one way for both: the same answers to the last digit
-    return FittedTwin(from_dict(data["twin"]), data["expected_gain"])
+    return RecalibratedTwin(from_dict(data["twin"]), data["expected_gain"])
 
 
 def _read_answer(path: Path, key: str) -> Answer | None:

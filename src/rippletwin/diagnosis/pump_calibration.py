@@ -62,7 +62,7 @@ class _Flow:
     error: np.ndarray
 
 
-class FittedTwin(NamedTuple):
+class RecalibratedTwin(NamedTuple):
     """A twin, and what one more step of its pump's fit promises to add to the log posterior (as in
     `laplace.Mode`); 0 where the pump was not fitted."""
 
@@ -70,7 +70,7 @@ class FittedTwin(NamedTuple):
     expected_gain: float = 0.0
 
 
-def calibrate_pump(twin: Twin, healthy: Sequence) -> FittedTwin:
+def calibrate_pump(twin: Twin, healthy: Sequence) -> RecalibratedTwin:
     """The twin with its pump fitted to the flow of healthy periodic observations.
 
     Its line must be known; the pump's numbers are no parameters (`with_fitted_pump`). It is
@@ -79,13 +79,13 @@ def calibrate_pump(twin: Twin, healthy: Sequence) -> FittedTwin:
     twin = with_fitted_pump(twin)
     pump = dict(twin.rig.pump)
     if set(pump) == {"pistons"}:
-        return FittedTwin(twin)
+        return RecalibratedTwin(twin)
     fitted, gain = twin, 0.0
     for _ in range(ROUNDS):  # the flow is told beside the chambers of the pump that was fitted
         flows = [_measured_flow(fitted, observation) for observation in healthy]
         numbers, gain = _fit_numbers(pump, twin.rig.fluid, flows)
         fitted = rebuild(twin, replace(twin.rig, pump=pump | numbers), theta=twin.theta)
-    return FittedTwin(fitted, gain)
+    return RecalibratedTwin(fitted, gain)
 
 
 def _fit_numbers(pump: dict, fluid: Fluid, flows: Sequence[_Flow]) -> tuple[dict, float]:

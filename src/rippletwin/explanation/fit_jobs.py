@@ -19,6 +19,7 @@ from rippletwin.calibration.fit import Fit, Hypothesis
 from rippletwin.calibration.frequency_continuation import fit_hypothesis, refine
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.score_test import ScoreTest
+from rippletwin.case.model import Rig
 from rippletwin.explanation.fit_starts import scan_starts, transfer_theta, weak_effect_starts
 from rippletwin.twin.twin import Twin
 
@@ -170,6 +171,12 @@ def job_without_effect(fit: Fit, k: int, base: Twin) -> FitJob:
     """The job that refits without effect k, from the mode of `fit`."""
     rest = fit.without(k)
     return FitJob(rest, FromTheta(transfer_theta(fit, rest, base)))
+
+
+def make_base(rig: Rig, observations: Sequence) -> Twin:
+    """The twin without effects, not yet fitted, as explaining fits it to observations:
+    the pump's numbers and the line's state in each recording are parameters."""
+    return Twin(rig, observations, uncertain_pump=True, changing_state=True)
 
 
 class Workers:

@@ -77,9 +77,8 @@ def read_results(
     faulty = [r for r in case.recordings if r.kind == "periodic" and r.state != "healthy"]
     if diagnosis is None and faulty:
         named = []
-        if all(
-            r.state != "unknown" for r in faulty
-        ):  # diagnose takes known faults where named alone
+        # diagnose takes known faults only where they are named
+        if all(r.state != "unknown" for r in faulty):
             named = [word for r in faulty for word in ("--recording", r.label)]
         told = _command("diagnose", case, DIAGNOSED, *named)
         missing.append(f"There is no diagnosis: {told}")

@@ -229,7 +229,7 @@ class ForwardModel:
                 whole, self.twin.load_factor(theta), tolerance=tolerance
             )
             state = [x[seen] for x in solver.solve(whole, solve_load)]
-            self.solved = solver.solved and wide._orifice_is_solved
+            self.solved = solver.solved and wide.load.solved
             positions, outflow = whole.outflows
             network.outflows = positions, outflow[:, seen]
             if self.load.orifice is not None:
@@ -237,18 +237,14 @@ class ForwardModel:
         else:
             wide, seen = self._extended_for_orifice
             pressure, flow = wide.load.balance(whole, self.twin.load_factor(theta))
-            self.solved = wide._orifice_is_solved
+            self.solved = wide.load.solved
             network.load = "state", (pressure[seen], flow[seen])
 
     def _balance_load(self, network: FrequencyDomainLine, theta: np.ndarray) -> None:
         """Set the full-amplitude state at the load of `network`, whose outflows are given."""
         if self.load.orifice is not None:
             network.load = "state", tuple(self.load.balance(network, self.twin.load_factor(theta)))
-        self.solved = self._orifice_is_solved
-
-    @property
-    def _orifice_is_solved(self) -> bool:
-        return self.load.orifice is None or self.load.orifice.solved
+        self.solved = self.load.solved
 
     @cached_property
     def _extended_for_compliance(self) -> tuple[ForwardModel, np.ndarray]:

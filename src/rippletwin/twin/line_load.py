@@ -80,6 +80,11 @@ class LineLoad:
         )
         return coefficient / (2 * np.sqrt(pressure - self._rig.load.back_pressure))
 
+    @property
+    def solved(self) -> bool:
+        """Whether the last balance of the orifice is a steady state; True without an orifice."""
+        return self.orifice is None or self.orifice.solved
+
     def balance(
         self, network: FrequencyDomainLine, factor: float, **accuracy: float
     ) -> tuple[np.ndarray, np.ndarray]:

@@ -46,7 +46,7 @@ def fit_passive_networks(workers: Workers, best: Fit) -> list[Fit]:
         return []
     networks = library.candidates(workers.base.rig, named=False)
     jobs = [extension_job(best, network) for network in networks]
-    if best.model_error <= GOOD_MODEL_ERROR:  # only the ripple errs: it may be the pump
+    if best.model_error <= GOOD_MODEL_ERROR:  # only the ripple errs, and the pump may make that
         scored = workers.map(score_extension, jobs)
         jobs = [job for promise, job in scored if promise >= MIN_PROMISE]
         if not jobs:

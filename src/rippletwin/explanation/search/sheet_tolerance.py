@@ -18,7 +18,7 @@ import numpy as np
 
 from rippletwin.calibration.fit import Fit
 from rippletwin.case.model import Rig, Uncertainty
-from rippletwin.explanation.fit_jobs import Continuation, FitJob, FromTheta, Workers
+from rippletwin.explanation.fit_jobs import Continuation, FitJob, FromTheta, Workers, make_base
 from rippletwin.explanation.fit_starts import common_coordinates
 from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR
@@ -78,7 +78,7 @@ def fit_with_wider_tolerances(workers: Workers, best: Fit) -> Fit | None:
     rig = scale_tolerances(best.twin.rig, WIDER if scale == 1.0 else scale)
     if rig.tolerance_scale > SCALES[-1] * (1.0 + ROUNDING):
         return None
-    base = Twin(rig, workers.observations, uncertain_pump=True, changing_state=True)
+    base = make_base(rig, workers.observations)
     twin = base.with_(effects=best.hypothesis)
     starts = (
         FromTheta(coordinates(twin.parameters, best.twin.values())),

@@ -13,6 +13,7 @@ from functools import partial
 from threadpoolctl import threadpool_limits
 
 from rippletwin.case.model import Case, Recording, Rig
+from rippletwin.explanation.fit_jobs import make_base
 from rippletwin.explanation.localise.phase_modulation import with_phase_modulation
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
@@ -58,7 +59,7 @@ def prepare_base(
     data = select_fitted_frequencies(
         with_phase_modulation(observations, modulation), rig, highest_hz
     )
-    base = Twin(rig, data, uncertain_pump=True, changing_state=True)
+    base = make_base(rig, data)
     # Simulate the pump before the worker processes start: the twin keeps the result.
     ForwardModel(base, data)
     return base, data

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.case.model import Rig
-from rippletwin.explanation.fit_jobs import FitJob, open_workers
+from rippletwin.explanation.fit_jobs import FitJob, make_base, open_workers
 from rippletwin.explanation.localise.phase_modulation import (
     estimate_phase_modulation,
     modulation_differs,
@@ -113,7 +113,7 @@ def _resume_search(
     data = coupled or stage.observations
     for _ in range(MAX_RESUMED):
         rig = scale_tolerances(stage.base.rig, scale)
-        base = Twin(rig, data, uncertain_pump=True, changing_state=True)
+        base = make_base(rig, data)
         with open_workers(base, data, processes) as workers:
             search = resume_search(workers, with_coordinates_of(search, base), progress)
         stage = Stage(base, data, stage.modulation)
