@@ -1,7 +1,6 @@
 """The page that reports a trial."""
 
 from collections import Counter
-from collections.abc import Iterable
 
 import numpy as np
 
@@ -9,6 +8,7 @@ from concealed import summary
 from concealed.failures import circumstance, failure
 from concealed.score import PLAIN_CHANGE
 from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
+from rippletwin.learning.markdown import markdown_table
 
 KINDS = {
     "none": "no effect, nominal values within tolerance",
@@ -42,16 +42,22 @@ def report_page(rows: list[dict], origin: dict) -> str:
             *_terms(),
             "## Scores",
             "",
-            *_table(("score", "target", "result"),
-                    [(s.what, s.target, str(s.rate)) for s in summary.score_table(rows)]),
+            markdown_table(
+                ("score", "target", "result"),
+                [(s.what, s.target, str(s.rate)) for s in summary.score_table(rows)],
+            ),
             "## Comparison with simpler methods",
             "",
             *_methods(rows),
             "## Single effects by the change that they make in the ripple",
             "",
-            *_table(("change", "alarm", "effect or its class named"),
-                    [(_span(b.low, b.high), str(b.alarm), str(b.right))
-                     for b in summary.power_table(rows)]),
+            markdown_table(
+                ("change", "alarm", "effect or its class named"),
+                [
+                    (_span(b.low, b.high), str(b.alarm), str(b.right))
+                    for b in summary.power_table(rows)
+                ],
+            ),
             "![power](figures/power.png)",
             "",
             "## Stated probabilities of named effects",
@@ -59,11 +65,25 @@ def report_page(rows: list[dict], origin: dict) -> str:
             *_probabilities(rows),
             "## Line parameters in cases with an effect",
             "",
-            *_table(("quantity", "twin", "mean error", "rms error",
-                     "within two stated standard deviations"),
-                    [(e.quantity, e.twin, f"{100 * e.mean:+.2f} %", _percent(e.rms, 2),
-                      str(e.within))
-                     for e in summary.line_error_table(rows)]),
+            markdown_table(
+                (
+                    "quantity",
+                    "twin",
+                    "mean error",
+                    "rms error",
+                    "within two stated standard deviations",
+                ),
+                [
+                    (
+                        e.quantity,
+                        e.twin,
+                        f"{100 * e.mean:+.2f} %",
+                        _percent(e.rms, 2),
+                        str(e.within),
+                    )
+                    for e in summary.line_error_table(rows)
+                ],
+            ),
             "![errors](figures/line_errors.png)",
             "",
             "## Misfits",
@@ -74,12 +94,12 @@ def report_page(rows: list[dict], origin: dict) -> str:
             *_failures(rows),
             "## All cases",
             "",
-            *_cases(rows),
+            _cases(rows),
             "## Numerics of the recordings",
             "",
-            *_numerics(rows, origin["checks"]),
+            _numerics(rows, origin["checks"]),
         ]
-    )  # fmt: skip
+    )
 
 
 def _origin(rows: list[dict], origin: dict) -> list[str]:
@@ -92,14 +112,16 @@ def _origin(rows: list[dict], origin: dict) -> list[str]:
         f"{origin['number']} by `snakemake concealed`.{changed} The protocol is in "
         "docs/concealed.md.",
         "",
-        *_table(("kind", "cases", "what"),
-                [(f"`{kind}`", str(counts[kind]), what) for kind, what in KINDS.items()]),
+        markdown_table(
+            ("kind", "cases", "what"),
+            [(f"`{kind}`", str(counts[kind]), what) for kind, what in KINDS.items()],
+        ),
         f"The tool took {np.median(seconds):.0f} s a case (median, one process; "
         f"{seconds.min():.0f} to {seconds.max():.0f} s, 95 % of the cases at most "
         f"{np.quantile(seconds, 0.95):.0f} s) and {np.median(seconds / points):.0f} s for each "
         "operating point (median).",
         "",
-    ]  # fmt: skip
+    ]
 
 
 def _terms() -> list[str]:
@@ -125,24 +147,34 @@ def _terms() -> list[str]:
 
 def _methods(rows: list[dict]) -> list[str]:
     return [
-        *_table(("method", "no effect: alarm", "plain single effects: effect or its class named",
-                 "outside the library: given a name"),
-                [tuple(map(str, method)) for method in summary.method_table(rows)]),
+        markdown_table(
+            (
+                "method",
+                "no effect: alarm",
+                "plain single effects: effect or its class named",
+                "outside the library: given a name",
+            ),
+            [tuple(map(str, method)) for method in summary.method_table(rows)],
+        ),
         "Calibration alone names no effect; its alarm is a calibrated misfit above 5 %.",
         "",
-    ]  # fmt: skip
+    ]
 
 
 def _probabilities(rows: list[dict]) -> list[str]:
     return [
-        *_table(("stated", "mean stated", "right"),
-                [(_span(b.low, b.high), f"{b.mean:.3f}", str(b.right))
-                 for b in summary.reliability_table(rows)]),
+        markdown_table(
+            ("stated", "mean stated", "right"),
+            [
+                (_span(b.low, b.high), f"{b.mean:.3f}", str(b.right))
+                for b in summary.reliability_table(rows)
+            ],
+        ),
         f"Brier score {summary.brier_score(rows):.3f}.",
         "",
         "![probabilities](figures/probabilities.png)",
         "",
-    ]  # fmt: skip
+    ]
 
 
 def _misfits(rows: list[dict]) -> list[str]:
@@ -151,20 +183,28 @@ def _misfits(rows: list[dict]) -> list[str]:
         return _percent(np.nanmedian(values), 2) if np.any(np.isfinite(values)) else "-"
 
     columns = {
-        "misfit_nominal": "nominal", "misfit_calibrated": "calibrated", "absorbed": "absorbed",
-        "misfit_corrected": "corrected", "held_out_calibrated": "held out, calibrated",
-        "held_out_corrected": "held out, corrected", "oracle_held_out": "held out, from the truth",
+        "misfit_nominal": "nominal",
+        "misfit_calibrated": "calibrated",
+        "absorbed": "absorbed",
+        "misfit_corrected": "corrected",
+        "held_out_calibrated": "held out, calibrated",
+        "held_out_corrected": "held out, corrected",
+        "oracle_held_out": "held out, from the truth",
         "floor": "floor",
-    }  # fmt: skip
+    }
     return [
         "Medians over the cases.",
         "",
-        *_table(("cases", *columns.values()),
-                [(group, *(median(name, kinds) for name in columns))
-                 for group, kinds in GROUPS.items()]),
+        markdown_table(
+            ("cases", *columns.values()),
+            [
+                (group, *(median(name, kinds) for name in columns))
+                for group, kinds in GROUPS.items()
+            ],
+        ),
         "![misfits](figures/misfit.png)",
         "",
-    ]  # fmt: skip
+    ]
 
 
 def _failures(rows: list[dict]) -> list[str]:
@@ -172,16 +212,35 @@ def _failures(rows: list[dict]) -> list[str]:
     if not failed:
         return ["None.", ""]
     return [
-        *_table(
-            ("case", "failure", "true effects", "named", "change", "oracle log evidence",
-             "cause by the data", "held out, corrected", "held out, from the truth", "points",
-             "sensors", "noise, Pa"),
+        markdown_table(
+            (
+                "case",
+                "failure",
+                "true effects",
+                "named",
+                "change",
+                "oracle log evidence",
+                "cause by the data",
+                "held out, corrected",
+                "held out, from the truth",
+                "points",
+                "sensors",
+                "noise, Pa",
+            ),
             [
                 (
-                    str(row["case"]), what, row["effects"] or "-", row["named"] or "-",
-                    _percent(row['change'], 1), _log_evidence(row), circumstance(row),
-                    _percent(row['held_out_corrected'], 2), _percent(row['oracle_held_out'], 2),
-                    str(row["points"]), str(row["sensors"]), f"{row['noise']:.0f}",
+                    str(row["case"]),
+                    what,
+                    row["effects"] or "-",
+                    row["named"] or "-",
+                    _percent(row["change"], 1),
+                    _log_evidence(row),
+                    circumstance(row),
+                    _percent(row["held_out_corrected"], 2),
+                    _percent(row["oracle_held_out"], 2),
+                    str(row["points"]),
+                    str(row["sensors"]),
+                    f"{row['noise']:.0f}",
                 )
                 for row, what in failed
             ],
@@ -193,34 +252,56 @@ def _failures(rows: list[dict]) -> list[str]:
             for row, _ in failed
         ),
         "",
-    ]  # fmt: skip
+    ]
 
 
-def _cases(rows: list[dict]) -> list[str]:
-    return _table(
-        ("case", "kind", "true effects", "change", "oracle log evidence", "verdict", "named",
-         "failure", "nominal", "calibrated", "absorbed", "corrected", "held out, corrected",
-         "held out, from the truth"),
+def _cases(rows: list[dict]) -> str:
+    return markdown_table(
+        (
+            "case",
+            "kind",
+            "true effects",
+            "change",
+            "oracle log evidence",
+            "verdict",
+            "named",
+            "failure",
+            "nominal",
+            "calibrated",
+            "absorbed",
+            "corrected",
+            "held out, corrected",
+            "held out, from the truth",
+        ),
         [
             (
-                str(row["case"]), row["kind"], row["effects"] or "-", _percent(row['change'], 1),
-                _log_evidence(row), row["verdict"], row["named"] or "-", failure(row) or "-",
-                _percent(row['misfit_nominal'], 1), _percent(row['misfit_calibrated'], 2),
-                _percent(row['absorbed'], 0), _percent(row['misfit_corrected'], 2),
-                _percent(row['held_out_corrected'], 2), _percent(row['oracle_held_out'], 2),
+                str(row["case"]),
+                row["kind"],
+                row["effects"] or "-",
+                _percent(row["change"], 1),
+                _log_evidence(row),
+                row["verdict"],
+                row["named"] or "-",
+                failure(row) or "-",
+                _percent(row["misfit_nominal"], 1),
+                _percent(row["misfit_calibrated"], 2),
+                _percent(row["absorbed"], 0),
+                _percent(row["misfit_corrected"], 2),
+                _percent(row["held_out_corrected"], 2),
+                _percent(row["oracle_held_out"], 2),
             )
             for row in rows
         ],
-    )  # fmt: skip
+    )
 
 
-def _numerics(rows: list[dict], checks: list[dict]) -> list[str]:
+def _numerics(rows: list[dict], checks: list[dict]) -> str:
     refined = [
         {"truth": f"finer meshes, case {row['case']}"} | row["mesh"]
         for row in rows
         if row["mesh"] is not None
     ]
-    return _table(
+    return markdown_table(
         ("checked against", "error, Pa rms", "allowed, Pa rms"),
         [(c["truth"], f"{c['error']:.0f}", f"{c['allowed']:.0f}") for c in [*checks, *refined]],
     )
@@ -233,11 +314,6 @@ def _log_evidence(row: dict) -> str:
 
 def _percent(share: float | None, digits: int) -> str:
     return "-" if share is None else f"{100 * share:.{digits}f} %"
-
-
-def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> list[str]:
-    lines = [head, ("---",) * len(head), *rows]
-    return ["| " + " | ".join(cells) + " |" for cells in lines] + [""]
 
 
 def _span(low: float, high: float) -> str:

@@ -39,14 +39,18 @@ from rippletwin.spectra.noise import noise_mad
 from rippletwin.spectra.observation import revolutions_of
 from rippletwin.twin.twin import Twin
 
-ARCHITECTURE = "cnn1d_150_50"
+ARCHITECTURE = "cnn1d_341_100"
 SAMPLES = 3072  # of a revolution
-DRAWS, HELD_OUT = 400, 100  # simulated revolutions of a class, to learn and for p-values
-SAMPLES_OF_A_DRAW = 2
+DRAWS, HELD_OUT = 1600, 100  # simulated revolutions of a class, to learn and for p-values
 FLOW_KINDS = ("Q", "QR")
 BANDWIDTH_HZ = 1500.0  # of the estimated flow, the workflow's default
 SETTINGS = TrainingSettings(
-    batch_size=8, learning_rate=0.003, target_loss=0.05, patience=1, max_epochs=40
+    batch_size=16,
+    falling_rate=True,
+    target_loss=0.05,
+    patience=1,
+    plateau=30,
+    max_epochs=30,
 )
 SEED = 0
 
@@ -70,7 +74,7 @@ def teach_network(kind: str, twin: Twin, covariance: np.ndarray | None, case: Ca
         learnt, others = (band_limit(s, speed_hz, band) for s in (learnt, others))
         flow = _flow_windows(recording, case.rig, twin, speed_hz)[:, 0]
         noise = noise_of_flow(flow, np.zeros(len(flow)), np.ones(len(flow), bool))
-    x, y = augment(learnt, DRAWS * SAMPLES_OF_A_DRAW, noise, rng)
+    x, y = augment(learnt, DRAWS, noise, rng)
     held_out, _ = each_once(others, noise, rng)
     network, _ = train(build(ARCHITECTURE, x.shape[1]), x, y, SETTINGS, SEED)
     seen, unseen = (activation_statistics(network, samples) for samples in (x, held_out))

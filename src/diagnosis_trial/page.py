@@ -1,13 +1,12 @@
 """The page that reports a diagnosis trial."""
 
-from collections.abc import Iterable
-
 import numpy as np
 
 from concealed.summary import Rate, percent
 from diagnosis_trial import detection, summary
 from diagnosis_trial.figures import file_name
 from diagnosis_trial.score import LEAK_STATES
+from rippletwin.learning.markdown import markdown_table
 
 FAILURES_SHOWN = 60
 
@@ -30,14 +29,14 @@ def report_page(rows: list[dict], origin: dict) -> str:
             "Over the recordings that a column has answered: a network does so at the operating "
             "point that it has learnt.",
             "",
-            *_scores(columns),
+            _scores(columns),
             *(_scores_of_shared(shared) if len(shared) < len(rows) else []),
             "## Smallest leak found at 5 % false alarms",
             "",
             "The alarm is raised above the log odds against healthy that 5 % of the healthy "
             "recordings exceed. Intervals are from resampled rigs.",
             "",
-            *_smallest(columns),
+            _smallest(columns),
             "![detection](figures/detection.png)",
             "",
             *(line for name, chosen in columns.items() for line in _column(name, chosen)),
@@ -55,15 +54,17 @@ def _origin(rows: list[dict], columns: dict[str, list[dict]], origin: dict) -> l
         "",
         "A column is METHOD@TWIN.",
         "",
-        *_table(("column", "misfit of the twin", "twin, s", "diagnosis of a rig, s"),
-                [(name, *_costs(made)) for name, made in columns.items()]),
+        markdown_table(
+            ("column", "misfit of the twin", "twin, s", "diagnosis of a rig, s"),
+            [(name, *_costs(made)) for name, made in columns.items()],
+        ),
         "* Medians over rigs, the misfit with its least and greatest.",
         "* Shares are followed by their exact 95 % confidence interval (Clopper and Pearson). It "
         "takes recordings as independent.",
         "* *Change*: norm of the change that the state makes in the sensors' ripple, over that of "
         "the healthy ripple, from two runs of the rig.",
         "",
-    ]  # fmt: skip
+    ]
 
 
 def _costs(rows: list[dict]) -> tuple[str, str, str]:
@@ -78,29 +79,31 @@ def _costs(rows: list[dict]) -> tuple[str, str, str]:
     return text, *(f"{np.median(x):.0f}" if x else "" for x in (fit, seconds))
 
 
-def _scores(columns: dict[str, list[dict]]) -> list[str]:
+def _scores(columns: dict[str, list[dict]]) -> str:
     tables = [summary.score_table(rows) for rows in columns.values()]
     lines = [
         (same[0].what, same[0].target, *(str(score.rate) for score in same))
         for same in zip(*tables, strict=True)
     ]
     answered = "Recordings answered", "", *(str(len(rows)) for rows in columns.values())
-    return _table(("score", "target", *columns), [answered, *lines])
+    return markdown_table(("score", "target", *columns), [answered, *lines])
 
 
 def _scores_of_shared(rows: list[dict]) -> list[str]:
     heading = "## Scores over the recordings that all columns have answered"
-    return [heading, "", *_scores(summary.columns_of(rows))]
+    return [heading, "", _scores(summary.columns_of(rows))]
 
 
-def _smallest(columns: dict[str, list[dict]]) -> list[str]:
+def _smallest(columns: dict[str, list[dict]]) -> str:
     """The table of smallest leaks, by change and by area, with intervals over rigs."""
     rng = np.random.default_rng(0)
     lines = [
         (name, *line) for name, rows in columns.items() for line in _smallest_of_column(rows, rng)
     ]
     heads = [f"found in {100 * p:.0f} %" for p in detection.FOUND]
-    return _table(("column", "alarm above", "false alarms", "fault", "severity", *heads), lines)
+    return markdown_table(
+        ("column", "alarm above", "false alarms", "fault", "severity", *heads), lines
+    )
 
 
 def _smallest_of_column(rows: list[dict], rng: np.random.Generator) -> list[tuple[str, ...]]:
@@ -139,27 +142,39 @@ def _column(name: str, rows: list[dict]) -> list[str]:
     return [
         f"## {name}",
         "",
-        *_table(("state", "change", "state right", "not called healthy"),
-                [(b.state, _span(b.low, b.high), str(b.right), str(b.noticed))
-                 for b in summary.change_table(rows)]),
+        markdown_table(
+            ("state", "change", "state right", "not called healthy"),
+            [
+                (b.state, _span(b.low, b.high), str(b.right), str(b.noticed))
+                for b in summary.change_table(rows)
+            ],
+        ),
         f"![confusion](figures/{picture}.png)",
         "",
-        *_table(("fault", "stated over true, median", "5 to 95 %", "95 % intervals that hold"),
-                [(e.fault, f"{e.median:.2f}", f"{e.low:.2f} to {e.high:.2f}", str(e.coverage))
-                 for e in summary.severity_table(rows)]),
-        *_table(("stated probability", "mean", "state right"),
-                [(f"{b.low:g} to {b.high:g}", f"{b.mean:.4f}", str(b.right))
-                 for b in summary.reliability_table(rows)]),
+        markdown_table(
+            ("fault", "stated over true, median", "5 to 95 %", "95 % intervals that hold"),
+            [
+                (e.fault, f"{e.median:.2f}", f"{e.low:.2f} to {e.high:.2f}", str(e.coverage))
+                for e in summary.severity_table(rows)
+            ],
+        ),
+        markdown_table(
+            ("stated probability", "mean", "state right"),
+            [
+                (f"{b.low:g} to {b.high:g}", f"{b.mean:.4f}", str(b.right))
+                for b in summary.reliability_table(rows)
+            ],
+        ),
         f"![severities](figures/{severities}.png)",
         "",
-        *_rigs(rows),
+        _rigs(rows),
         "Recordings that were diagnosed wrongly:",
         "",
         *_failures(rows),
-    ]  # fmt: skip
+    ]
 
 
-def _rigs(rows: list[dict]) -> list[str]:
+def _rigs(rows: list[dict]) -> str:
     lines = []
     for rig in sorted({row["rig"] for row in rows}):
         of_rig = [row for row in rows if row["rig"] == rig]
@@ -173,7 +188,7 @@ def _rigs(rows: list[dict]) -> list[str]:
                 f"{sum(row['right'] for row in of_rig)} of {len(of_rig)}",
             )
         )
-    return _table(("rig", "misfit of the twin", "known states right", "all right"), lines)
+    return markdown_table(("rig", "misfit of the twin", "known states right", "all right"), lines)
 
 
 def _failures(rows: list[dict]) -> list[str]:
@@ -190,19 +205,10 @@ def _failures(rows: list[dict]) -> list[str]:
     ]
     heads = ("rig, recording", "truth", "change", "told", "stated probability")
     left = len(wrong) - len(lines)
-    return [*_table(heads, lines), *([f"And {left} more.", ""] if left else [])]
+    return [markdown_table(heads, lines), *([f"And {left} more.", ""] if left else [])]
 
 
 def _span(low: float, high: float) -> str:
     if high == np.inf:
         return f"{100 * low:g} % and more"
     return f"below {100 * high:g} %" if low == 0 else f"{100 * low:g} to {100 * high:g} %"
-
-
-def _table(heads: Iterable[str], lines: Iterable[Iterable[str]]) -> list[str]:
-    heads, lines = list(heads), list(lines)
-    if not lines:
-        return ["None.", ""]
-    rule = "|" + "---|" * len(heads)
-    return [*("| " + " | ".join(cells) + " |" for cells in [heads]), rule,
-            *("| " + " | ".join(cells) + " |" for cells in lines), ""]  # fmt: skip

@@ -168,6 +168,27 @@ def test_one_scale_for_everything():
     assert np.abs(predict(pascal, x / 2)[1] - predict(pascal, x)[1]).max() > 0.01
 
 
+@pytest.mark.parametrize("falls", [False, True])
+def test_the_learning_rate_falls_as_half_a_cosine(monkeypatch, falls):
+    """The rates of the steps, against the formula written out: one rate an epoch, the first whole;
+    without the setting all are whole."""
+    rates = []
+
+    class Watched(torch.optim.Adam):
+        def step(self, *arguments):
+            rates.append(self.param_groups[0]["lr"])
+            return super().step(*arguments)
+
+    monkeypatch.setattr(torch.optim, "Adam", Watched)
+    x, y = ripples(10, 0)
+    settings = TrainingSettings(
+        batch_size=32, learning_rate=1e-3, falling_rate=falls, target_loss=0.0, max_epochs=4
+    )
+    train(build("cnn1d_341_100", 1), x, y, settings, 0)
+    expected = 1e-3 * (1 + np.cos(np.pi * np.arange(4) / 4)) / 2 if falls else np.full(4, 1e-3)
+    assert list(dict.fromkeys(np.round(rates, 9))) == list(dict.fromkeys(np.round(expected, 9)))
+
+
 def test_threads_follow_the_settings():
     """What a scheduler grants is what torch uses."""
     x, y = ripples(5, 0)

@@ -6,6 +6,7 @@ from job import open_log
 from rippletwin import store
 from rippletwin.learning.architectures import ARCHITECTURES
 from rippletwin.learning.conformal import PROMISED_RATE
+from rippletwin.learning.markdown import markdown_table
 
 report_progress = open_log(snakemake)
 names = store.load(snakemake.input.recorded).labels
@@ -17,9 +18,7 @@ cells = pd.concat(
 )
 table = 100 * cells.pivot_table(index="network", columns="recording", values="unlike", sort=False)
 table.columns = [names[k] for k in table.columns]
-head = ["Network", *table.columns]
-lines = [head, ["---"] * len(head)]
-lines += [[network, *(f"{share:.0f}" for share in row)] for network, *row in table.itertuples()]
+lines = [[network, *(f"{share:.0f}" for share in row)] for network, *row in table.itertuples()]
 store.write_text(
     snakemake.output.page,
     f"""# Windows that are unlike everything simulated
@@ -28,6 +27,6 @@ Share of the windows of each recording that networks call unlike, per cent over 
 windows {100 * PROMISED_RATE:.0f} % are called so; this is promised by their conformal p-values.
 
 """
-    + "".join("| " + " | ".join(line) + " |\n" for line in lines),
+    + markdown_table(["Network", *table.columns], lines),
 )
 report_progress(f"{len(table)} networks")

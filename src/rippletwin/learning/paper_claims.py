@@ -28,7 +28,7 @@ from scipy.stats import t as student
 
 from rippletwin.learning.accuracy import summarise
 from rippletwin.learning.architectures import ARCHITECTURES
-from rippletwin.learning.markdown import mark_unconverged, with_footnote
+from rippletwin.learning.footnote import mark_unconverged, with_footnote
 from rippletwin.learning.recording_accuracy import paired_interval
 
 EXPERIMENTAL = "experimental"  # the dataset of recordings, which no zero-shot claim concerns

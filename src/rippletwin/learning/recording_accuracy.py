@@ -14,7 +14,8 @@ from scipy.stats import binomtest
 
 from rippletwin.learning.accuracy import UNKNOWN
 from rippletwin.learning.architectures import ARCHITECTURES, CLASSES
-from rippletwin.learning.markdown import mark_unconverged, markdown_table, with_footnote
+from rippletwin.learning.footnote import mark_unconverged, with_footnote
+from rippletwin.learning.markdown import markdown_table
 
 CELL = ["architecture", "dataset"]
 MOST_SUBSETS = 2**14  # of differences whose means are taken

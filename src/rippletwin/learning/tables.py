@@ -9,7 +9,8 @@ import pandas as pd
 
 from rippletwin.learning.accuracy import summarise
 from rippletwin.learning.architectures import ARCHITECTURES, CLASSES
-from rippletwin.learning.markdown import mark_unconverged, markdown_table, with_footnote
+from rippletwin.learning.footnote import mark_unconverged, with_footnote
+from rippletwin.learning.markdown import markdown_table
 
 DOMAIN_TITLES = {"time": "Time domain", "image": "Time-frequency domain"}
 
@@ -31,10 +32,7 @@ def accuracy_table(
     known = {*paper["dataset"], *rows["dataset"]}
     datasets = [dataset for dataset in datasets if dataset in known]
 
-    lines = [
-        "| Input | Architecture | " + " | ".join(datasets) + " |",
-        "|---|---|" + "---|" * len(datasets),
-    ]
+    lines = []
     domain = None
     for name, architecture in ARCHITECTURES.items():
         first = DOMAIN_TITLES[architecture.domain] if architecture.domain != domain else ""
@@ -45,8 +43,8 @@ def accuracy_table(
             if (name, dataset) in theirs:
                 cell += f" ({theirs[name, dataset]})"
             cells.append(cell)
-        lines.append(f"| {first} | {architecture.title} | " + " | ".join(cells) + " |")
-    return with_footnote("\n".join(lines) + "\n")
+        lines.append((first, architecture.title, *cells))
+    return with_footnote(markdown_table(["Input", "Architecture", *datasets], lines))
 
 
 def cost_table(
@@ -63,22 +61,22 @@ def cost_table(
     cells, means = _cells(table), table.set_index(["architecture", "dataset"])["mean"]
     ran = [name for name in ARCHITECTURES if name in set(rows["architecture"])]
     head = [title for without, plus in pairs for title in (without, plus, "cost")]
-    lines = ["| Architecture | " + " | ".join(head) + " |", "|---|" + "---|" * len(head)]
+    lines = []
     for name in ran:
         line = []
         for pair in pairs:
             without, plus = (means.get((name, dataset), np.nan) for dataset in pair)
             cost = "–" if np.isnan(plus - without) else f"{plus - without:+.1f}"
             line += [*(cells.get((name, dataset), "–") for dataset in pair), cost]
-        lines.append(f"| {ARCHITECTURES[name].title} | " + " | ".join(line) + " |")
+        lines.append((ARCHITECTURES[name].title, *line))
     line = []
     for pair in pairs:
         both = pd.DataFrame({d: means.xs(d, level="dataset") for d in pair}).dropna()
         without, plus = (both[dataset].mean() for dataset in pair)
         numbers = f"{without:.1f}", f"{plus:.1f}", f"{plus - without:+.1f}"
         line += numbers if len(both) else ["–"] * 3
-    lines.append("| mean of networks | " + " | ".join(line) + " |")
-    return with_footnote("\n".join(lines) + "\n")
+    lines.append(("mean of networks", *line))
+    return with_footnote(markdown_table(["Architecture", *head], lines))
 
 
 def answer_table(answers: pd.DataFrame) -> str:

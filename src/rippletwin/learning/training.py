@@ -27,6 +27,7 @@ from rippletwin.learning.networks import Classifier
 class TrainingSettings:
     batch_size: int = 32
     learning_rate: float = 1e-3
+    falling_rate: bool = False  # to zero at max_epochs, as half a cosine (Loshchilov, Hutter 2017)
     validation_fraction: float = 0.2
     target_loss: float = 0.02  # nats a sample
     patience: int = 2  # epochs in a row below target_loss
@@ -86,6 +87,7 @@ def train(
     ripple = images[fit] - network.architecture.silence
     network.scale.fill_(float(ripple.square().mean().sqrt()) or 1.0)
     optimiser = torch.optim.Adam(network.parameters(), lr=settings.learning_rate, fused=True)
+    fall = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, settings.max_epochs)
     history, best = History(arithmetic=str(arithmetic)), None
 
     for epoch in range(settings.max_epochs):
@@ -101,6 +103,8 @@ def train(
             loss.backward()
             optimiser.step()
             total += float(loss.detach()) * len(batch)
+        if settings.falling_rate:
+            fall.step()
         with arithmetic.mixed():
             logits = _logits(network, images[validation]).float()
         history.training_loss.append(total / len(fit))
