@@ -31,7 +31,7 @@ def seal_at(
     ]
     segments = cut_with_gradient(
         walled,
-        true["sensors"],
+        fitted_positions(true),
         true["fluid"]["kinematic_viscosity"],
         nuisance["temperature_drop"],
         kelvin,
@@ -70,6 +70,12 @@ def seal_at(
     }
 
 
+def fitted_positions(true: dict) -> list[float]:
+    """Where sensors, branches and effects sit on the line, m from the pump."""
+    fitted = [*true.get("branches", []), *true.get("effects", [])]
+    return [*true["sensors"], *(each["position"] for each in fitted if "position" in each)]
+
+
 def true_pump(known: dict, nuisance: dict, kelvin: float = 0.0) -> dict:
     """Values of the true pump that differ from the data sheet's.
 
@@ -95,16 +101,20 @@ def true_pump(known: dict, nuisance: dict, kelvin: float = 0.0) -> dict:
 
 
 def cut_with_gradient(
-    segments: list[dict], sensors: list[float], viscosity: float, drop: float, kelvin: float
+    segments: list[dict], fitted: list[float], viscosity: float, drop: float, kelvin: float
 ) -> list[dict]:
-    """The segments cut at the sensors and into pieces, each at its own temperature.
+    """The segments cut where something is fitted, and into pieces, each at its own temperature.
 
-    It falls by `drop`, K, evenly from pump to load and is `kelvin` above average in the middle.
+    The network has a node at every fitting in any case. A cut anywhere near one would leave a pipe
+    so short that it needs tiny time steps.
+
+    The temperature falls by `drop`, K, evenly from pump to load and is `kelvin` above average in
+    the middle.
     """
     ends = np.concatenate([[0.0], np.cumsum([s["length"] for s in segments])])
     pieces = []
     for k, segment in enumerate(segments):
-        inside = [x for x in sensors if ends[k] < x < ends[k + 1]]
+        inside = sorted(x for x in fitted if ends[k] < x < ends[k + 1])
         joints = [ends[k], *inside, ends[k + 1]]
         for start, stop in pairwise(joints):
             count = int(np.ceil((stop - start) / LONGEST_PIECE))

@@ -13,6 +13,7 @@ from virtualrig.nuisance_case import (
     record_nuisance_case,
     true_ripples,
 )
+from virtualrig.rig import build
 
 COUNT, COMMIT, NUMBER = 60, "fixed", 1
 
@@ -48,6 +49,16 @@ def test_a_concealed_effect_comes_on_top_of_the_nuisance_physics():
             assert (effect["arguments"]["compliance"], effect["arguments"]["time"]) in walls
         else:
             assert effect["name"] in names
+
+
+def test_no_fitting_leaves_a_sliver_of_pipe():
+    """Time steps follow from the shortest pipe, so a millimetre between a fitting and a change of
+    temperature would cost hours. Effects keep their distance, and no other pipe is as short."""
+    for kind in ("single", "pair", "outside"):
+        for case in cases(kind):
+            rig = case.rig
+            network = build(rig.sheet, seal_at(rig.sheet, rig.true, rig.nuisance)).network
+            assert min(pipe.length for pipe in network.pipes) > 0.03, case.truth["effects"]
 
 
 def test_nuisance_physics_is_part_of_the_truth():
