@@ -116,7 +116,7 @@ def _origin(rows: list[dict], origin: dict) -> list[str]:
             ("kind", "cases", "what"),
             [(f"`{kind}`", str(counts[kind]), what) for kind, what in KINDS.items()],
         ),
-        f"The tool took {np.median(seconds):.0f} s a case (median, one process; "
+        f"The tool took {np.median(seconds):.0f} s of one core a case (median; "
         f"{seconds.min():.0f} to {seconds.max():.0f} s, 95 % of the cases at most "
         f"{np.quantile(seconds, 0.95):.0f} s) and {np.median(seconds / points):.0f} s for each "
         "operating point (median).",

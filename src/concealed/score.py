@@ -51,7 +51,7 @@ def score_case(truth: dict, verdict: dict, baselines: dict, oracle: dict = NO_OR
         held_out_calibrated, held_out_corrected   the verdict's, of data that were left out
         line_errors      {"calibrated", "corrected"}: see `line_errors`
         baselines        {"bic", "sparse", "recalibrate"}: see `score_baseline`
-        seconds          run time of the tool
+        seconds          processor time of the tool, s
     """
     true, named = truth["effects"], named_effects(verdict)
     nuisance = truth.get("nuisance", [])

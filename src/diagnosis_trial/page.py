@@ -58,7 +58,7 @@ def _origin(rows: list[dict], columns: dict[str, list[dict]], origin: dict) -> l
             ("column", "misfit of the twin", "twin, s", "diagnosis of a rig, s"),
             [(name, *_costs(made)) for name, made in columns.items()],
         ),
-        "* Medians over rigs, the misfit with its least and greatest.",
+        "* Medians over rigs, the misfit with its least and greatest; seconds of one core.",
         "* Shares are followed by their exact 95 % confidence interval (Clopper and Pearson). It "
         "takes recordings as independent.",
         "* *Change*: norm of the change that the state makes in the sensors' ripple, over that of "

@@ -8,8 +8,8 @@ Its arguments are a case, an output folder and the columns, METHOD@TWIN. METHOD 
     P, PR, PRA, Q, QR     a network that the twin teaches (`diagnosis_trial.networks`)
 
 and TWIN one of `diagnosis_trial.twins`. Writes diagnosis.json, column -> the content of a file of
-`rippletwin diagnose`, and run.json, column -> the seconds that twin and diagnoses took and the
-twin's misfit. It runs in one process: its confinement has no shared memory.
+`rippletwin diagnose`, and run.json, column -> the processor seconds that twin and diagnoses took
+and the twin's misfit. It runs in one process: its confinement has no shared memory.
 """
 
 import json
@@ -71,9 +71,9 @@ def diagnose_by(method: str, kind: str, fitted: FittedTwin, case: Case) -> dict:
 
 
 def timed(work: Callable, *arguments) -> tuple:
-    """What `work` returns, and the seconds that it took."""
-    started = time.perf_counter()
-    return work(*arguments), time.perf_counter() - started
+    """What `work` returns, and the processor seconds that it took."""
+    started = time.process_time()
+    return work(*arguments), time.process_time() - started
 
 
 def unknown_labels(case_folder: str) -> list[str]:
