@@ -44,13 +44,14 @@ SAMPLES = 3072  # of a revolution
 DRAWS, HELD_OUT = 1600, 100  # simulated revolutions of a class, to learn and for p-values
 FLOW_KINDS = ("Q", "QR")
 BANDWIDTH_HZ = 1500.0  # of the estimated flow, the workflow's default
+EPOCHS = 30  # no plateau ends a training before its learning rate has fallen: most is learnt then
 SETTINGS = TrainingSettings(
     batch_size=16,
     falling_rate=True,
     target_loss=0.05,
     patience=1,
-    plateau=30,
-    max_epochs=30,
+    plateau=EPOCHS,
+    max_epochs=EPOCHS,
 )
 SEED = 0
 
