@@ -13,6 +13,7 @@ rule train:
     priority: priority_of
     resources:
         mem_mb=4000,
+        trainings=1,  # `--resources trainings=N` limits how many share a GPU
     params:
         seeds=config["seeds"],
         settings=lambda wildcards: config["training"][

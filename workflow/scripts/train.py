@@ -13,7 +13,8 @@ from rippletwin.learning.architectures import CLASSES
 from rippletwin.learning.arithmetic import choose_arithmetic
 from rippletwin.learning.dataset import split_by_time
 from rippletwin.learning.networks import build
-from rippletwin.learning.training import TrainingSettings, train
+from rippletwin.learning.side_by_side import train_all
+from rippletwin.learning.training import TrainingSettings, train_stepwise
 from rippletwin.learning.windows import first_of_each_state
 
 report_progress = open_log(snakemake)
@@ -34,12 +35,11 @@ def samples(path):
     return data.signal.values[kept], np.array([CLASSES.index(s) for s in state])
 
 
-weights, histories = [], []
-for seed in range(params.seeds):
+def train_seed(seed):
+    """The training of one seed, not yet begun."""
     x, y = samples(paths[min(seed, len(paths) - 1)])
-    network = build(snakemake.wildcards.architecture, channels=x.shape[1])
-    network, history = train(
-        network,
+    return train_stepwise(
+        build(snakemake.wildcards.architecture, channels=x.shape[1]),
         x,
         y,
         settings,
@@ -47,10 +47,14 @@ for seed in range(params.seeds):
         lambda epoch, so_far: print(f"epoch {epoch}: {so_far.validation_loss[-1]:.4f}"),
         arithmetic,
     )
+
+
+weights, histories = [], []
+for network, history in train_all(map(train_seed, range(params.seeds)), arithmetic.device):
     weights.append(network.state_dict())
     histories.append(asdict(history))
     report_progress(
-        f"seed {seed + 1} of {params.seeds}: {history.epochs} epochs in {arithmetic}, "
+        f"seed {len(weights)} of {params.seeds}: {history.epochs} epochs in {arithmetic}, "
         f"{history.reason}, validation accuracy {history.best_accuracy:.1%}"
     )
 # Through an open file: by name, torch writes the name into the file.

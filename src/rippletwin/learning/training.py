@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,6 +21,7 @@ from torch import nn
 
 from rippletwin.learning.arithmetic import FLOAT32, Arithmetic
 from rippletwin.learning.networks import Classifier
+from rippletwin.learning.training_steps import TrainingSteps
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,10 @@ class History:
         return self.validation_accuracy[self.best_epoch]
 
 
+Training = Generator[None, None, tuple[Classifier, History]]
+"""A training under way: it yields after every step, and returns the network with its history."""
+
+
 def train(
     network: Classifier,
     x: np.ndarray,
@@ -76,38 +81,59 @@ def train(
     epoch. The returned network is on the processor. Sets torch's thread count to
     ``settings.threads``. Raises ValueError where a class has no sample in one of the two parts.
     """
+    return finish(train_stepwise(network, x, y, settings, seed, progress, arithmetic))
+
+
+def finish(training: Training) -> tuple[Classifier, History]:
+    """Take all steps of a training that are left."""
+    while True:
+        try:
+            next(training)
+        except StopIteration as end:
+            return end.value
+
+
+def train_stepwise(
+    network: Classifier,
+    x: np.ndarray,
+    y: np.ndarray,
+    settings: TrainingSettings,
+    seed: int,
+    progress: Callable[[int, History], None] | None = None,
+    arithmetic: Arithmetic = FLOAT32,
+) -> Training:
+    """As ``train``, but halting after every step, so that several trainings can take turns."""
     torch.set_num_threads(settings.threads)
     rng = np.random.default_rng(seed)
     fit, validation = stratified_split(y, settings.validation_fraction, rng)
     device = arithmetic.device
     images = torch.as_tensor(x, dtype=torch.float32, device=device)
     labels = torch.as_tensor(y, device=device)
+    del x  # on a GPU, its memory serves the next training
     initialise(network, seed)
     network.to(device)
     ripple = images[fit] - network.architecture.silence
     network.scale.fill_(float(ripple.square().mean().sqrt()) or 1.0)
-    optimiser = torch.optim.Adam(network.parameters(), lr=settings.learning_rate, fused=True)
-    fall = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, settings.max_epochs)
+    del ripple
+    steps = TrainingSteps(
+        network, images, labels, settings.learning_rate, settings.batch_size, arithmetic
+    )
+    fall = torch.optim.lr_scheduler.CosineAnnealingLR(steps.optimiser, settings.max_epochs)
     history, best = History(arithmetic=str(arithmetic)), None
 
     for epoch in range(settings.max_epochs):
         network.train()
-        order, total = torch.as_tensor(rng.permutation(fit), device=device), 0.0
+        order = torch.as_tensor(rng.permutation(fit), device=device)
         for batch in order.split(settings.batch_size):
             if len(batch) < 2:  # batch normalisation needs two
                 continue
-            with arithmetic.mixed():
-                logits = network(images[batch])
-            loss = nn.functional.cross_entropy(logits.float(), labels[batch])
-            optimiser.zero_grad()
-            loss.backward()
-            optimiser.step()
-            total += float(loss.detach()) * len(batch)
+            steps.take(batch)
+            yield
         if settings.falling_rate:
             fall.step()
         with arithmetic.mixed():
             logits = _logits(network, images[validation]).float()
-        history.training_loss.append(total / len(fit))
+        history.training_loss.append(steps.pop_loss() / len(fit))
         loss = nn.functional.cross_entropy(logits, labels[validation])
         history.validation_loss.append(float(loss))
         history.validation_accuracy.append(
