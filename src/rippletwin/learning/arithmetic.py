@@ -58,7 +58,7 @@ def choose_arithmetic(gpu: str | bool = "auto", precision: str = "auto") -> Arit
 
 
 def choose_device(gpu: str | bool = "auto") -> torch.device:
-    """The GPU that torch finds, or the processor.
+    """The GPU that torch finds, or the processor; float32 is made to mean 24 bits on it.
 
     gpu  True, False, or "auto": a GPU where there is one
 
@@ -69,7 +69,10 @@ def choose_device(gpu: str | bool = "auto") -> torch.device:
     found = torch.cuda.is_available()
     if gpu is True and not found:
         raise ValueError("gpu is true, but torch finds none: set it to auto or false")
-    return torch.device("cuda" if found and gpu else "cpu")
+    if not (found and gpu):
+        return torch.device("cpu")
+    torch.backends.cudnn.allow_tf32 = False  # convolutions would have 11 bits
+    return torch.device("cuda")
 
 
 def multiplies_bfloat16() -> bool:
