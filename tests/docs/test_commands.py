@@ -84,6 +84,10 @@ NOT_RUN = {
         "it takes minutes",
         "python benchmarks/bench_mesh.py --help",
     ),
+    "python benchmarks/gpu_training.py": (
+        "it needs a GPU",
+        "python benchmarks/gpu_training.py --help",
+    ),
     "python benchmarks/constants.py results/concealed constants --cases 8": (
         "it needs a finished trial",
         "python benchmarks/constants.py --help",
