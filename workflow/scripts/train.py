@@ -23,30 +23,26 @@ settings = TrainingSettings(**params.settings, threads=snakemake.threads)
 arithmetic = choose_arithmetic(params.gpu, params.precision)
 
 
-def samples(path):
-    """x and y of a store; a recorded cylinder fault has the severity that scoring gives it."""
+def samples(path):  # a recorded cylinder fault has the severity that scoring gives it
     data = store.load(path)
     if "label" in data:
         return data.signal.values, data.label.values
     kept, _ = split_by_time(np.bincount(data.recording), params.learnt_share)
-    kept = kept[first_of_each_state(data.state.values, data.recording.values)[kept]]
-    kept = kept[data.state.values[kept] != UNKNOWN]  # nothing to learn from an unknown state
-    state = np.where(data.state == "C", params.cylinder, data.state)[kept]
-    return data.signal.values[kept], np.array([CLASSES.index(s) for s in state])
+    is_learnt = first_of_each_state(data.state.values, data.recording.values)
+    kept = kept[(is_learnt & (data.state.values != UNKNOWN))[kept]]  # no unknown state teaches
+    classes = np.where(data.state == "C", params.cylinder, data.state)[kept]
+    return data.signal.values[kept], np.array([*map(CLASSES.index, classes)])
+
+
+def report_epoch(epoch, so_far):
+    print(f"epoch {epoch}: {so_far.validation_loss[-1]:.4f}")
 
 
 def train_seed(seed):
     """The training of one seed, not yet begun."""
     x, y = samples(paths[min(seed, len(paths) - 1)])
-    return train_stepwise(
-        build(snakemake.wildcards.architecture, channels=x.shape[1]),
-        x,
-        y,
-        settings,
-        seed,
-        lambda epoch, so_far: print(f"epoch {epoch}: {so_far.validation_loss[-1]:.4f}"),
-        arithmetic,
-    )
+    network = build(snakemake.wildcards.architecture, channels=x.shape[1])
+    return train_stepwise(network, x, y, settings, seed, report_epoch, arithmetic)
 
 
 weights, histories = [], []
