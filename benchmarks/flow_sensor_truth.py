@@ -221,7 +221,7 @@ def main() -> None:
                     ]
                     cells = [
                         str(count), name, "the rig's" if not noise else f"+ {noise / 1e3:g} kPa",
-                        method, *(f"{100 * e:.1f} %" for e in errors), f"{spent:.1f}", accuracy,
+                        method, *errors, f"{spent:.1f}", accuracy,
                     ]  # fmt: skip
                     print("| " + " | ".join(cells) + " |", flush=True)
 

@@ -8,14 +8,12 @@ import torch
 
 from job import open_log
 from rippletwin import store
-from rippletwin.learning.accuracy import UNKNOWN
 from rippletwin.learning.architectures import CLASSES
 from rippletwin.learning.arithmetic import choose_arithmetic
-from rippletwin.learning.dataset import split_by_time
 from rippletwin.learning.networks import build
 from rippletwin.learning.side_by_side import train_all
 from rippletwin.learning.training import TrainingSettings, train_stepwise
-from rippletwin.learning.windows import first_of_each_state
+from rippletwin.learning.windows import early_known
 
 report_progress = open_log(snakemake)
 params, paths = snakemake.params, snakemake.input.samples
@@ -23,15 +21,14 @@ settings = TrainingSettings(**params.settings, threads=snakemake.threads)
 arithmetic = choose_arithmetic(params.gpu, params.precision)
 
 
-def samples(path):  # a recorded cylinder fault has the severity that scoring gives it
+def samples(path):
+    """x and y of a store; a recorded cylinder fault has the severity that scoring gives it."""
     data = store.load(path)
     if "label" in data:
         return data.signal.values, data.label.values
-    kept, _ = split_by_time(np.bincount(data.recording), params.learnt_share)
-    is_learnt = first_of_each_state(data.state.values, data.recording.values)
-    kept = kept[(is_learnt & (data.state.values != UNKNOWN))[kept]]  # no unknown state teaches
-    classes = np.where(data.state == "C", params.cylinder, data.state)[kept]
-    return data.signal.values[kept], np.array([*map(CLASSES.index, classes)])
+    kept = early_known(data.state.values, data.recording.values, params.learnt_share)
+    state = np.where(data.state == "C", params.cylinder, data.state)[kept]
+    return data.signal.values[kept], np.array([CLASSES.index(s) for s in state])
 
 
 def report_epoch(epoch, so_far):
