@@ -133,10 +133,11 @@ class ForwardModel:
     def _make_linear(self, theta: np.ndarray) -> FrequencyDomainLine:
         twin, rig = self.twin, self.twin.rig
         v = twin.arrays(theta)
+        viscosity = self._viscosity(theta, v)
         series = np.array(
-            [self._series(k, d, v.viscosity) for k, d in enumerate(v.diameters)], dtype=complex
+            [self._series(k, d, viscosity) for k, d in enumerate(v.diameters)], dtype=complex
         )
-        shunt = self._state_factor(theta) * shunt_admittance(
+        shunt = self._state(theta) ** -2.0 * shunt_admittance(
             self.s,
             density=rig.fluid.density,
             wave_speed=v.wave_speeds[:, None],
@@ -155,13 +156,13 @@ class ForwardModel:
             sensor_factor=v.gains,
         )
         if twin.effects:
-            state = self.line_state(v)
+            line = self.line_state(theta, v)
             for effect, place, values in twin.applied_effects(theta):
-                effect.apply(network, state, values, place)
+                effect.apply(network, line, values, place)
         return network
 
-    def _state_factor(self, theta: np.ndarray) -> np.ndarray | float:
-        """What the state of each recording makes of shunt admittances, (..., F); `theta` may be
+    def _state(self, theta: np.ndarray) -> np.ndarray | float:
+        """Factor (..., F) on the wave speeds while each recording was made; `theta` may be
         (P, B)."""
         if not self.twin.changing_state:
             return 1.0
@@ -169,19 +170,27 @@ class ForwardModel:
         for o, part in zip(self.observations, self.slices):
             k = self.twin.index.get(f"state[{o.label}]")
             if k is not None:
-                speed = self.twin.parameters[k].value(theta[k])
-                factor[..., part] = np.asarray(speed**-2.0)[..., None]
+                factor[..., part] = np.asarray(self.twin.parameters[k].value(theta[k]))[..., None]
         return factor
 
-    def line_state(self, v: Arrays) -> LineState:
-        """The numbers of the line that effects need, with `v` of `Twin.arrays`."""
+    def _viscosity(self, theta: np.ndarray, v: Arrays) -> np.ndarray | float:
+        """Kinematic viscosity (..., F) while each recording was made, m2/s."""
+        k = self.twin.index.get("viscosity_slope")
+        if k is None:
+            return v.viscosity
+        slope = np.asarray(self.twin.parameters[k].value(theta[k]))[..., None]
+        return v.viscosity * self._state(theta) ** slope
+
+    def line_state(self, theta: np.ndarray, v: Arrays) -> LineState:
+        """The numbers of the line that effects need, with `v` of `Twin.arrays` at theta (P,) or
+        (P, B)."""
         fluid = self.twin.rig.fluid
         resistance = None
         if self.twin.rig.load.kind == "orifice":
             resistance = 1.0 / self.load.orifice_admittance(v.load)
         return LineState(
             density=fluid.density,
-            viscosity=v.viscosity,
+            viscosity=self._viscosity(theta, v),
             diameters=v.diameters,
             wave_speeds=v.wave_speeds,
             lengths=v.lengths,
@@ -197,9 +206,10 @@ class ForwardModel:
             effects=self.twin.effects,
         )
 
-    def _series(self, segment: int, diameter: float, viscosity: float) -> np.ndarray:
+    def _series(self, segment: int, diameter: float, viscosity: np.ndarray | float) -> np.ndarray:
+        key = diameter, np.asarray(viscosity).tobytes()
         last, value = self._series_cache.get(segment, (None, None))
-        if last != (diameter, viscosity):
+        if last != key:
             value = series_impedance(
                 self.s,
                 density=self.twin.rig.fluid.density,
@@ -207,7 +217,7 @@ class ForwardModel:
                 diameter=diameter,
                 friction=self.twin.friction,
             )
-            self._series_cache[segment] = (diameter, viscosity), value
+            self._series_cache[segment] = key, value
         return value
 
     def _balance(
