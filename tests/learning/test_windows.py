@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from rippletwin.errors import InputError
+from rippletwin.learning.dataset import UNKNOWN
 from rippletwin.learning.windows import (
     early_healthy,
+    early_known,
     first_of_each_state,
     noise_free_probes,
     pair_windows,
@@ -51,6 +53,15 @@ def test_the_first_recording_of_each_state_is_the_papers_protocol():
     recording = np.array([0, 0, 1, 1, 2, 3, 3, 4])
     kept = first_of_each_state(state, recording)
     assert kept.tolist() == [True, True, True, True, True, False, False, False]
+
+
+def test_early_known_windows_are_of_the_first_recording_of_their_state():
+    """By hand: the early half of the healthy recording and of the first slipper's; neither those of
+    a second slipper nor those of a recording that nobody knows."""
+    state = np.array(["H"] * 4 + ["S"] * 2 + [UNKNOWN] * 2 + ["S"] * 2)
+    recording = np.array([0] * 4 + [1] * 2 + [2] * 2 + [3] * 2)
+    assert early_known(state, recording, 0.5).tolist() == [0, 1, 4]
+    assert early_known(state, recording, 0.0).size == 0
 
 
 def test_early_healthy_windows_are_of_one_recording():

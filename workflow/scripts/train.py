@@ -4,18 +4,15 @@ import json
 from dataclasses import asdict
 
 import numpy as np
-import torch
 
 from job import open_log
 from rippletwin import store
-from rippletwin.learning.accuracy import UNKNOWN
 from rippletwin.learning.architectures import CLASSES
 from rippletwin.learning.arithmetic import choose_arithmetic
-from rippletwin.learning.dataset import split_by_time
-from rippletwin.learning.networks import build
+from rippletwin.learning.networks import build, save_tensors
 from rippletwin.learning.side_by_side import train_all
 from rippletwin.learning.training import TrainingSettings, train_stepwise
-from rippletwin.learning.windows import first_of_each_state
+from rippletwin.learning.windows import early_known
 
 report_progress = open_log(snakemake)
 params, paths = snakemake.params, snakemake.input.samples
@@ -28,9 +25,7 @@ def samples(path):
     data = store.load(path)
     if "label" in data:
         return data.signal.values, data.label.values
-    kept, _ = split_by_time(np.bincount(data.recording), params.learnt_share)
-    kept = kept[first_of_each_state(data.state.values, data.recording.values)[kept]]
-    kept = kept[data.state.values[kept] != UNKNOWN]  # nothing to learn from an unknown state
+    kept = early_known(data.state.values, data.recording.values, params.learnt_share)
     state = np.where(data.state == "C", params.cylinder, data.state)[kept]
     return data.signal.values[kept], np.array([CLASSES.index(s) for s in state])
 
@@ -57,7 +52,5 @@ for network, history in train_all(map(train_seed, range(params.seeds)), arithmet
         f"seed {len(weights)} of {params.seeds}: {history.epochs} epochs in {arithmetic}, "
         f"{history.reason}, validation accuracy {history.best_accuracy:.1%}"
     )
-# Through an open file: by name, torch writes the name into the file.
-with store.whole(snakemake.output.weights) as scratch, scratch.open("wb") as file:
-    torch.save(weights, file)
+save_tensors(weights, snakemake.output.weights)
 store.write_text(snakemake.output.history, json.dumps(histories, indent=1))

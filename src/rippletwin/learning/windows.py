@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rippletwin.errors import InputError
-from rippletwin.learning.dataset import remove_mean
+from rippletwin.learning.dataset import UNKNOWN, remove_mean, split_by_time
 
 
 def pair_windows(recording: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -48,6 +48,17 @@ def first_of_each_state(state: np.ndarray, recording: np.ndarray) -> np.ndarray:
     recording = np.asarray(recording)
     _, first, of_state = np.unique(np.asarray(state, str), return_index=True, return_inverse=True)
     return recording == recording[first][of_state]
+
+
+def early_known(state: np.ndarray, recording: np.ndarray, share: float) -> np.ndarray:
+    """Indices of the early `share` of the windows of the first recording of every known state.
+
+    state, recording : (n,) of each window; a recording's windows follow each other, and recordings
+    are numbered in their order.
+    """
+    early, _ = split_by_time(np.bincount(recording), share)
+    early = early[first_of_each_state(state, recording)[early]]
+    return early[np.asarray(state)[early] != UNKNOWN]
 
 
 def early_healthy(state: np.ndarray, recording: np.ndarray, share: float) -> np.ndarray:
