@@ -54,16 +54,13 @@ def run_case(number: int, kind: str, geometry: bool = False) -> dict:
     measured = np.concatenate([o.values for o in observations], axis=1)
     truth_misfit = relative_misfit(measured, np.concatenate(truth.predict(observations), axis=1))
     accepted = e.decision.accepted
-    actual = [{"name": effect.name, "element": place.element} for effect, place in truth.effects]
-    claims = assign_claims(actual, v["effects"], [set(names) for names in v["equivalents"]])
-    right = [true["name"] for true, claim in zip(actual, claims) if claim is not None]
-    wrong = [x["name"] for x in v["effects"] if not any(x is claim for claim in claims)]
+    right, wrong = compare_names(rig, truth, v)
     return {
         "number": number,
         "kind": kind,
         "points": len(observations),
         "sensors": len(rig.sensors),
-        "truth": [(true["name"], true["element"]) for true in actual],
+        "truth": [(effect.name, place.element) for effect, place in truth.effects],
         "oracle_log_evidence": known.evidence - e.search.base.evidence,
         "verdict": v["verdict"],
         "named": [(x["name"], x["element"]) for x in v["effects"]],
@@ -87,6 +84,22 @@ def run_case(number: int, kind: str, geometry: bool = False) -> dict:
         "misfit_of_truth": truth_misfit,
         "seconds": seconds,
     }
+
+
+def compare_names(rig, truth, verdict: dict) -> tuple[list[str], list[str]]:
+    """Names of the true effects that a verdict names, and of those that it names and are not there.
+
+    truth : the twin with the true values
+    """
+    actual = [
+        {"name": effect.name, "element": place.element}
+        | dict.fromkeys(("position", "position_nominal"), values.get("position"))
+        for effect, place, values in truth.effect_values(truth.theta)
+    ]
+    named, classes = verdict["effects"], [set(names) for names in verdict["equivalents"]]
+    claims = assign_claims(actual, named, classes, rig.length)
+    right = [true["name"] for true, claim in zip(actual, claims) if claim is not None]
+    return right, [x["name"] for x in named if not any(x is claim for claim in claims)]
 
 
 def is_place_right(rig, truth, e) -> bool | None:
