@@ -79,7 +79,8 @@ class TrainingSteps:
                 self._step(self.batch)
         torch.cuda.current_stream().wait_stream(stream)
         graph = torch.cuda.CUDAGraph()
-        with torch.cuda.graph(graph):
+        # Graphs recorded on one stream, torch's default, share the workspace of matrix products.
+        with torch.cuda.graph(graph, stream=stream):
             self._step(self.batch)
         self.network.load_state_dict(before)
         for state in self.optimiser.state.values():
