@@ -57,6 +57,7 @@ NOT_RUN = {
         NETWORK,
         "python -m pip install --help && test -s environment.txt",
     ),
+    "pip install jupyterlab": (NETWORK, "python -m pip install --help"),
     "pip install 'rippletwin[readers]'": (NETWORK, "python -m pip install --help"),
     "pip install snakemake-executor-plugin-slurm": (NETWORK, "python -m pip install --help"),
     "pip install snakemake-executor-plugin-kubernetes snakemake-storage-plugin-s3": (
@@ -121,7 +122,8 @@ NOT_RUN = {
         "it needs a finished trial",
         "rippletwin explain --help",
     ),
-    "rippletwin diagnose my_case --out my_case/diagnosed --networks results/my_case": (
+    "rippletwin diagnose my_case --out my_case/diagnosed --twin my_case/explained/twin.json"
+    " --networks results/my_case": (
         "it needs a finished run",
         "rippletwin diagnose --help",
     ),

@@ -64,10 +64,16 @@ def test_a_speed_fluctuation_is_named_with_its_own_interval(explanation, verdict
 
 
 def test_a_modulation_whose_fit_did_not_converge_is_not_established(explanation):
-    """The same fluctuation is supported only, and the sentence says why."""
-    rough = replace(explanation, shaft_orders=replace(MODULATION, converged=False))
-    for each, support in ((explanation, "established"), (rough, "supported")):
+    """The same fluctuation is supported only: something is missing and has no name, and the
+    sentence says why."""
+    silent = decided(explanation, "consistent")
+    rough = replace(silent, shaft_orders=replace(MODULATION, converged=False))
+    for each, support, verdict in (
+        (silent, "established", "named"),
+        (rough, "supported", "unexplained"),
+    ):
         result = verdict_dict(each)
+        assert result["verdict"] == verdict and result["mismatch"]["present"]
         assert [effect["support"] for effect in result["effects"]] == [support]
         assert ("did not converge" in result["sentence"]) is (each is rough)
 

@@ -30,18 +30,15 @@ def samples(path):
     return data.signal.values[kept], np.array([CLASSES.index(s) for s in state])
 
 
+def report_epoch(epoch, so_far):
+    print(f"epoch {epoch}: {so_far.validation_loss[-1]:.4f}")
+
+
 def train_seed(seed):
     """The training of one seed, not yet begun."""
     x, y = samples(paths[min(seed, len(paths) - 1)])
-    return train_stepwise(
-        build(snakemake.wildcards.architecture, channels=x.shape[1]),
-        x,
-        y,
-        settings,
-        seed,
-        lambda epoch, so_far: print(f"epoch {epoch}: {so_far.validation_loss[-1]:.4f}"),
-        arithmetic,
-    )
+    network = build(snakemake.wildcards.architecture, channels=x.shape[1])
+    return train_stepwise(network, x, y, settings, seed, report_epoch, arithmetic)
 
 
 weights, histories = [], []

@@ -66,7 +66,7 @@ class TrainingSteps:
         self.optimiser.zero_grad()
         loss.backward()
         self.optimiser.step()
-        self.loss += loss.detach() * len(batch)
+        self.loss += loss.detach().double() * len(batch)
 
     def _record(self) -> torch.cuda.CUDAGraph:
         """A graph of one step on ``self.batch``; the network is left as it was."""

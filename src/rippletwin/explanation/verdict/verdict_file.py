@@ -44,7 +44,8 @@ def verdict_dict(explanation: Explanation) -> dict:
     decision = e.decision
     verdict, shaft_effects = decision.verdict, _shaft_effects(e)
     if shaft_effects and verdict in NOTHING_MISSING:
-        verdict = "named"
+        is_named = any(effect["support"] == "established" for effect in shaft_effects)
+        verdict = "named" if is_named else "unexplained"
     entries = []
     if verdict in ("named", "ambiguous", "unexplained"):
         entries = effect_intervals(decision.accepted)
