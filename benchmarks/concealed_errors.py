@@ -20,8 +20,8 @@ from pathlib import Path
 import numpy as np
 
 from concealed.score import assign_claims, intervals_hold, named_effects
+from opened_trial import check_opened, open_truth
 from rippletwin.case.load import load_case
-from virtualrig.seal import open_seal_file
 
 QUANTITIES = ("delay", "impedance")
 TOLD = 3.0
@@ -56,7 +56,7 @@ def missed_intervals(trial: Path, rows: list[dict]) -> Iterator[str]:
     """A line for each interval of an effect that misses."""
     for row in rows:
         case = f"{row['case']:03d}"
-        truth = open_seal_file(trial / "seals" / f"{case}.json", trial / "keys" / case)
+        truth = open_truth(trial, case)
         verdict = json.loads((trial / "explained" / case / "verdict.json").read_text())
         classes = [set(names) for names in [*verdict["equivalents"], *truth["classes"]]]
         claims = assign_claims(truth["effects"], named_effects(verdict), classes, truth["length"])
@@ -92,8 +92,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("trial", type=Path, help="folder RESULTS/concealed of an opened trial")
     trial = parser.parse_args().trial
-    if not (trial / "rows.json").exists():
-        parser.error(f"{trial}: has no rows.json; run `snakemake concealed` to its end")
+    check_opened(parser, trial)
     rows = json.loads((trial / "rows.json").read_text())
     print(line_table(trial, rows), *missed_intervals(trial, rows), sep="\n")
     print(*disagreements(trial, rows), sep="\n")

@@ -16,6 +16,7 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from opened_trial import check_opened, open_truth
 from scaled_constants import scale_constant
 
 CONSTANTS = {
@@ -88,7 +89,6 @@ def explain_case(setting: str, case: Path, out: Path) -> None:
 def score(trial: Path, out: Path, setting: str, cases: list[str]) -> dict:
     """Counts over the cases: see the columns of `table`."""
     from concealed.score import named_effects, score_case
-    from virtualrig.seal import open_seal_file
 
     rows = []
     for case in cases:
@@ -96,7 +96,7 @@ def score(trial: Path, out: Path, setting: str, cases: list[str]) -> dict:
             json.loads((folder_of(out, setting, case) / name).read_text())
             for name in ("verdict.json", "baselines.json")
         )
-        truth = open_seal_file(trial / "seals" / f"{case}.json", trial / "keys" / case)
+        truth = open_truth(trial, case)
         row = score_case(truth, verdict, baselines)
         established = named_effects(verdict)
         wrong = [name for name in row["wrong"].split(" + ") if name]
@@ -166,8 +166,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="*", default=[], choices=list(CONSTANTS), metavar="NAME")
     parser.add_argument("--processes", type=int, default=2)
     options = parser.parse_args()
-    if not (options.trial / "rows.json").exists():
-        parser.error(f"{options.trial}: has no rows.json; run `snakemake concealed` to its end")
+    check_opened(parser, options.trial)
     cases = sorted(path.stem for path in (options.trial / "seals").glob("*.json"))[: options.cases]
     names = settings(options.only)
     run_settings(options.trial, options.out, names, cases, options.processes)

@@ -10,15 +10,14 @@ time: six sensors have many effects of their own.
 from __future__ import annotations
 
 import argparse
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from measured_case import copy_case
 from rippletwin.calibration import report
 from rippletwin.calibration.calibrate import Calibration, calibrate
-from rippletwin.case.load import load_case
 from rippletwin.case.model import Case, Load
 from rippletwin.explanation.explain import explain
 from rippletwin.explanation.verdict.verdict_file import write_verdict
@@ -27,15 +26,10 @@ from rippletwin.spectra.frequency_selection import select_fitted_frequencies
 from rippletwin.spectra.observation import observe
 from rippletwin.twin.twin import Twin
 
-DATA_SHEET = Path(__file__).resolve().parent.parent / "resources" / "duct" / "rig.yaml"
-
 
 def case(measured: Path, folder: Path) -> Case:
-    """The duct's case: the data sheet and the recorder's own file beside it."""
-    folder.mkdir(parents=True, exist_ok=True)
-    shutil.copy(DATA_SHEET, folder)
-    shutil.copy(measured / "empty.h5", folder)
-    return load_case(folder)
+    """The duct's case."""
+    return copy_case("duct", {"empty.h5": measured / "empty.h5"}, folder)
 
 
 def calibrated(duct: Case, load: str = "unknown", gain: bool = True) -> Calibration:

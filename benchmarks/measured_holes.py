@@ -10,14 +10,11 @@ lacks must turn up in what remains: its place and law are printed.
 from __future__ import annotations
 
 import argparse
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
-from rippletwin.calibration.misfit import score_fit
-from rippletwin.case.load import load_case
+from measured_case import copy_case
+from rippletwin.calibration.misfit import relative_misfit, score_fit
 from rippletwin.case.model import Case
 from rippletwin.explanation.explain import explain
 from rippletwin.explanation.verdict.verdict_file import write_verdict
@@ -26,17 +23,13 @@ from rippletwin.spectra.observation import observe
 from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.reflection import to_reflection
 
-DATA_SHEET = Path(__file__).resolve().parent.parent / "resources" / "hole_tube" / "rig.yaml"
 STATES = ("closed", "first_open")
 
 
 def case(measured: Path, state: str, folder: Path, runs: tuple[int, int] = (1, 2)) -> Case:
     """The tube's case with two runs of a state."""
-    folder.mkdir(parents=True, exist_ok=True)
-    shutil.copy(DATA_SHEET, folder)
-    for k, run in enumerate(runs, 1):
-        shutil.copy(measured / f"{state}_{run}.txt", folder / f"run_{k}.txt")
-    return load_case(folder)
+    files = {f"run_{k}.txt": measured / f"{state}_{run}.txt" for k, run in enumerate(runs, 1)}
+    return copy_case("hole_tube", files, folder)
 
 
 def unseen_run(measured: Path, state: str, run: int, seen: Case, folder: Path):
@@ -102,7 +95,7 @@ def main() -> None:
                 (accepted, [unseen]),
             )
         ]
-        between = np.linalg.norm(second - first) / np.linalg.norm(first)
+        between = relative_misfit(first, second)
         values = accepted.twin.values()
         effects = [
             f"{effect.name}" + (f" at {1e3 * x:.1f} mm" if (x := values.get(key)) else "")

@@ -9,17 +9,16 @@ twin.json and figures of the first.
 from __future__ import annotations
 
 import argparse
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from measured_case import copy_case
 from rippletwin.calibration.fit import Fit, Hypothesis
 from rippletwin.calibration.frequency_continuation import refine
-from rippletwin.calibration.misfit import score_fit
-from rippletwin.case.load import load_case
+from rippletwin.calibration.misfit import relative_misfit, score_fit
 from rippletwin.case.model import Case
 from rippletwin.explanation.checks.prior_sensitivity import widen_priors
 from rippletwin.explanation.explain import explain
@@ -32,7 +31,6 @@ from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.reflection import to_reflection
 from rippletwin.twin.twin import Twin
 
-DATA_SHEET = Path(__file__).resolve().parent.parent / "resources" / "air_tube" / "rig.yaml"
 ACOUSTICS: Hypothesis = (
     (EFFECTS["unsteady_friction"], Place("line")),
     (EFFECTS["thermal_boundary_layer"], Place("line")),
@@ -42,10 +40,7 @@ ACOUSTICS: Hypothesis = (
 
 def case(run: Path, folder: Path) -> Case:
     """The tube's case with one of the measurements."""
-    folder.mkdir(parents=True, exist_ok=True)
-    shutil.copy(DATA_SHEET, folder)
-    shutil.copy(run, folder / "measured.txt")
-    return load_case(folder)
+    return copy_case("air_tube", {"measured.txt": run}, folder)
 
 
 def fit_effects(rig, data, effects: Hypothesis) -> Fit:
@@ -83,8 +78,7 @@ def with_wave_speed_of(fit: Fit, observation) -> tuple[Fit, float]:
 def reflection_difference(a, b) -> float:
     """Relative difference of two runs' reflection coefficients at the frequencies both have."""
     _, i, j = np.intersect1d(a.frequency_hz, b.frequency_hz, return_indices=True)
-    first, second = to_reflection(a.values[:, i]), to_reflection(b.values[:, j])
-    return float(np.linalg.norm(second - first) / np.linalg.norm(first))
+    return relative_misfit(to_reflection(a.values[:, i]), to_reflection(b.values[:, j]))
 
 
 def main() -> None:

@@ -25,11 +25,6 @@ from virtualrig.source import constant_pressure_flow
 MODULUS_STEP, TIMING_STEP_DEG = 0.1, 1.0  # a unit of each coordinate; the modulus is relative
 
 
-def harmonics(flow: np.ndarray, orders: np.ndarray) -> np.ndarray:
-    """Complex peak amplitudes of one revolution's flow at the shaft `orders`."""
-    return peak_amplitudes(flow)[orders]
-
-
 def aligned(true: np.ndarray, nominal: np.ndarray, orders: np.ndarray) -> np.ndarray:
     """`true` at the shaft angle at which it is nearest to `nominal`."""
     angles = np.linspace(-0.04, 0.04, 4001)
@@ -52,7 +47,7 @@ def analyse(index: int) -> tuple[float, float, np.ndarray, np.ndarray]:
             constant_pressure_flow(p, fluid.density, point.speed_rpm, point.load_pressure)
             for p in (nominal, true)
         ]
-        a, b = (harmonics(flow, orders) for flow in flows)
+        a, b = (peak_amplitudes(flow)[orders] for flow in flows)
         modulus = nominal.bulk_modulus
         ends = {
             "bulk_modulus": (modulus * np.exp(MODULUS_STEP), modulus * np.exp(-MODULUS_STEP)),

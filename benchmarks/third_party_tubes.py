@@ -30,7 +30,7 @@ from openwind_tubes import (
     with_noise,
     write_case,
 )
-from rippletwin.calibration.misfit import score_fit
+from rippletwin.calibration.misfit import relative_misfit, score_fit
 from rippletwin.case.load import load_case
 from rippletwin.explanation.explain import explain
 from rippletwin.explanation.verdict.verdict_file import write_verdict
@@ -194,7 +194,7 @@ def main() -> None:
         base, accepted = explanation.search.base, explanation.decision.accepted
         before, after = (score_fit(fit, data).misfit for fit in (base, accepted))
         first, second = to_reflection(fitted.recordings[0].spectra[:, 0])
-        between = float(np.linalg.norm(second - first) / np.linalg.norm(first))
+        between = relative_misfit(first, second)
         result = score(tube, verdict["effects"])
         scores.append((kind, result))
         unseen_misfits.append((between, before, after))

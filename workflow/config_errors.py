@@ -31,13 +31,10 @@ def check_config(config: dict, schema: Path) -> None:
         raise WorkflowError("\n".join([*lines, "config/README.md explains every key."]))
 
 
-def check_names(key: str, names: Sequence[str], known: Sequence[str], remedy: str = "") -> None:
-    """Raise WorkflowError that names each of `names`, values of the config key, that is not known.
-
-    remedy : what to do where the name is meant as it is.
-    """
+def check_names(key: str, names: Sequence[str], known: Sequence[str]) -> None:
+    """Raise WorkflowError that names each value of a config key, `names`, that is not known."""
     lines = [
-        f"config: {key}: {name!r} is not known. {_near(name, known)}{remedy}"
+        f"config: {key}: {name!r} is not known. {_near(name, known)}"
         for name in names
         if name not in known
     ]

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from concealed.summary import Rate, power_table, reliability_table
+from concealed.summary import Rate, line_errors_of, power_table, reliability_table
 from rippletwin.figures import style
 
 LEAST_CHANGE = 1e-4  # smaller changes are drawn here
@@ -17,11 +17,11 @@ KINDS = ("none", "off", "single", "indistinguishable", "pair", "outside")
 SHORT_NAMES = {"indistinguishable": "alike"}
 
 
-def draw_figures(rows: list[dict], folder: str | Path, suffix: str = ".png") -> list[Path]:
+def draw_figures(rows: list[dict], folder: str | Path) -> list[Path]:
     """Write every figure of the scored cases into `folder`; returns their paths."""
     paths = []
     for name, make in FIGURES.items():
-        paths.append(Path(folder) / f"{name}{suffix}")
+        paths.append(Path(folder) / f"{name}.png")
         style.save(make(rows), paths[-1])
     return paths
 
@@ -43,7 +43,7 @@ def draw_power(rows: list[dict]) -> Figure:
         for n, b in enumerate(bins):
             low, high = max(b.low, LEAST_CHANGE), min(b.high, GREATEST_CHANGE)
             x = np.sqrt(low * high) * 1.08 ** (2 * k - 1)
-            _error_bar(ax, x, getattr(b, name), colour, marker, label if n == 0 else None)
+            draw_rate(ax, x, getattr(b, name), colour, marker, label=None if n else label)
         cases = [row for row in rows if row["kind"] in ("single", "indistinguishable")]
         x = [max(row["change"], LEAST_CHANGE) for row in cases]
         y = [(1.04 + 0.04 * k if row[name] else -0.04 - 0.04 * k) for row in cases]
@@ -92,15 +92,8 @@ def draw_line_errors(rows: list[dict]) -> Figure:
             ("calibrated", style.CALIBRATED, "-"),
             ("corrected", style.CORRECTED, "--"),
         ):
-            errors = np.sort(
-                [
-                    abs(error["relative"])
-                    for row in rows
-                    if row["effects"]
-                    for error in row["line_errors"][twin]
-                    if error["quantity"] == quantity
-                ]
-            )
+            found = line_errors_of(rows, quantity, twin)
+            errors = np.sort([abs(error["relative"]) for error in found])
             if len(errors) and errors[-1] > 0:
                 share = np.arange(1, len(errors) + 1) / len(errors)
                 ax.step(errors, share, dash, color=colour, label=twin, where="post")
@@ -122,7 +115,7 @@ def draw_probabilities(rows: list[dict]) -> Figure:
     ax = axes[0, 0]
     ax.plot([0, 1], [0, 1], color=style.NEUTRAL, lw=0.8)
     for b in reliability_table(rows, PROBABILITY_EDGES):
-        _error_bar(ax, b.mean, b.right, style.CORRECTED, "o")
+        draw_rate(ax, b.mean, b.right, style.CORRECTED, "o")
     ax.set_xlabel("stated probability, pooled at 0.5, 0.9 and 0.99")
     ax.set_ylabel("share that is right")
     ax.set_xlim(0, 1.03)
@@ -130,10 +123,11 @@ def draw_probabilities(rows: list[dict]) -> Figure:
     return fig
 
 
-def _error_bar(ax, x: float, rate: Rate, colour: str, marker: str, label: str | None = None):
+def draw_rate(ax, x: float, rate: Rate, colour: str, marker: str, **options) -> None:
+    """A share with its interval; `options` are those of matplotlib's `errorbar`."""
     low, high = rate.interval
     spread = [[rate.share - low], [high - rate.share]]
-    ax.errorbar(x, rate.share, spread, fmt=marker, color=colour, ms=4, capsize=2, label=label)
+    ax.errorbar(x, rate.share, spread, fmt=marker, color=colour, ms=4, capsize=2, **options)
 
 
 FIGURES = {

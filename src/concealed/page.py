@@ -1,6 +1,7 @@
 """The page that reports a trial."""
 
 from collections import Counter
+from collections.abc import Callable
 
 import numpy as np
 
@@ -54,7 +55,7 @@ def report_page(rows: list[dict], origin: dict) -> str:
             markdown_table(
                 ("change", "alarm", "effect or its class named"),
                 [
-                    (_span(b.low, b.high), str(b.alarm), str(b.right))
+                    (span(b.low, b.high), str(b.alarm), str(b.right))
                     for b in summary.power_table(rows)
                 ],
             ),
@@ -104,13 +105,10 @@ def report_page(rows: list[dict], origin: dict) -> str:
 
 def _origin(rows: list[dict], origin: dict) -> list[str]:
     counts = Counter(row["kind"] for row in rows)
-    changed = " The tool has changes that are not committed." if origin["not_committed"] else ""
     seconds = np.array([row["seconds"] for row in rows])
     points = np.array([row["points"] for row in rows])
     return [
-        f"{len(rows)} cases, drawn from tree `{origin['commit'][:12]}` and trial number "
-        f"{origin['number']} by `snakemake concealed`.{changed} The protocol is in "
-        "docs/concealed.md.",
+        f"{len(rows)} cases, {drawn_from(origin, 'concealed')}",
         "",
         markdown_table(
             ("kind", "cases", "what"),
@@ -166,7 +164,7 @@ def _probabilities(rows: list[dict]) -> list[str]:
         markdown_table(
             ("stated", "mean stated", "right"),
             [
-                (_span(b.low, b.high), f"{b.mean:.3f}", str(b.right))
+                (span(b.low, b.high), f"{b.mean:.3f}", str(b.right))
                 for b in summary.reliability_table(rows)
             ],
         ),
@@ -208,91 +206,38 @@ def _misfits(rows: list[dict]) -> list[str]:
 
 
 def _failures(rows: list[dict]) -> list[str]:
-    failed = [(row, what) for row in rows if (what := failure(row)) is not None]
+    failed = [row for row in rows if failure(row) is not None]
     if not failed:
         return ["None.", ""]
     return [
-        markdown_table(
-            (
-                "case",
-                "failure",
-                "true effects",
-                "named",
-                "change",
-                "oracle log evidence",
-                "cause by the data",
-                "held out, corrected",
-                "held out, from the truth",
-                "points",
-                "sensors",
-                "noise, Pa",
-            ),
-            [
-                (
-                    str(row["case"]),
-                    what,
-                    row["effects"] or "-",
-                    row["named"] or "-",
-                    _percent(row["change"], 1),
-                    _log_evidence(row),
-                    circumstance(row),
-                    _percent(row["held_out_corrected"], 2),
-                    _percent(row["oracle_held_out"], 2),
-                    str(row["points"]),
-                    str(row["sensors"]),
-                    f"{row['noise']:.0f}",
-                )
-                for row, what in failed
-            ],
+        _table(
+            failed,
+            *("case", "failure", "true effects", "named", "change", "oracle log evidence"),
+            *("cause by the data", "held out, corrected", "held out, from the truth"),
+            *("points", "sensors", "noise, Pa"),
         ),
         "The verdicts' sentences:",
         "",
         *(
             f"* **Case {row['case']}** (`{row['verdict']}`): {' '.join(row['sentence'].split())}"
-            for row, _ in failed
+            for row in failed
         ),
         "",
     ]
 
 
 def _cases(rows: list[dict]) -> str:
-    return markdown_table(
-        (
-            "case",
-            "kind",
-            "true effects",
-            "change",
-            "oracle log evidence",
-            "verdict",
-            "named",
-            "failure",
-            "nominal",
-            "calibrated",
-            "absorbed",
-            "corrected",
-            "held out, corrected",
-            "held out, from the truth",
-        ),
-        [
-            (
-                str(row["case"]),
-                row["kind"],
-                row["effects"] or "-",
-                _percent(row["change"], 1),
-                _log_evidence(row),
-                row["verdict"],
-                row["named"] or "-",
-                failure(row) or "-",
-                _percent(row["misfit_nominal"], 1),
-                _percent(row["misfit_calibrated"], 2),
-                _percent(row["absorbed"], 0),
-                _percent(row["misfit_corrected"], 2),
-                _percent(row["held_out_corrected"], 2),
-                _percent(row["oracle_held_out"], 2),
-            )
-            for row in rows
-        ],
+    return _table(
+        rows,
+        *("case", "kind", "true effects", "change", "oracle log evidence", "verdict", "named"),
+        *("failure", "nominal", "calibrated", "absorbed", "corrected"),
+        *("held out, corrected", "held out, from the truth"),
     )
+
+
+def _table(rows: list[dict], *columns: str) -> str:
+    """A line for each case, of these COLUMNS."""
+    return markdown_table(columns, [[COLUMNS[name](row) for name in columns] for row in rows])
 
 
 def _numerics(rows: list[dict], checks: list[dict]) -> str:
@@ -316,7 +261,40 @@ def _percent(share: float | None, digits: int) -> str:
     return "-" if share is None else f"{100 * share:.{digits}f} %"
 
 
-def _span(low: float, high: float) -> str:
+COLUMNS: dict[str, Callable[[dict], object]] = {
+    "case": lambda row: row["case"],
+    "kind": lambda row: row["kind"],
+    "failure": lambda row: failure(row) or "-",
+    "true effects": lambda row: row["effects"] or "-",
+    "verdict": lambda row: row["verdict"],
+    "named": lambda row: row["named"] or "-",
+    "change": lambda row: _percent(row["change"], 1),
+    "oracle log evidence": _log_evidence,
+    "cause by the data": circumstance,
+    "nominal": lambda row: _percent(row["misfit_nominal"], 1),
+    "calibrated": lambda row: _percent(row["misfit_calibrated"], 2),
+    "absorbed": lambda row: _percent(row["absorbed"], 0),
+    "corrected": lambda row: _percent(row["misfit_corrected"], 2),
+    "held out, corrected": lambda row: _percent(row["held_out_corrected"], 2),
+    "held out, from the truth": lambda row: _percent(row["oracle_held_out"], 2),
+    "points": lambda row: row["points"],
+    "sensors": lambda row: row["sensors"],
+    "noise, Pa": lambda row: f"{row['noise']:.0f}",
+}
+"""Column of a table with a line for each case -> its cell of a row."""
+
+
+def drawn_from(origin: dict, trial: str) -> str:
+    """The end of a page's first sentence: what the cases of `snakemake TRIAL` were drawn from."""
+    changed = " The tool has changes that are not committed." if origin["not_committed"] else ""
     return (
-        f"{100 * low:.0f} to {100 * high:.0f} %" if np.isfinite(high) else f"over {100 * low:.0f} %"
+        f"drawn from tree `{origin['commit'][:12]}` and trial number {origin['number']} by "
+        f"`snakemake {trial}`.{changed} The protocol is in docs/{trial}.md."
     )
+
+
+def span(low: float, high: float) -> str:
+    """Shares from `low` to `high`, which is infinite where there is no end, in per cent."""
+    if high == np.inf:
+        return f"{100 * low:g} % and more"
+    return f"below {100 * high:g} %" if low == 0 else f"{100 * low:g} to {100 * high:g} %"

@@ -1,14 +1,14 @@
 """Shares and errors over all cases, each share with its confidence interval."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import binomtest
 
 from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
+from rippletwin.learning.recording_accuracy import exact_interval
 
 CHANGE_EDGES = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, np.inf)
 PROBABILITY_EDGES = (0.0, 0.5, 0.8, 0.95, 0.99, 1.0)
@@ -33,10 +33,7 @@ class Rate:
     @property
     def interval(self) -> tuple[float, float]:
         """95 % interval of Clopper and Pearson, Biometrika 26, 1934; (0, 1) without a case."""
-        if not self.count:
-            return 0.0, 1.0
-        low, high = binomtest(self.hits, self.count).proportion_ci()
-        return float(low), float(high)
+        return exact_interval(self.hits, self.count) if self.count else (0.0, 1.0)
 
     def __str__(self) -> str:
         if not self.count:
@@ -208,7 +205,7 @@ def power_table(rows: list[dict]) -> list[PowerBin]:
 
 
 class ProbabilityBin(NamedTuple):
-    """Named effects whose stated probability lies between `low` and `high`; `mean` is theirs."""
+    """Answers whose stated probability lies between `low` and `high`; `mean` is theirs."""
 
     low: float
     high: float
@@ -216,10 +213,19 @@ class ProbabilityBin(NamedTuple):
     right: Rate
 
 
-def reliability_table(rows: list[dict], edges: Iterable[float] = PROBABILITY_EDGES) -> list:
-    """ProbabilityBins between the `edges`, the last of which is inside; no empty bins."""
-    stated = [pair for row in rows for pair in row["probabilities"]]
-    edges, table = list(edges), []
+def reliability_table(
+    rows: list[dict], edges: Sequence[float] = PROBABILITY_EDGES
+) -> list[ProbabilityBin]:
+    """Named effects by their stated probability, see `bin_probabilities`."""
+    return bin_probabilities([pair for row in rows for pair in row["probabilities"]], edges)
+
+
+def bin_probabilities(
+    stated: Sequence[tuple[float, bool]], edges: Sequence[float]
+) -> list[ProbabilityBin]:
+    """Pairs (stated probability, right) between the `edges`, the last of which is inside; no empty
+    bins."""
+    table = []
     for low, high in pairwise(edges):
         last = high == edges[-1]
         inside = [(p, right) for p, right in stated if low <= p < high or (last and p == high)]
@@ -245,18 +251,24 @@ class LineErrors(NamedTuple):
     within: Rate
 
 
+def line_errors_of(rows: list[dict], quantity: str, twin: str) -> list[dict]:
+    """Errors of all segments' "delay" or "impedance" in the "calibrated" or "corrected" twins of
+    cases with an effect."""
+    return [
+        error
+        for row in rows
+        if row["effects"]
+        for error in row["line_errors"][twin]
+        if error["quantity"] == quantity
+    ]
+
+
 def line_error_table(rows: list[dict]) -> list[LineErrors]:
     """Errors of calibrated and corrected delays and impedances in cases with an effect."""
     table = []
     for quantity in ("delay", "impedance"):
         for twin in ("calibrated", "corrected"):
-            errors = [
-                error
-                for row in rows
-                if row["effects"]
-                for error in row["line_errors"][twin]
-                if error["quantity"] == quantity
-            ]
+            errors = line_errors_of(rows, quantity, twin)
             if errors:
                 relative = np.array([error["relative"] for error in errors])
                 rms = float(np.sqrt(np.mean(relative**2)))

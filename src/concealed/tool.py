@@ -9,7 +9,6 @@ import sys
 import time
 import traceback
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 
@@ -83,8 +82,8 @@ def compute_baselines(explanation) -> dict:
     return {
         "nominal": measure_misfit(likelihood, nominal).relative,
         "segments": {
-            "calibrated": _segments(explanation.without_effects),
-            "corrected": _segments(accepted),
+            "calibrated": segment_table(explanation.without_effects),
+            "corrected": segment_table(accepted),
         },
         "bic": pick_by_bic(explanation),
         "sparse": pick_by_matching_pursuit(base, candidates, observations),
@@ -109,10 +108,6 @@ def pick_by_bic(explanation) -> dict | None:
         return None
     effect, place = best.hypothesis[0]
     return {"name": effect.name, "element": place.element}
-
-
-def _segments(fit) -> list[dict]:
-    return segment_table(SimpleNamespace(twin=fit.twin, covariance=fit.covariance))
 
 
 if __name__ == "__main__":

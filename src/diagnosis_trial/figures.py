@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from concealed.figures import draw_rate
 from diagnosis_trial import detection
 from diagnosis_trial.summary import (
     ANSWERS,
@@ -68,11 +69,8 @@ def _draw_curve(ax, leaks: detection.Leaks, label: str, rank: int) -> None:
         grid = np.geomspace(shown.min(), shown.max(), 200)
         ax.plot(grid, curve.probability(grid), dash, color=colour)
     for k, (middle, rate) in enumerate(detection.shares_in_bins(shown, leaks.hit)):
-        low, high = rate.interval
         x = middle * np.exp(0.03 * rank)  # intervals beside each other
-        spread = [[rate.share - low], [high - rate.share]]
-        ax.errorbar(x, rate.share, spread, fmt=marker, color=colour, ms=4, capsize=2, lw=0.8,
-                    label=label if k == 0 else None)  # fmt: skip
+        draw_rate(ax, x, rate, colour, marker, label=None if k else label, lw=0.8)
 
 
 def draw_confusion(rows: list[dict]) -> Figure:
@@ -130,9 +128,7 @@ def _draw_reliability(ax, rows: list[dict]) -> None:
     """Share of the answers that is right by their stated probability."""
     ax.plot([0, 1], [0, 1], color=style.NEUTRAL, lw=0.8)
     for b in reliability_table(rows):
-        low, high = b.right.interval
-        spread = [[b.right.share - low], [high - b.right.share]]
-        ax.errorbar(b.mean, b.right.share, spread, fmt="o", color=style.CORRECTED, ms=4, capsize=2)
+        draw_rate(ax, b.mean, b.right, style.CORRECTED, "o")
     ax.set_xlabel("stated probability of the state")
     ax.set_ylabel("share that is right")
     ax.set_xlim(0.3, 1.02)

@@ -17,7 +17,7 @@ from collections import Counter
 
 import numpy as np
 
-from diagnosis_trial.taught_signals import TaughtSignals
+from diagnosis_trial.taught_signals import fixed_signals, leak_bins
 from rippletwin.case.model import Case, Recording, Rig
 from rippletwin.diagnosis.network_answers import (
     STATE_OF,
@@ -26,10 +26,12 @@ from rippletwin.diagnosis.network_answers import (
     judge_windows,
 )
 from rippletwin.diagnosis.pump_flow import simulate_healthy_pump, with_fitted_pump
+from rippletwin.diagnosis.randomised_signals import SignalSource
 from rippletwin.flow_sensor.estimate import band_limit
 from rippletwin.flow_sensor.line_response import line_factory
 from rippletwin.flow_sensor.methods import noise_of_flow
 from rippletwin.flow_sensor.spectral_inversion import estimate_flow
+from rippletwin.learning.architectures import CLASSES
 from rippletwin.learning.conformal import fit_conformal
 from rippletwin.learning.dataset import augment, each_once
 from rippletwin.learning.kept_networks import KeptNetworks
@@ -42,7 +44,7 @@ from rippletwin.twin.twin import Twin
 ARCHITECTURE = "cnn1d_341_100"
 SAMPLES = 3072  # of a revolution
 DRAWS, HELD_OUT = 1600, 100  # simulated revolutions of a class, to learn and for p-values
-FLOW_KINDS = ("Q", "QR")
+FIXED_KINDS, FLOW_KINDS = ("P", "Q"), ("Q", "QR")
 BANDWIDTH_HZ = 1500.0  # of the estimated flow, the workflow's default
 EPOCHS = 30  # no plateau ends a training before its learning rate has fallen: most is learnt then
 SETTINGS = TrainingSettings(
@@ -64,9 +66,15 @@ def teach_network(kind: str, twin: Twin, covariance: np.ndarray | None, case: Ca
     recording = _most_recorded(case.healthy)
     revolutions = revolutions_of(recording, case.rig, SAMPLES)
     speed_hz, pressure = float(np.mean(revolutions.speed_hz)), recording.load_pressure
-    source = TaughtSignals(twin, covariance, revolutions.windows, speed_hz, pressure)
     rng = np.random.default_rng(SEED)
-    learnt, others = (source.draw(kind, count, rng) for count in (DRAWS, HELD_OUT))
+    if kind in FIXED_KINDS:
+        once = fixed_signals(kind, twin, SAMPLES, speed_hz, pressure)
+        learnt, others = (_repeated(once, count) for count in (DRAWS, HELD_OUT))
+    else:
+        source = SignalSource(twin, covariance, revolutions.windows, speed_hz, pressure)
+        bins, anchored = leak_bins(twin, speed_hz, pressure), kind == "PRA"
+        drawn = [source.draw(bins, CLASSES, n, rng, anchored) for n in (DRAWS, HELD_OUT)]
+        learnt, others = (each.flow if kind == "QR" else each.pressure for each in drawn)
     signal, channels = "pressure", [sensor.name for sensor in case.rig.sensors]
     noise = noise_mad(recording.pressure)
     if kind in FLOW_KINDS:
@@ -118,6 +126,11 @@ def ask_network(kept: KeptNetworks, recordings: list[Recording], rig: Rig, twin:
             }
         )
     return {"recordings": entries}
+
+
+def _repeated(signals: np.ndarray, count: int) -> np.ndarray:
+    """Each of signals (classes, channels, M) so often: (classes, count, channels, M)."""
+    return np.broadcast_to(signals[:, None], (len(signals), count, *signals.shape[1:]))
 
 
 def _most_recorded(recordings: list[Recording]) -> Recording:

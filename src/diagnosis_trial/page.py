@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from concealed.page import drawn_from, span
 from concealed.summary import Rate, percent
 from diagnosis_trial import detection, summary
 from diagnosis_trial.figures import file_name
-from diagnosis_trial.score import LEAK_STATES
 from rippletwin.learning.markdown import markdown_table
 
 FAILURES_SHOWN = 60
@@ -45,12 +45,10 @@ def report_page(rows: list[dict], origin: dict) -> str:
 
 
 def _origin(rows: list[dict], columns: dict[str, list[dict]], origin: dict) -> list[str]:
-    changed = " The tool has changes that are not committed." if origin["not_committed"] else ""
     every = len({(row["rig"], row["label"]) for row in rows})
     return [
-        f"{every} recordings of {len({row['rig'] for row in rows})} rigs, drawn from tree "
-        f"`{origin['commit'][:12]}` and trial number {origin['number']} by "
-        f"`snakemake diagnosis_trial`.{changed} The protocol is in docs/diagnosis_trial.md.",
+        f"{every} recordings of {len({row['rig'] for row in rows})} rigs, "
+        f"{drawn_from(origin, 'diagnosis_trial')}",
         "",
         "A column is METHOD@TWIN.",
         "",
@@ -145,7 +143,7 @@ def _column(name: str, rows: list[dict]) -> list[str]:
         markdown_table(
             ("state", "change", "state right", "not called healthy"),
             [
-                (b.state, _span(b.low, b.high), str(b.right), str(b.noticed))
+                (b.state, span(b.low, b.high), str(b.right), str(b.noticed))
                 for b in summary.change_table(rows)
             ],
         ),
@@ -178,7 +176,7 @@ def _rigs(rows: list[dict]) -> str:
     lines = []
     for rig in sorted({row["rig"] for row in rows}):
         of_rig = [row for row in rows if row["rig"] == rig]
-        known = [row for row in of_rig if row["state"] in ("healthy", *LEAK_STATES)]
+        known = [row for row in of_rig if row["state"] in summary.KNOWN]
         misfit = of_rig[0]["twin_misfit"]
         lines.append(
             (
@@ -206,9 +204,3 @@ def _failures(rows: list[dict]) -> list[str]:
     heads = ("rig, recording", "truth", "change", "told", "stated probability")
     left = len(wrong) - len(lines)
     return [markdown_table(heads, lines), *([f"And {left} more.", ""] if left else [])]
-
-
-def _span(low: float, high: float) -> str:
-    if high == np.inf:
-        return f"{100 * low:g} % and more"
-    return f"below {100 * high:g} %" if low == 0 else f"{100 * low:g} to {100 * high:g} %"

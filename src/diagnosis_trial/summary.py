@@ -1,13 +1,13 @@
 """Shares over all recordings of a trial, each with its exact confidence interval."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from concealed.summary import Rate, Score, rate_of
+from concealed.summary import ProbabilityBin, Rate, Score, bin_probabilities, rate_of
 from diagnosis_trial.score import CHANGED_LINE, LEAK_STATES, OUTSIDE_STATES
 
 CHANGE_EDGES = (0.0, 0.02, 0.05, np.inf)
@@ -94,9 +94,7 @@ class ChangeBin(NamedTuple):
     noticed: Rate
 
 
-def change_table(
-    rows: list[dict], states: Iterable[str] = STATES[1:], edges: Iterable[float] = CHANGE_EDGES
-) -> list[ChangeBin]:
+def change_table(rows: list[dict]) -> list[ChangeBin]:
     """Share right, and share not called healthy, by the change of the ripple; no empty bins."""
     return [
         ChangeBin(
@@ -106,8 +104,8 @@ def change_table(
             rate_of(row["right"] for row in inside),
             rate_of(row["told"] not in ("healthy", "crashed") for row in inside),
         )
-        for state in states
-        for low, high in pairwise(edges)
+        for state in STATES[1:]
+        for low, high in pairwise(CHANGE_EDGES)
         if (inside := [r for r in rows if r["state"] == state and low <= r["change"] < high])
     ]
 
@@ -143,30 +141,12 @@ def severity_table(rows: list[dict]) -> list[SeverityErrors]:
     return table
 
 
-class ProbabilityBin(NamedTuple):
-    """Recordings whose state is named with a probability between `low` and `high`; `mean` of it."""
-
-    low: float
-    high: float
-    mean: float
-    right: Rate
-
-
-def reliability_table(rows: list[dict], edges: Iterable[float] = PROBABILITY_EDGES) -> list:
-    """ProbabilityBins of recordings in a state that the tool knows; no empty bins.
-
-    The last edge is inside. Recordings that are called unlike state no probability.
-    """
+def reliability_table(rows: list[dict]) -> list[ProbabilityBin]:
+    """Recordings in a state that the tool knows by the probability of the state that it names.
+    Those that are called unlike state no probability."""
     stated = [
         (row["probability"], row["right"])
         for row in rows
         if row["state"] in KNOWN and row["probability"] is not None
     ]
-    edges, table = list(edges), []
-    for low, high in pairwise(edges):
-        last = high == edges[-1]
-        inside = [(p, right) for p, right in stated if low <= p < high or (last and p == high)]
-        if inside:
-            mean = float(np.mean([p for p, _ in inside]))
-            table.append(ProbabilityBin(low, high, mean, rate_of(right for _, right in inside)))
-    return table
+    return bin_probabilities(stated, PROBABILITY_EDGES)

@@ -28,9 +28,10 @@ def healthy():
 
 
 def test_ratios_between_sensors_give_the_delay_whatever_the_pump_is_said_to_be(healthy):
-    """A twin that believes in another pump, and whose diameter made up for it, finds the true delay
-    between its sensors to 0.1 % and gives the diameter back. The wave speed itself is known no
-    better than the tape's positions: a line 1 % longer with waves 1 % faster has the same ratios."""
+    """A twin that believes in another pump, and whose diameter made up for it, finds the true
+    delay between its sensors to 0.1 % and gives the diameter back. The wave speed itself is known
+    no better than the positions: a line 1 % longer with waves 1 % faster has the same ratios.
+    """
     twin = Twin(leaking_pump.rig(), healthy)
     theta = twin.theta.copy()
     theta[twin.index["diameter[1]"]] = 6.0

@@ -8,10 +8,12 @@ import pytest
 
 import leaking_pump
 from diagnosis_trial import networks
-from diagnosis_trial.taught_signals import TaughtSignals
+from diagnosis_trial.taught_signals import fixed_signals, leak_bins
 from rippletwin.case.model import Case, Recording
 from rippletwin.flow_sensor.estimate import band_limit
 from rippletwin.learning.architectures import CLASSES
+from rippletwin.pump.outlets import ConstantPressure
+from rippletwin.pump.simulation import simulate
 from rippletwin.twin.twin import Twin
 
 RATE, SAMPLES = 51200.0, 3072
@@ -26,10 +28,9 @@ def twin():
 
 
 @pytest.fixture(scope="module")
-def source(twin):
-    """What the twin teaches where the healthy recording is of silence."""
-    silence = np.zeros((3, len(leaking_pump.SENSORS), SAMPLES))
-    return TaughtSignals(twin, None, silence, SPEED_HZ, leaking_pump.LOAD)
+def taught(twin):
+    """Kind of fixed leaks -> its signals (classes, channels, M)."""
+    return {kind: fixed_signals(kind, twin, SAMPLES, SPEED_HZ, leaking_pump.LOAD) for kind in "PQ"}
 
 
 def recording(revolution, label="a", state="unknown"):
@@ -43,10 +44,9 @@ def recording(revolution, label="a", state="unknown"):
 
 
 @pytest.mark.parametrize("name", CLASSES)
-def test_the_line_turns_simulated_pressure_into_the_flow_that_made_it(twin, source, name):
+def test_the_line_turns_simulated_pressure_into_the_flow_that_made_it(twin, taught, name):
     """Flow by the line in the frequency domain from pressure in the time domain is the pump's."""
-    at = CLASSES.index(name)
-    pressure, flow = (source.draw(kind, 1, np.random.default_rng(0))[at, 0] for kind in ("P", "Q"))
+    pressure, flow = (taught[kind][CLASSES.index(name)] for kind in "PQ")
     found = networks._flow_windows(recording(pressure), twin.rig, twin, SPEED_HZ)
     expected = band_limit(flow, SPEED_HZ, networks.BANDWIDTH_HZ)[0]
     spectra = np.abs(np.fft.rfft(found[:, 0])).mean(axis=0), np.abs(np.fft.rfft(expected))
@@ -54,13 +54,30 @@ def test_the_line_turns_simulated_pressure_into_the_flow_that_made_it(twin, sour
     assert error < 0.02
 
 
-def test_kinds_of_fixed_leaks_repeat_one_signal_a_class(source):
-    """P and Q are the paper's, one simulation a class: at the sensors and at the pump."""
-    rng = np.random.default_rng(0)
-    for kind, channels in {"P": 2, "Q": 1}.items():
-        drawn = source.draw(kind, 2, rng)
-        assert drawn.shape == (len(CLASSES), 2, channels, SAMPLES)
-        np.testing.assert_array_equal(drawn[:, 0], drawn[:, 1])
+def test_fixed_leaks_are_the_papers(taught):
+    """A signal of each class without its mean, at the sensors and at the pump; the leaks of the
+    cylinder's two severities are as 0.26 to 0.77, and so nearly are the changes of flow."""
+    assert taught["P"].shape == (len(CLASSES), len(leaking_pump.SENSORS), SAMPLES)
+    assert taught["Q"].shape == (len(CLASSES), 1, SAMPLES)
+    healthy, _, small, large = taught["Q"][:, 0]
+    assert abs(healthy.mean()) < 1e-9 * np.ptp(healthy)
+    changes = [np.linalg.norm(leaking - healthy) for leaking in (small, large)]
+    assert changes[1] / changes[0] == pytest.approx(0.77 / 0.26, rel=0.2)
+
+
+def test_drawn_leaks_are_those_that_are_diagnosed(twin):
+    """Their flow by the law of the orifice is from 0.002 to 4 times the mean flow of one piston.
+    The cylinder's range is halved in the logarithm."""
+    bins = leak_bins(twin, SPEED_HZ, leaking_pump.LOAD)
+    outlet = ConstantPressure(leaking_pump.LOAD)
+    run = simulate(leaking_pump.SHEET, leaking_pump.OIL, leaking_pump.SPEED, outlet)
+    velocity = 0.65 * np.sqrt(2.0 * leaking_pump.LOAD / leaking_pump.OIL.density)
+    one_piston = run.flow.mean() / leaking_pump.PISTONS
+    ends = np.array(bins["S"]) * velocity / one_piston
+    np.testing.assert_allclose(ends, (0.002, 4.0), rtol=1e-3)
+    middle = np.sqrt(np.prod(bins["S"]))
+    assert bins["C1"] == pytest.approx((bins["S"][0], middle))
+    assert bins["C2"] == pytest.approx((middle, bins["S"][1]))
 
 
 def test_a_network_of_flow_answers_recordings_of_its_operating_point(twin, monkeypatch):
@@ -68,9 +85,7 @@ def test_a_network_of_flow_answers_recordings_of_its_operating_point(twin, monke
     monkeypatch.setattr(networks, "DRAWS", 20)
     monkeypatch.setattr(networks, "HELD_OUT", 20)
     monkeypatch.setattr(networks, "SETTINGS", replace(networks.SETTINGS, max_epochs=1))
-    pressure = TaughtSignals(
-        twin, None, np.zeros((3, 2, SAMPLES)), SPEED_HZ, leaking_pump.LOAD
-    ).draw("P", 1, np.random.default_rng(0))[0, 0]
+    pressure = fixed_signals("P", twin, SAMPLES, SPEED_HZ, leaking_pump.LOAD)[0]
     case = Case(Path("case"), twin.rig, [recording(pressure, "healthy", "healthy")])
     asked = [recording(pressure, "b"), replace(recording(pressure, "c"), load_pressure=5e6)]
     kept = networks.teach_network("Q", twin, None, case)

@@ -107,13 +107,6 @@ def test_split_by_time_has_no_neighbours_across_the_cut_but_one():
     assert across == 2 * len(counts) - 1  # the cut, and the joint between stacked recordings
 
 
-def test_split_by_time_can_leave_a_gap():
-    """With a gap no test window touches a training window."""
-    train, test = split_by_time([50, 50], fraction=0.8, gap=1)
-    of_one = abs(np.subtract.outer(train[train < 50], test[test < 50]))
-    assert of_one.min() == 2 and len(train) + len(test) == 98
-
-
 def test_a_single_draw_takes_the_same_random_numbers(seed):
     """Against the paper's augmentation written out: shifts first, then noise, nothing else; and one
     draw a class is the same as none."""

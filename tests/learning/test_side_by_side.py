@@ -64,11 +64,11 @@ def test_a_processor_holds_the_samples_of_one_training():
 
 @needs_gpu
 @pytest.mark.parametrize("network", ["cnn1d_150_50", "resnet18_1d"])
-def test_a_recorded_step_is_the_step(network):
+def test_a_recorded_step_is_the_step(network, monkeypatch):
     """Replays of the graph change weights, statistics and loss as the same steps started kernel by
     kernel do; recording leaves no trace."""
     arithmetic = Arithmetic(torch.device("cuda"), torch.float32)
-    torch.backends.cudnn.deterministic = True
+    monkeypatch.setattr(torch.backends.cudnn, "deterministic", True)
     x, y = (torch.as_tensor(a, device="cuda") for a in tones(48, 0))
     results = []
     for replayed in (True, False):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rippletwin.errors import InputError
-from rippletwin.learning.accuracy import UNKNOWN
+from rippletwin.learning.dataset import UNKNOWN
 from rippletwin.learning.windows import (
     early_healthy,
     early_known,

@@ -115,9 +115,9 @@ wildcard_constraints:
     windows="recorded|probe",
 
 
-def cells(datasets):
+def cells(datasets, networks=config["architectures"]):
     """(dataset, architecture) of every network that learns from one of these datasets."""
-    return [(name, network) for name in datasets for network in config["architectures"]]
+    return [(name, network) for name in datasets for network in networks]
 
 
 def of_domain(domain):

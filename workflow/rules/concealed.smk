@@ -80,11 +80,8 @@ rule explain_concealed:
 rule commit_verdicts:
     input:
         seals=expand_outputs(rules.conceal.output.seal, hidden=HIDDEN),
-        verdicts=expand_outputs(rules.explain_concealed.output.verdict, hidden=HIDDEN),
-        baselines=expand_outputs(
-            rules.explain_concealed.output.baselines, hidden=HIDDEN
-        ),
-        source=scripts_sources("commit_verdicts.py"),
+        results=expand_outputs(rules.explain_concealed.output, hidden=HIDDEN),
+        source=scripts_sources("commit_results.py"),
     output:
         f"{CONCEALED}/commitments.json",
     log:
@@ -92,7 +89,7 @@ rule commit_verdicts:
     benchmark:
         f"{RESULTS}/benchmarks/commit_verdicts.tsv"
     script:
-        "../scripts/commit_verdicts.py"
+        "../scripts/commit_results.py"
 
 
 rule oracle_concealed:

@@ -61,11 +61,8 @@ rule diagnose_population:
 rule commit_diagnoses:
     input:
         seals=expand_outputs(rules.record_population.output.seal, drawn=DRAWN),
-        diagnoses=expand_outputs(
-            rules.diagnose_population.output.diagnosis, drawn=DRAWN
-        ),
-        runs=expand_outputs(rules.diagnose_population.output.run, drawn=DRAWN),
-        source=scripts_sources("commit_diagnoses.py"),
+        results=expand_outputs(rules.diagnose_population.output, drawn=DRAWN),
+        source=scripts_sources("commit_results.py"),
     output:
         f"{TRIAL}/commitments.json",
     log:
@@ -73,7 +70,7 @@ rule commit_diagnoses:
     benchmark:
         f"{RESULTS}/benchmarks/commit_diagnoses.tsv"
     script:
-        "../scripts/commit_diagnoses.py"
+        "../scripts/commit_results.py"
 
 
 rule score_diagnosis_trial:

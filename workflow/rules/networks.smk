@@ -47,7 +47,7 @@ rule unlike_table:
     benchmark:
         f"{RESULTS}/benchmarks/unlike_table.tsv"
     params:
-        cells=[(name, network) for name in RANDOMISED for network in of_domain("time")],
+        cells=cells(RANDOMISED, of_domain("time")),
     script:
         "../scripts/unlike_table.py"
 

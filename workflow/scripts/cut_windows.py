@@ -10,7 +10,7 @@ from rippletwin import store
 from rippletwin.case.diagnosed_point import reference_recordings
 from rippletwin.case.load import load_case, unread_recordings
 from rippletwin.case.rig_yaml import read_sheet
-from rippletwin.learning.dataset import remove_mean
+from rippletwin.learning.dataset import UNKNOWN, remove_mean
 from rippletwin.spectra.noise import noise_cycle_scatter, noise_mad
 from rippletwin.spectra.observation import revolutions_of
 
@@ -41,7 +41,7 @@ store.save(
             "cycle_scatter": ("channel", scatter, {"units": "Pa", "source": turns}),
         },
         coords={
-            "state": ("window", np.repeat([r.state_code or "?" for r in chosen], counts)),
+            "state": ("window", np.repeat([r.state_code or UNKNOWN for r in chosen], counts)),
             "recording": ("window", np.repeat(range(len(chosen)), counts)),
             "channel": [sensor.name for sensor in case.rig.sensors],
         },

@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from concealed.commitments import sha256_of_files
+from concealed.commitments import check_unchanged
 from diagnosis_trial.score import score_rig
 from job import open_log
 from rippletwin import store
@@ -12,11 +12,7 @@ from virtualrig.seal import open_seal_file
 report_progress = open_log(snakemake)
 paths = snakemake.input
 committed = json.loads(Path(paths.commitments[0]).read_text())
-digests = sha256_of_files([*paths.seals, *paths.diagnoses, *paths.runs])
-changed = [path for path, digest in digests.items() if committed.get(path) != digest]
-if changed:
-    raise ValueError(f"changed since the diagnoses were committed to: {', '.join(changed)}")
-
+check_unchanged(committed, [*paths.seals, *paths.diagnoses, *paths.runs])
 rows = []
 for rig, (seal, key, *results) in enumerate(
     zip(paths.seals, paths.seal_keys, paths.diagnoses, paths.runs, strict=True)

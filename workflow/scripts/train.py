@@ -4,13 +4,12 @@ import json
 from dataclasses import asdict
 
 import numpy as np
-import torch
 
 from job import open_log
 from rippletwin import store
 from rippletwin.learning.architectures import CLASSES
 from rippletwin.learning.arithmetic import choose_arithmetic
-from rippletwin.learning.networks import build
+from rippletwin.learning.networks import build, save_tensors
 from rippletwin.learning.side_by_side import train_all
 from rippletwin.learning.training import TrainingSettings, train_stepwise
 from rippletwin.learning.windows import early_known
@@ -50,7 +49,5 @@ for network, history in train_all(map(train_seed, range(params.seeds)), arithmet
         f"seed {len(weights)} of {params.seeds}: {history.epochs} epochs in {arithmetic}, "
         f"{history.reason}, validation accuracy {history.best_accuracy:.1%}"
     )
-# Through an open file: by name, torch writes the name into the file.
-with store.whole(snakemake.output.weights) as scratch, scratch.open("wb") as file:
-    torch.save(weights, file)
+save_tensors(weights, snakemake.output.weights)
 store.write_text(snakemake.output.history, json.dumps(histories, indent=1))

@@ -61,6 +61,11 @@ def distance(
     return 0.0 if same else float(by_speed + by_pressure)
 
 
+def distance_between(one, other) -> float:
+    """`distance` of the operating points of two observations."""
+    return distance(one.speed_hz, other.speed_hz, one.load_pressure, other.load_pressure)
+
+
 def make_anchor(
     twin: Twin, healthy, observation, line: DriftingLine, speed_rpm: float, pressure: float
 ) -> Anchor:
@@ -68,9 +73,7 @@ def make_anchor(
     `speed_rpm` into `pressure`, Pa. Both are at the same shaft orders; the twin's pump is as fitted
     (`with_fitted_pump`)."""
     orders = np.asarray(healthy.orders)
-    apart = distance(
-        healthy.speed_hz, observation.speed_hz, healthy.load_pressure, observation.load_pressure
-    )
+    apart = distance_between(healthy, observation)
     pump, fluid = twin.rig.pump, twin.rig.fluid
     here = simulate_healthy_pump(pump, fluid, speed_rpm, pressure)
     there = here

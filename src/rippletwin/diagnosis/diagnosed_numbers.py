@@ -61,9 +61,8 @@ def gather(d: Diagnosis) -> DiagnosedNumbers:
     at_sensors, variance = model.division.at_sensors, model.variance(parts, best.errors)
     leaks = {}
     for name, density in best.areas.items():
-        middle, low, high = map(float, np.exp(density.quantiles([0.5, 0.025, 0.975])))
         shape = np.exp(density.log_density - np.max(density.log_density))
-        leaks[name] = Leak(_rounded(np.exp(density.nodes)), _rounded(shape), middle, low, high)
+        leaks[name] = Leak(_rounded(np.exp(density.nodes)), _rounded(shape), *density.interval)
     return DiagnosedNumbers(
         label=d.label,
         state=d.state,

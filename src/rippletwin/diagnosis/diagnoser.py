@@ -8,7 +8,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import logsumexp
 
-from rippletwin.diagnosis.anchor import distance, even_flow, make_anchor, without_recording
+from rippletwin.diagnosis.anchor import (
+    distance_between,
+    even_flow,
+    make_anchor,
+    without_recording,
+)
 from rippletwin.diagnosis.diagnosis import Diagnosis
 from rippletwin.diagnosis.drifting_line import DriftingLine
 from rippletwin.diagnosis.evidence import ErrorPrior, StateEvidence, compare_healthy, weigh_states
@@ -109,11 +114,6 @@ class Diagnoser:
         scatters = [scatter for scatter, _ in found]
         scatter = float(np.exp(np.mean(np.log([prior.scatter, *scatters]))))
         return replace(prior, scatter=scatter), [change for _, change in found]
-
-
-def distance_between(one, other) -> float:
-    """Distance of the operating points of two observations, relative, as `anchor.distance`."""
-    return distance(one.speed_hz, other.speed_hz, one.load_pressure, other.load_pressure)
 
 
 def _rounded(value: float) -> float:

@@ -53,11 +53,7 @@ class Diagnosis:
         """Of each fault of the state; none where the recording is unlike all of them."""
         if self.unlikeness.unlike:
             return {}
-        ends = {
-            name: np.exp(density.quantiles([0.5, 0.025, 0.975]))
-            for name, density in self.best.areas.items()
-        }
-        return {name: Severity(*map(float, values)) for name, values in ends.items()}
+        return {name: Severity(*density.interval) for name, density in self.best.areas.items()}
 
     @property
     def pistons(self) -> dict[str, int]:

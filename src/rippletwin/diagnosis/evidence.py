@@ -151,8 +151,8 @@ def _at_best_areas(model: ObservationModel, mode: Hypothesis, errors: Errors) ->
     def likelihood(hypothesis: Hypothesis) -> float:
         return model.evaluate(hypothesis, errors).log_likelihood
 
-    for k, fault in enumerate(mode.state):
-        found = explore(_along(mode, k, likelihood), *model.area_ends(fault, mode.beside(k)))
+    for k in range(len(mode.state)):
+        found = _explore_area(model, mode, k, likelihood)
         mode = _with_area(mode, k, found.nodes[np.argmax(found.log_density)])
     return mode
 
@@ -178,8 +178,7 @@ def _over_areas(
     likelihood = partial(_over_changes, model, errors=errors, prior=prior)
     at_mode = likelihood(mode)
     densities = {
-        fault.name: explore(_along(mode, k, likelihood), *model.area_ends(fault, mode.beside(k)))
-        for k, fault in enumerate(mode.state)
+        fault.name: _explore_area(model, mode, k, likelihood) for k, fault in enumerate(mode.state)
     }
     mean = sum(d.log_integral - at_mode - np.log(d.width) for d in densities.values())
     return float(mean), densities
@@ -191,9 +190,12 @@ def _over_changes(model, hypothesis: Hypothesis, errors: Errors, prior: ErrorPri
     return float(logsumexp(prior.log_weights_of_change() + each))
 
 
-def _along(mode: Hypothesis, k: int, likelihood: Callable[[Hypothesis], float]):
-    """The likelihood of the logarithm of area k, all else as in the mode."""
-    return lambda log_area: likelihood(_with_area(mode, k, log_area))
+def _explore_area(
+    model: ObservationModel, mode: Hypothesis, k: int, likelihood: Callable[[Hypothesis], float]
+) -> Density:
+    """The likelihood over the logarithm of area k, all else as in the mode."""
+    ends = model.area_ends(mode.state[k], mode.beside(k))
+    return explore(lambda log_area: likelihood(_with_area(mode, k, log_area)), *ends)
 
 
 def _with_area(mode: Hypothesis, k: int, log_area: float) -> Hypothesis:

@@ -61,6 +61,12 @@ class Density:
         below = cumulative_trapezoid(weight, nodes, initial=0.0)
         return np.interp(shares, below / below[-1], nodes)
 
+    @property
+    def interval(self) -> tuple[float, float, float]:
+        """Median of the area, m2, and the ends of its 95 % interval."""
+        middle, low, high = map(float, np.exp(self.quantiles([0.5, 0.025, 0.975])))
+        return middle, low, high
+
     def widen(self, sd: float) -> Density:
         """The density with an independent Gaussian error of the logarithm, of standard deviation
         `sd`, beside it."""

@@ -9,13 +9,15 @@ import numpy as np
 
 from rippletwin.case.model import Recording, Rig
 from rippletwin.diagnosis.anchor import distance
+from rippletwin.diagnosis.faults.library import FAULT_OF
 from rippletwin.errors import InputError
 from rippletwin.learning.conformal import PROMISED_RATE
 from rippletwin.learning.dataset import remove_mean
 from rippletwin.learning.kept_networks import KeptNetworks, load_networks
 from rippletwin.spectra.observation import revolutions_of
 
-STATE_OF = {"H": "healthy", "S": "slipper", "C1": "cylinder", "C2": "cylinder"}
+STATE_OF = {"H": "healthy"} | FAULT_OF
+"""Class of the networks -> state."""
 
 
 def find_networks(results: str | Path, rig: Rig) -> dict[str, KeptNetworks]:

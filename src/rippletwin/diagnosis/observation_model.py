@@ -117,7 +117,7 @@ class ObservationModel:
         """Drift (D,), standard deviations, with what the leaks' change of mean flow makes of an
         orifice set anew."""
         gained = sum(
-            self.flows[fault.name].harmonics(area)[0].real / self.flows[fault.name].mean
+            self.flows[fault.name].gained(area)
             for fault, area in zip(hypothesis.state, hypothesis.areas)
         )
         return self.line.reset_orifice(np.array(hypothesis.drift, float), gained)

@@ -147,6 +147,10 @@ class LeakFlow:
         """Change (K,) of the flow's peak amplitudes, m3/s, orders 0 to K - 1, for a leak area."""
         return area * self._change(np.log(np.clip(area, self.areas[0], self.areas[-1])))
 
+    def gained(self, area: float) -> float:
+        """Change of the mean flow over the healthy pump's, for a leak area; below zero."""
+        return self.harmonics(area)[0].real / self.mean
+
     def pump_slopes(self, area: float) -> np.ndarray:
         """What one standard deviation of each of the pump's numbers makes of it (P, K), m3/s."""
         first, *_, last = self.areas[SLOPE_NODES]

@@ -20,7 +20,7 @@ import numpy as np
 
 from rippletwin.diagnosis.anchor import estimate_flow_at_pump, make_anchor
 from rippletwin.diagnosis.drifting_line import DriftingLine
-from rippletwin.diagnosis.faults.library import FAULTS
+from rippletwin.diagnosis.faults.library import FAULT_OF, FAULTS
 from rippletwin.diagnosis.observation_model import SOURCE_DRIFT, TURN_SD
 from rippletwin.diagnosis.pump_flow import (
     NUMBERS,
@@ -34,8 +34,6 @@ from rippletwin.harmonics import one_period, peak_amplitudes
 from rippletwin.spectra.observation import Observation
 from rippletwin.twin.twin import Twin
 
-FAULT_OF = {"S": "slipper", "C1": "cylinder", "C2": "cylinder"}
-"""Class of the networks -> fault; the healthy class H has none."""
 WAVES, WAVES_HZ = 6, 4000.0  # cosines of the smooth error, and over which frequency
 
 
@@ -170,8 +168,7 @@ class SignalSource:
         if leak is None:
             return 0.0, 0.0
         turn = np.exp(2j * np.pi * self.orders * piston / self._pistons)
-        gained = leak.harmonics(area)[0].real / leak.mean
-        return self._flows.change(leak, area, numbers) * turn, gained
+        return self._flows.change(leak, area, numbers) * turn, leak.gained(area)
 
     def _draw_twin(self, rng) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates (P,) of the line and numbers (U,) of the pump, see `UncertainPump`."""

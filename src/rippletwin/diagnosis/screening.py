@@ -12,7 +12,7 @@ which another piston only shifts.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -161,13 +161,9 @@ class Screen:
 
 
 def _swapped(candidate: Candidate) -> Candidate:
-    return Candidate(
-        candidate.state[::-1],
-        candidate.areas[::-1],
-        candidate.pistons[::-1],
-        candidate.turn,
-        candidate.score,
-    )
+    """The same with its faults in the other order."""
+    c = candidate
+    return replace(c, state=c.state[::-1], areas=c.areas[::-1], pistons=c.pistons[::-1])
 
 
 def _sorted(candidates) -> list[Candidate]:

@@ -12,9 +12,9 @@ import numpy as np
 import pandas as pd
 
 from rippletwin.learning.architectures import ARCHITECTURES, CLASSES
+from rippletwin.learning.dataset import UNKNOWN
 
 TRUE_STATES = ("H", "S", "C")
-UNKNOWN = "?"  # state of a recording to be diagnosed
 SEVERITY = {"pressure": "C1", "flow": "C2"}  # the class that the paper counts as right for C
 
 
@@ -90,7 +90,7 @@ def result_row(architecture: str, dataset: str, seed: int, scored: dict, history
         row |= {
             "epochs": history.epochs,
             "converged": history.converged,
-            "validation_loss": history.validation_loss[history.best_epoch],
+            "validation_loss": history.best_loss,
             "validation_accuracy": 100 * history.best_accuracy,
         }
     return row

@@ -14,11 +14,18 @@ import pandas as pd
 from scipy.stats import rankdata
 
 from rippletwin.learning.architectures import ARCHITECTURES
+from rippletwin.learning.markdown import markdown_table
 
 MAX_EXACT_COUNT = 8  # of values, up to which the p-value is over all orders
 PERMUTATIONS = 20_000  # random orders for more values
 DOMAIN_NAMES = {"time": ["time"], "image": ["image"], "both": ["time", "image"]}
 SCORES = {"accuracy": "strict", "accuracy_either": "either severity"}
+NETWORK_HEADS = (
+    "Dataset", "Architecture", "On fault", "Region", "Alignment", "Blind", "Accuracy", "Either",
+)  # fmt: skip
+RANKING_HEADS = (
+    "Dataset", "Input", "Score", "n", "rho", "95 %", "p", "Chosen", "Its accuracy", "Best", "Mean",
+)  # fmt: skip
 
 
 def alignment_table(shares: pd.DataFrame, results: pd.DataFrame) -> pd.DataFrame:
@@ -105,47 +112,50 @@ def rank_correlation(first: np.ndarray, second: np.ndarray) -> tuple[float, floa
 
 def ranking_markdown(table: pd.DataFrame, ranks: pd.DataFrame) -> str:
     """Both tables as a page."""
-    lines = [
-        "# Attention and accuracy",
-        "",
-        "Alignment is the share of attention on the simulated fault over that region's own share,",
-        "mean and standard deviation over seeds: one is chance. It is found on simulations alone.",
-        "Accuracies, in per cent, are those on recordings.",
-        "",
-        "| Dataset | Architecture | On fault | Region | Alignment | Blind | Accuracy | Either |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
-    for row in table.itertuples():
-        shares = f"{row.attended:.1%} | {row.region:.1%}"
-        lines.append(
-            f"| {row.dataset} | {ARCHITECTURES[row.architecture].title} | {shares} "
-            f"| {row.alignment:.2f} ± {row.alignment_std:.2f} | {row.blind:.0%} "
-            f"| {row.accuracy:.1f} ± {row.accuracy_std:.1f} | {row.accuracy_either:.1f} |"
-        )
-    lines += [
-        "",
-        "Blind: share of simulated faults for which a network shows no positive evidence at all.",
-        "",
-        "## Does alignment choose the network?",
-        "",
-        "Spearman's rank correlation of alignment and accuracy over the networks of a dataset,",
-        "its 95 % interval and the p-value over all orders; then the accuracy of the network with",
-        "the highest alignment, of the best network and of the mean network.",
-        "",
-        "| Dataset | Input | Score | n | rho | 95 % | p | Chosen | Its accuracy | Best | Mean |",
-        "|---|---|---|---|---|---|---|---|---|---|---|",
-    ]
-    for row in ranks.itertuples():
-        rho = "none: all equal | – | –"
-        if np.isfinite(row.rho):
-            rho = f"{row.rho:.2f} | {row.low:.2f} to {row.high:.2f} | {row.p:.3f}"
-        lines.append(
-            f"| {row.dataset} | {row.input} | {SCORES[row.score]} | {row.networks} | {rho} "
-            f"| {ARCHITECTURES[row.chosen].title} | {row.chosen_accuracy:.1f} | {row.best:.1f} "
-            f"| {row.mean:.1f} |"
-        )
-    lines += ["", f"**{ranking_sentence(ranks)}**", ""]
-    return "\n".join(lines)
+    networks = map(_network_line, table.itertuples())
+    rankings = map(_ranking_line, ranks.itertuples())
+    return f"""# Attention and accuracy
+
+Alignment is the share of attention on the simulated fault over that region's own share,
+mean and standard deviation over seeds: one is chance. It is found on simulations alone.
+Accuracies, in per cent, are those on recordings.
+
+{markdown_table(NETWORK_HEADS, networks)}
+Blind: share of simulated faults for which a network shows no positive evidence at all.
+
+## Does alignment choose the network?
+
+Spearman's rank correlation of alignment and accuracy over the networks of a dataset,
+its 95 % interval and the p-value over all orders; then the accuracy of the network with
+the highest alignment, of the best network and of the mean network.
+
+{markdown_table(RANKING_HEADS, rankings)}
+**{ranking_sentence(ranks)}**
+"""
+
+
+def _network_line(row) -> tuple[str, ...]:
+    """The cells of NETWORK_HEADS."""
+    return (
+        row.dataset,
+        ARCHITECTURES[row.architecture].title,
+        f"{row.attended:.1%}",
+        f"{row.region:.1%}",
+        f"{row.alignment:.2f} ± {row.alignment_std:.2f}",
+        f"{row.blind:.0%}",
+        f"{row.accuracy:.1f} ± {row.accuracy_std:.1f}",
+        f"{row.accuracy_either:.1f}",
+    )
+
+
+def _ranking_line(row) -> tuple[str, ...]:
+    """The cells of RANKING_HEADS."""
+    rho = "none: all equal", "–", "–"
+    if np.isfinite(row.rho):
+        rho = f"{row.rho:.2f}", f"{row.low:.2f} to {row.high:.2f}", f"{row.p:.3f}"
+    numbers = (f"{x:.1f}" for x in (row.chosen_accuracy, row.best, row.mean))
+    chosen = ARCHITECTURES[row.chosen].title
+    return row.dataset, row.input, SCORES[row.score], str(row.networks), *rho, chosen, *numbers
 
 
 def ranking_sentence(ranks: pd.DataFrame) -> str:

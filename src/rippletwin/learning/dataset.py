@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+UNKNOWN = "?"  # state of a recording to be diagnosed
 NOISE_FRACTION = 0.15  # of the estimated sensor noise (the paper's augmentation)
 
 
@@ -75,18 +76,18 @@ def remove_mean(x: np.ndarray) -> np.ndarray:
 
 
 def split_by_time(
-    n_per_recording: list[int] | np.ndarray, fraction: float = 0.8, gap: int = 0
+    n_per_recording: list[int] | np.ndarray, fraction: float = 0.8
 ) -> tuple[np.ndarray, np.ndarray]:
     """Early windows of each recording for training, late ones for testing: indices (a,), (b,).
 
     n_per_recording : windows of each recording, in the order in which they are stacked.
-    gap : windows dropped between the two parts. Neighbouring windows are on one side, unlike after
-        shuffling.
+
+    Neighbouring windows are on one side, unlike after shuffling.
     """
     train, test, start = [], [], 0
     for n in n_per_recording:
         cut = round(fraction * n)
         train.append(np.arange(start, start + cut))
-        test.append(np.arange(start + cut + gap, start + n))
+        test.append(np.arange(start + cut, start + n))
         start += n
     return np.concatenate(train), np.concatenate(test)

@@ -13,13 +13,11 @@ import numpy as np
 import torch
 from torch import nn
 
-from rippletwin.learning.networks import Classifier
+from rippletwin.learning.networks import BATCH, Classifier
 
 
 @torch.no_grad()
-def grad_cam(
-    network: Classifier, x: np.ndarray, target: np.ndarray | int, batch_size: int = 64
-) -> np.ndarray:
+def grad_cam(network: Classifier, x: np.ndarray, target: np.ndarray | int) -> np.ndarray:
     """Coarse Grad-CAM (n, rows, columns) on the grid of the last feature maps (one row in time).
 
     x : inputs as the network takes them; target : (n,) or one class index, whose evidence is shown.
@@ -29,7 +27,7 @@ def grad_cam(
     targets = torch.as_tensor(np.broadcast_to(target, len(x)).copy())
     heats = []
     for inputs, classes in zip(
-        torch.as_tensor(x, dtype=torch.float32).split(batch_size), targets.split(batch_size)
+        torch.as_tensor(x, dtype=torch.float32).split(BATCH), targets.split(BATCH)
     ):
         maps = network.feature_maps(inputs)
         weight = network.head.weight[classes.to(maps.device)] / maps[0, 0].numel()
@@ -37,15 +35,13 @@ def grad_cam(
     return torch.cat(heats).cpu().numpy()
 
 
-def attention_map(
-    network: Classifier, x: np.ndarray, target: np.ndarray | int, batch_size: int = 64
-) -> np.ndarray:
+def attention_map(network: Classifier, x: np.ndarray, target: np.ndarray | int) -> np.ndarray:
     """Grad-CAM at the resolution of the input: (n, M) or (n, size, size), linear in between.
 
     Each feature is put where its receptive field is centred; on time windows, which are whole
     revolutions, positions wrap, and where the cyclic padding shows a place twice its mean counts.
     """
-    coarse = grad_cam(network, x, target, batch_size)
+    coarse = grad_cam(network, x, target)
     cyclic = network.architecture.domain == "time"
     to_columns = _spread(network, coarse.shape[2], np.shape(x)[-1], axis=1, cyclic=cyclic)
     fine = coarse @ to_columns.T
@@ -89,10 +85,10 @@ def fault_region(healthy: np.ndarray, faulty: np.ndarray, energy: float = 0.5) -
 def measure_alignment(heat: np.ndarray, region: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Share of the attention that falls into the region, and share that the region is of all.
 
-    heat : ``attention``, (n, M) or (n, rows, columns); region : booleans of ``fault_region``,
-    (n, M) or (n, rows). Returns two arrays (n,). Attention that looks everywhere alike has equal
-    shares: their ratio is one, more means it seeks the fault. NaN where there is no attention at
-    all (no positive evidence for the class).
+    heat : of ``attention_map``, (n, M) or (n, rows, columns); region : of ``fault_region``,
+    booleans (n, M) or (n, rows). Returns two arrays (n,). Attention that looks everywhere alike has
+    equal shares: their ratio is one, more means it seeks the fault. NaN where there is no attention
+    at all (no positive evidence for the class).
     """
     if heat.ndim == 3:
         heat = heat.sum(-1)

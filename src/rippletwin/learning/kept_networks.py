@@ -8,11 +8,10 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from rippletwin import store
 from rippletwin.errors import InputError
 from rippletwin.learning.architectures import CLASSES
 from rippletwin.learning.conformal import Conformal
-from rippletwin.learning.networks import restore_networks
+from rippletwin.learning.networks import restore_networks, save_tensors
 from rippletwin.learning.training import activation_statistics, predict
 
 FORMAT = 2
@@ -63,9 +62,7 @@ class KeptNetworks:
             {name: torch.as_tensor(values) for name, values in asdict(each).items()}
             for each in self.conformal
         ]
-        # Through an open file: by name, torch writes the name into the file.
-        with store.whole(path) as scratch, scratch.open("wb") as file:
-            torch.save(data, file)
+        save_tensors(data, path)
 
 
 def load_networks(path: str | Path) -> KeptNetworks:

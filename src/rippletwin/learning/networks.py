@@ -9,23 +9,26 @@ channels-last order.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 
 import torch
 from torch import nn
 
+from rippletwin import store
 from rippletwin.learning.architectures import ARCHITECTURES, CLASSES, Architecture
 
 MAPS = 64  # feature maps of every plain layer and of the first residual stage
+BATCH = 64  # inputs that a trained network answers at once
 
 
-def build(name: str, channels: int, classes: int = len(CLASSES)) -> Classifier:
+def build(name: str, channels: int) -> Classifier:
     """A fresh network, initialised from torch's global generator.
 
     name : a key of ``ARCHITECTURES``; channels : 2 for two pressure sensors, 1 for the outlet flow.
     Raises KeyError for an unknown name.
     """
     architecture = ARCHITECTURES[name]
-    network = Classifier(architecture, channels, classes)
+    network = Classifier(architecture, channels)
     return network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
 
@@ -46,6 +49,13 @@ def restore_networks(
         yield network.to(device)
 
 
+def save_tensors(data: list | dict, path: str | Path) -> None:
+    """Write tensors in lists and dictionaries to `path`, whole or not at all."""
+    # Through an open file: by name, torch writes the name into the file.
+    with store.whole(path) as scratch, scratch.open("wb") as file:
+        torch.save(data, file)
+
+
 class Classifier(nn.Module):
     """Feature maps, global average pooling, one linear layer: logits (n, classes).
 
@@ -56,14 +66,14 @@ class Classifier(nn.Module):
 
     scale: torch.Tensor
 
-    def __init__(self, architecture: Architecture, channels: int, classes: int):
+    def __init__(self, architecture: Architecture, channels: int):
         super().__init__()
         self.architecture = architecture
         self.register_buffer("scale", torch.ones(()))
         layers = _residual if architecture.blocks else _plain
         self.features, width = layers(architecture, channels)
         self.pool = nn.AdaptiveAvgPool2d(1)
-        self.head = nn.Linear(width, classes)
+        self.head = nn.Linear(width, len(CLASSES))
 
     def feature_maps(self, x: torch.Tensor) -> torch.Tensor:
         """x (n, channels, M) or (n, channels, size, size) in the data's own unit -> the last maps

@@ -29,6 +29,7 @@ from scipy.stats import t as student
 from rippletwin.learning.accuracy import summarise
 from rippletwin.learning.architectures import ARCHITECTURES
 from rippletwin.learning.footnote import mark_unconverged, with_footnote
+from rippletwin.learning.markdown import markdown_table
 from rippletwin.learning.recording_accuracy import paired_interval
 
 EXPERIMENTAL = "experimental"  # the dataset of recordings, which no zero-shot claim concerns
@@ -201,42 +202,36 @@ def judge_claims(compared: pd.DataFrame, cells: pd.DataFrame, period: float) -> 
 
 def claims_markdown(judged: pd.DataFrame, compared: pd.DataFrame) -> str:
     """The page: verdicts, the rule, every comparison of ours."""
-    lines = [
-        "# The paper's claims",
-        "",
-        "Accuracies on recordings, per cent of the windows. Each comparison is a difference of",
-        "means with its 95 % interval: it supports a claim where that lies above zero, opposes it",
-        "where it lies below, and is open otherwise. A claim is reproduced where more than half of",
-        "its comparisons support it and none opposes it, partly where some support it but not so,",
-        "not where none does; untested where nothing could be compared.",
-        "",
-        f"*{RECORDINGS}*: the recording is the unit. Both networks are compared on each recording,",
-        "either severity being right and seeds averaged, and the interval is over recordings",
-        "(Hartigan); five or less leave everything open. The other scores are the paper's",
-        "protocol: one recording a state, and an interval over seeds (Welch), which says nothing",
-        "of other recordings. The rule is laid on the paper's own table too. Nothing corrects for",
-        "the number of comparisons: one in forty would support a claim by chance.",
-        "",
-        "| Claim | Score | Verdict | Numbers |",
-        "|---|---|---|---|",
-    ]
-    for row in judged.itertuples():
-        lines.append(f"| {row.claim} | {row.score} | **{row.verdict}** | {row.evidence} |")
+    verdicts = [(r.claim, r.score, f"**{r.verdict}**", r.evidence) for r in judged.itertuples()]
+    page = f"""# The paper's claims
+
+Accuracies on recordings, per cent of the windows. Each comparison is a difference of
+means with its 95 % interval: it supports a claim where that lies above zero, opposes it
+where it lies below, and is open otherwise. A claim is reproduced where more than half of
+its comparisons support it and none opposes it, partly where some support it but not so,
+not where none does; untested where nothing could be compared.
+
+*{RECORDINGS}*: the recording is the unit. Both networks are compared on each recording,
+either severity being right and seeds averaged, and the interval is over recordings
+(Hartigan); five or less leave everything open. The other scores are the paper's
+protocol: one recording a state, and an interval over seeds (Welch), which says nothing
+of other recordings. The rule is laid on the paper's own table too. Nothing corrects for
+the number of comparisons: one in forty would support a claim by chance.
+
+{markdown_table(("Claim", "Score", "Verdict", "Numbers"), verdicts)}"""
+    heads = "Score", "Dataset", "Better, says the paper", "than", "Difference", "95 %", ""
     for claim, rows in compared[compared.score != PAPER].groupby("claim", sort=False):
-        lines += [
-            "",
-            f"## {claim}",
-            "",
-            "| Score | Dataset | Better, says the paper | than | Difference | 95 % | |",
-            "|---|---|---|---|---|---|---|",
-        ]
-        for row in rows.itertuples():
-            difference = mark_unconverged(f"{row.difference:+.1f}", row.converged)
-            lines.append(
-                f"| {row.score} | {row.dataset} | {row.better} | {row.worse} "
-                f"| {difference} | {row.low:+.1f} to {row.high:+.1f} | {row.verdict} |"
+        lines = [
+            (
+                *(r.score, r.dataset, r.better, r.worse),
+                mark_unconverged(f"{r.difference:+.1f}", r.converged),
+                f"{r.low:+.1f} to {r.high:+.1f}",
+                r.verdict,
             )
-    return with_footnote("\n".join(lines) + "\n")
+            for r in rows.itertuples()
+        ]
+        page += f"\n## {claim}\n\n{markdown_table(heads, lines)}"
+    return with_footnote(page)
 
 
 def _label(cell: tuple[str, str], beside: tuple[str, str] | None = None) -> str:

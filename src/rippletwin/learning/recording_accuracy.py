@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
 
-from rippletwin.learning.accuracy import UNKNOWN
 from rippletwin.learning.architectures import ARCHITECTURES, CLASSES
+from rippletwin.learning.dataset import UNKNOWN
 from rippletwin.learning.footnote import mark_unconverged, with_footnote
 from rippletwin.learning.markdown import markdown_table
 

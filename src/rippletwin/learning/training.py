@@ -20,12 +20,14 @@ import torch
 from torch import nn
 
 from rippletwin.learning.arithmetic import FLOAT32, Arithmetic
-from rippletwin.learning.networks import Classifier
+from rippletwin.learning.networks import BATCH, Classifier
 from rippletwin.learning.training_steps import TrainingSteps
 
 
 @dataclass(frozen=True)
 class TrainingSettings:
+    """How a network learns, and the numbers of the rule above."""
+
     batch_size: int = 32
     learning_rate: float = 1e-3
     falling_rate: bool = False  # to zero at max_epochs, as half a cosine (Loshchilov, Hutter 2017)
@@ -53,6 +55,11 @@ class History:
     @property
     def epochs(self) -> int:
         return len(self.validation_loss)
+
+    @property
+    def best_loss(self) -> float:
+        """Validation loss of the best epoch, nats a sample."""
+        return self.validation_loss[self.best_epoch]
 
     @property
     def best_accuracy(self) -> float:
@@ -131,26 +138,19 @@ def train_stepwise(
             yield
         if settings.falling_rate:
             fall.step()
-        with arithmetic.mixed():
-            logits = _logits(network, images[validation]).float()
         history.training_loss.append(steps.pop_loss() / len(fit))
-        loss = nn.functional.cross_entropy(logits, labels[validation])
-        history.validation_loss.append(float(loss))
-        history.validation_accuracy.append(
-            float((logits.argmax(1) == labels[validation]).double().mean())
-        )
-        if (
-            best is None
-            or history.validation_loss[-1] < history.validation_loss[history.best_epoch]
-        ):
+        loss, accuracy = _validate(network, images[validation], labels[validation], arithmetic)
+        history.validation_loss.append(loss)
+        history.validation_accuracy.append(accuracy)
+        if best is None or loss < history.best_loss:
             history.best_epoch, best = epoch, copy.deepcopy(network.state_dict())
         if progress:
             progress(epoch, history)
         reason = stopping_reason(history.validation_loss, settings)
         if reason:
             guessing = math.log(len(np.unique(y)))  # numpy's scalars do not go into JSON
-            learned = history.validation_loss[history.best_epoch] < guessing / 2
-            history.converged, history.reason = reason == "target" or learned, reason
+            history.converged = reason == "target" or history.best_loss < guessing / 2
+            history.reason = reason
             break
 
     network.load_state_dict(best)
@@ -194,7 +194,7 @@ def initialise(network: nn.Module, seed: int) -> None:
 
 
 def predict(
-    network: Classifier, x: np.ndarray, batch_size: int = 64
+    network: Classifier, x: np.ndarray, batch_size: int = BATCH
 ) -> tuple[np.ndarray, np.ndarray]:
     """Class indices (n,) and probabilities (n, classes) of x, in its own unit."""
     logits = _logits(network, torch.as_tensor(x, dtype=torch.float32), batch_size).cpu()
@@ -202,14 +202,24 @@ def predict(
 
 
 @torch.no_grad()
-def activation_statistics(network: Classifier, x: np.ndarray, batch_size: int = 64) -> np.ndarray:
+def activation_statistics(network: Classifier, x: np.ndarray) -> np.ndarray:
     """``Classifier.activation_statistics`` (n, D) of x."""
     network.eval()
-    batches = torch.as_tensor(x, dtype=torch.float32).split(batch_size)
+    batches = torch.as_tensor(x, dtype=torch.float32).split(BATCH)
     return torch.cat([network.activation_statistics(batch) for batch in batches]).cpu().numpy()
 
 
+def _validate(
+    network: Classifier, x: torch.Tensor, labels: torch.Tensor, arithmetic: Arithmetic
+) -> tuple[float, float]:
+    """Mean loss, nats a sample, and accuracy, 0 to 1, of held-out samples."""
+    with arithmetic.mixed():
+        logits = _logits(network, x).float()
+    accuracy = (logits.argmax(1) == labels).double().mean()
+    return float(nn.functional.cross_entropy(logits, labels)), float(accuracy)
+
+
 @torch.no_grad()
-def _logits(network: Classifier, x: torch.Tensor, batch_size: int = 64) -> torch.Tensor:
+def _logits(network: Classifier, x: torch.Tensor, batch_size: int = BATCH) -> torch.Tensor:
     network.eval()
     return torch.cat([network(batch) for batch in x.split(batch_size)])

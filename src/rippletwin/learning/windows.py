@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rippletwin.errors import InputError
-from rippletwin.learning.accuracy import UNKNOWN
-from rippletwin.learning.dataset import remove_mean, split_by_time
+from rippletwin.learning.dataset import UNKNOWN, remove_mean, split_by_time
 
 
 def pair_windows(recording: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -31,6 +31,10 @@ FAULTS: dict[str, Fault] = _discover()
 """Name -> fault, those that are not tried by default included."""
 
 
+FAULT_OF = {"S": "slipper", "C1": "cylinder", "C2": "cylinder"}
+"""Class of the networks -> fault; the healthy class H has none."""
+
+
 def select_faults(asked: Sequence[str | Path] = ()) -> tuple[Fault, ...]:
     """The faults to try: those tried by default, and those asked for by name or by file.
 

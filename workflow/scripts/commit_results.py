@@ -1,4 +1,4 @@
-"""Digests of all seals and diagnoses, before any seal is opened."""
+"""Digests of all seals and of what a tool made of their cases, before any seal is opened."""
 
 import json
 
@@ -7,6 +7,6 @@ from job import open_log
 from rippletwin import store
 
 report_progress = open_log(snakemake)
-paths = [*snakemake.input.seals, *snakemake.input.diagnoses, *snakemake.input.runs]
+paths = [*snakemake.input.seals, *snakemake.input.results]
 store.write_text(snakemake.output[0], json.dumps(sha256_of_files(paths), indent=1) + "\n")
 report_progress(f"{len(paths)} files committed to")
