@@ -66,6 +66,7 @@ from rippletwin.explanation.localise.shaft_order_intervals import add_amplitude_
 from rippletwin.explanation.localise.shaft_orders import analyse_shaft_orders
 from rippletwin.explanation.localise.source_free_fits import refit_source_free
 from rippletwin.explanation.search.gas_rivals import fit_gas_rivals
+from rippletwin.explanation.search.neighbouring_lumps import merge_neighbours
 from rippletwin.explanation.search.passive_networks import accepted_network, fit_passive_networks
 from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.stages.preparation import HIGHEST_HZ, observe_all, select_fitted_as
@@ -199,9 +200,10 @@ def _judge_explanation(
     """Steps 7 to 12: the search with the explanation that the checks leave and its competitors,
     the support of its effects, and the contradiction in words where the sensors are wired wrongly.
     """
+    search, piece = merge_neighbours(workers, search)
     judged = judge_effects(workers, search.base, search.best, halves)
     judged = replace(judged, best=add_profile_intervals(workers, judged.best))
-    networks = fit_passive_networks(workers, judged.best)
+    networks = fit_passive_networks(workers, judged.best, piece)
     search = replace(search, best=judged.best, passive_networks=networks)
     network = accepted_network(search)
     if network is not None:

@@ -60,8 +60,7 @@ class SmoothCorrections:
         self._posterior = Posterior(fit.twin, observations, None, fit.source_free)
         self._prediction = self._posterior.predict(self.theta)
         self._posterior.estimate_errors(self._prediction, self.theta)
-        # As in the Jacobian. Solved for each correction it takes long, the more so where there is no
-        # steady state.
+        # As in the Jacobian: to solve it for each correction takes long, most of all in vain.
         forward = self._posterior.forward
         forward.freeze_compliance = forward.has_nonlinear_compliance
         self.network = forward.network(self.theta)

@@ -124,11 +124,11 @@ def _resume_search(
 
 
 def _widen_tolerances(stage: Stage, search: Search, processes: int) -> tuple[Search, float]:
-    """The search with its best explanation under wider tolerances of the data sheet, if they gain,
-    and the factor on them."""
+    """The search with the better fit that wider tolerances of the data sheet find, if any, and the
+    factor on them."""
     with open_workers(stage.base, stage.observations, processes) as workers:
-        wider = fit_with_wider_tolerances(workers, search.best)
-    if wider is None:
+        better = fit_with_wider_tolerances(workers, search.best)
+    if better is None:
         return search, 1.0
-    factor = wider.twin.rig.tolerance_scale / stage.base.rig.tolerance_scale
-    return replace(search, best=wider), factor * estimate_tolerance_scale(wider)
+    factor = better.twin.rig.tolerance_scale / stage.base.rig.tolerance_scale
+    return replace(search, best=better), factor * estimate_tolerance_scale(better)
