@@ -1,11 +1,10 @@
 """Effects of one kind side by side that are one stretch of another pipe.
 
-A ladder of lumps is a continuous pipe for waves below a/(pi d), with a the wave speed and d the
-distance between neighbours (Brillouin 1946, Wave Propagation in Periodic Structures). Volumes that
-are closer than that are therefore also tried as one passive piece of another pipe, of the length
-and the compliance that they have together. Where the piece explains the data as well, there is no
-evidence for lumps: they leave the explanation, and the piece is a start for the network that
-stands in.
+A row of lumps is a continuous pipe for waves longer than twice the distance between neighbours
+(Brillouin 1946, Wave Propagation in Periodic Structures). Volumes that are as close as that are
+therefore also tried as one passive piece of another pipe, of the length and the compliance that
+they have together. Where the piece explains the data as well, there is no evidence for lumps: they
+leave the explanation, and the piece is a start for the network that stands in.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ def merge_neighbours(workers: Workers, search: Search) -> tuple[Search, Fit | No
     """The search without volumes that one passive piece explains as well, and the fit with that
     piece; the search as it is, and None, where there are none."""
     best, pieced = search.best, None
-    for members in _ladders(workers, best):
+    for members in _rows(workers, best):
         rest = tuple(m for m in best.hypothesis if m not in members)
         piece = next_instance((PIECE, Place("position")), rest)
         assert piece is not None  # a line may have one more of what is at a free position
@@ -48,7 +47,7 @@ def merge_neighbours(workers: Workers, search: Search) -> tuple[Search, Fit | No
     return replace(search, best=best, rivals=rivals), pieced
 
 
-def _ladders(workers: Workers, best: Fit) -> list[list]:
+def _rows(workers: Workers, best: Fit) -> list[list]:
     """Groups of at least two volumes of `best` whose neighbours act as one pipe, in the order of
     their positions."""
     highest_hz = max(float(np.max(o.frequency_hz)) for o in workers.observations)
@@ -58,7 +57,7 @@ def _ladders(workers: Workers, best: Fit) -> list[list]:
     for member in sorted(volumes, key=lambda m: values[f"{LUMP}@{m[1]}.position"]):
         position = values[f"{LUMP}@{member[1]}.position"]
         k = segment_at(best.twin.arrays(best.twin.theta).lengths, position)
-        reach = best.twin.rig.line[k].wave_speed / (np.pi * highest_hz)
+        reach = best.twin.rig.line[k].wave_speed / (2.0 * highest_hz)
         if position - last > reach:
             groups.append([])
         groups[-1].append(member)
@@ -67,7 +66,7 @@ def _ladders(workers: Workers, best: Fit) -> list[list]:
 
 
 def _piece_values(best: Fit, members: list, label: str) -> dict[str, float]:
-    """Place, length and softness of the piece with the volumes' compliance; the ladder ends half a
+    """Place, length and softness of the piece with the volumes' compliance; the row ends half a
     distance beyond its last lumps."""
     values = best.twin.values()
     positions = [values[f"{LUMP}@{place}.position"] for _, place in members]
