@@ -229,7 +229,7 @@ class DifferentiableForward(ForwardModel):
                 self.s, density=density, viscosity=viscosity, diameter=d, friction=twin.friction
             )
             network.shunt[k] = shunt_admittance(self.s, density=density, wave_speed=a, diameter=d)
-        network.shunt *= self._state(coordinates) ** -2.0
+        network.shunt *= self._softness(coordinates)
         line = self.line_state(coordinates, v)
         for effect, place, own in twin.applied_effects(coordinates):
             own = {name: x[:, None] for name, x in own.items()}

@@ -137,7 +137,7 @@ class ForwardModel:
         series = np.array(
             [self._series(k, d, viscosity) for k, d in enumerate(v.diameters)], dtype=complex
         )
-        shunt = self._state(theta) ** -2.0 * shunt_admittance(
+        shunt = self._softness(theta) * shunt_admittance(
             self.s,
             density=rig.fluid.density,
             wave_speed=v.wave_speeds[:, None],
@@ -161,25 +161,29 @@ class ForwardModel:
                 effect.apply(network, line, values, place)
         return network
 
-    def _state(self, theta: np.ndarray) -> np.ndarray | float:
-        """Factor (..., F) on the wave speeds while each recording was made; `theta` may be
+    def _states(self, theta: np.ndarray) -> np.ndarray:
+        """Factor (..., R) on the wave speeds while each of R recordings was made; `theta` may be
         (P, B)."""
-        if not self.twin.changing_state:
-            return 1.0
-        factor = np.ones((*np.shape(theta)[1:], len(self.s)))
-        for o, part in zip(self.observations, self.slices):
+        factors = np.ones((*np.shape(theta)[1:], len(self.observations)))
+        for r, o in enumerate(self.observations):
             k = self.twin.index.get(f"state[{o.label}]")
             if k is not None:
-                factor[..., part] = np.asarray(self.twin.parameters[k].value(theta[k]))[..., None]
-        return factor
+                factors[..., r] = self.twin.parameters[k].value(theta[k])
+        return factors
+
+    def _softness(self, theta: np.ndarray) -> np.ndarray | float:
+        """What the state of each recording makes of shunt admittances, (..., F)."""
+        if not self.twin.changing_state:
+            return 1.0
+        return (self._states(theta) ** -2.0)[..., self.recording]
 
     def _viscosity(self, theta: np.ndarray, v: Arrays) -> np.ndarray | float:
         """Kinematic viscosity (..., F) while each recording was made, m2/s."""
-        k = self.twin.index.get("viscosity_slope")
-        if k is None:
+        if not self.twin.changing_state:
             return v.viscosity
+        k = self.twin.index["viscosity_slope"]
         slope = np.asarray(self.twin.parameters[k].value(theta[k]))[..., None]
-        return v.viscosity * self._state(theta) ** slope
+        return v.viscosity * (self._states(theta) ** slope)[..., self.recording]
 
     def line_state(self, theta: np.ndarray, v: Arrays) -> LineState:
         """The numbers of the line that effects need, with `v` of `Twin.arrays` at theta (P,) or
