@@ -57,6 +57,7 @@ from rippletwin.explanation.checks.sensor_wiring import find_swapped_sensors
 from rippletwin.explanation.checks.support import (
     Judged,
     judge_beside_network,
+    judge_beside_piece,
     judge_effects,
     withhold_what_is_in_doubt,
 )
@@ -202,7 +203,10 @@ def _judge_explanation(
     the support of its effects, and the contradiction in words where the sensors are wired wrongly.
     """
     search, piece = merge_neighbours(workers, search)
-    judged = judge_effects(workers, search.base, search.best, halves)
+    if piece is None:
+        judged = judge_effects(workers, search.base, search.best, halves)
+    else:
+        judged = judge_beside_piece(workers, search.base, piece, halves)
     judged = replace(judged, best=add_profile_intervals(workers, judged.best))
     networks = fit_passive_networks(workers, judged.best, piece)
     search = replace(search, best=judged.best, passive_networks=networks)
