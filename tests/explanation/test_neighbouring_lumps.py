@@ -8,7 +8,6 @@ from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.stages.preparation import prepare_base
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
-from rippletwin.twin.effects.passive_piece import EFFECT as PIECE
 from rippletwin.twin.parameters import coordinates
 from synthetic_observations import POINTS, make
 
@@ -39,7 +38,7 @@ def test_a_soft_stretch_that_was_named_two_volumes_becomes_one_piece():
              "compliance_ratio": 1e-4, "conductance": 1e-15}  # fmt: skip
     observed = make(
         np.random.default_rng(4),
-        ((PIECE, Place("position")),),
+        ((EFFECTS["passive_piece"], Place("position")),),
         {f"passive_piece@position.{name}": value for name, value in truth.items()},
         points=POINTS[:2],
     )

@@ -70,6 +70,7 @@ class ForwardModel:
         self._series_cache: dict[int, tuple] = {}
         self._ripples = [point.ripple for point in points]
         self._periodic = [r for r, ripple in enumerate(self._ripples) if ripple is not None]
+        self._amplitude = self._known_amplitude()
         self.solved = True
         self._last_linear: tuple[bytes, FrequencyDomainLine] | None = None
         periodic = [self.slices[r] for r in self._periodic]
@@ -77,6 +78,16 @@ class ForwardModel:
 
     def __call__(self, theta: np.ndarray) -> list[np.ndarray]:
         return self._read(self.network(theta), theta)
+
+    def _known_amplitude(self) -> np.ndarray:
+        """(F,) by which the ripple of each recording is multiplied where load and compliance are
+        nonlinear, what is known of it over the nominal one; 1 where nothing is."""
+        amplitude = np.ones(len(self.s), complex)
+        for o, part in zip(self.observations, self.slices):
+            known = getattr(o, "corrected_ripple", None)
+            if known is not None:
+                amplitude[part] = known.at(o.label, np.asarray(o.orders))
+        return amplitude
 
     def unit_response(self, theta: np.ndarray) -> list[np.ndarray]:
         """Predictions, list of (S, F), Pa s/m3, at theta (P,) for a unit flow at every frequency,
@@ -237,27 +248,35 @@ class ForwardModel:
             whole = wide._linear(theta)
             whole.source_flow = np.array(whole.source_flow)
             whole.source_flow[seen] = network.source_flow
+            whole.source_flow *= wide._amplitude
             solver = wide.compliance_solver
             tolerance = min(COUPLED_ORIFICE_TOLERANCE, solver.tolerance)
             solve_load = wide.load.make_solver(
                 whole, self.twin.load_factor(theta), tolerance=tolerance
             )
-            state = [x[seen] for x in solver.solve(whole, solve_load)]
+            state = [x[seen] / self._amplitude for x in solver.solve(whole, solve_load)]
             self.solved = solver.solved and wide.load.solved
             positions, outflow = whole.outflows
-            network.outflows = positions, outflow[:, seen]
+            network.outflows = positions, outflow[:, seen] / self._amplitude
             if self.load.orifice is not None:
                 network.load = "state", tuple(state)
         else:
             wide, seen = self._extended_for_orifice
-            pressure, flow = wide.load.balance(whole, self.twin.load_factor(theta))
+            whole.source_flow = whole.source_flow * wide._amplitude
+            state = wide.load.balance(whole, self.twin.load_factor(theta))
             self.solved = wide.load.solved
-            network.load = "state", (pressure[seen], flow[seen])
+            network.load = "state", tuple(x[seen] / self._amplitude for x in state)
 
     def _balance_load(self, network: FrequencyDomainLine, theta: np.ndarray) -> None:
         """Set the full-amplitude state at the load of `network`, whose outflows are given."""
         if self.load.orifice is not None:
-            network.load = "state", tuple(self.load.balance(network, self.twin.load_factor(theta)))
+            scaled = copy(network)
+            scaled.source_flow = network.source_flow * self._amplitude
+            if network.outflows is not None:
+                positions, outflow = network.outflows
+                scaled.outflows = positions, outflow * self._amplitude
+            state = self.load.balance(scaled, self.twin.load_factor(theta))
+            network.load = "state", tuple(x / self._amplitude for x in state)
         self.solved = self.load.solved
 
     @cached_property

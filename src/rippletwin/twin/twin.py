@@ -33,8 +33,8 @@ import numpy as np
 
 from rippletwin.case.model import FlowRipple, Rig, Sensor
 from rippletwin.line.frequency_domain.pipe_immittance import FRICTION_LAWS
+from rippletwin.spectra.corrected_ripple import CorrectedRipple
 from rippletwin.twin import parameters as coordinates
-from rippletwin.twin.corrected_ripple import CorrectedRipple
 from rippletwin.twin.forward_model import ForwardModel
 from rippletwin.twin.nominal_ripples import NominalRipples
 from rippletwin.twin.operating_point import (

@@ -20,10 +20,9 @@ from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR
 from rippletwin.twin.effects.base import Place, segment_at
 from rippletwin.twin.effects.library import EFFECTS, next_instance
-from rippletwin.twin.effects.passive_piece import EFFECT as PIECE
 from rippletwin.twin.parameters import coordinates
 
-LUMP = "line_volume"
+LUMP, PIECE = "line_volume", "passive_piece"
 
 
 def merge_neighbours(workers: Workers, search: Search) -> tuple[Search, Fit | None]:
@@ -32,10 +31,10 @@ def merge_neighbours(workers: Workers, search: Search) -> tuple[Search, Fit | No
     best, pieced = search.best, None
     for members in _rows(workers, best):
         rest = tuple(m for m in best.hypothesis if m not in members)
-        piece = next_instance((PIECE, Place("position")), rest)
+        piece = next_instance((EFFECTS[PIECE], Place("position")), rest)
         assert piece is not None  # a line may have one more of what is at a free position
         hypothesis = (*rest, piece)
-        values = best.twin.values() | _piece_values(best, members, f"{PIECE.name}@{piece[1]}")
+        values = best.twin.values() | _piece_values(best, members, f"{PIECE}@{piece[1]}")
         theta = coordinates(workers.base.with_(effects=hypothesis).parameters, values)
         (fit,) = workers.fit([FitJob(hypothesis, FromTheta(theta))])
         if fit.evidence > best.evidence - EQUIVALENT_LOG_BAYES_FACTOR:
