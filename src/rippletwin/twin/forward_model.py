@@ -40,7 +40,8 @@ class ForwardModel:
     reflection coefficient (1, F), see `twin.reflection`.
 
     observations may be `OperatingCondition`s. `slices` has each one's columns among all F; `solved`
-    says whether orifice and nonlinear compliance of the last prediction are in a steady state.
+    says whether orifice and nonlinear compliance of the last prediction are in a steady state;
+    `amplitude` (F,) is what is known of the source over the nominal one.
     """
 
     def __init__(self, twin: Twin, observations: Sequence):
@@ -70,7 +71,7 @@ class ForwardModel:
         self._series_cache: dict[int, tuple] = {}
         self._ripples = [point.ripple for point in points]
         self._periodic = [r for r, ripple in enumerate(self._ripples) if ripple is not None]
-        self._amplitude = self._known_amplitude()
+        self.amplitude = self._known_amplitude()
         self.solved = True
         self._last_linear: tuple[bytes, FrequencyDomainLine] | None = None
         periodic = [self.slices[r] for r in self._periodic]
@@ -248,35 +249,35 @@ class ForwardModel:
             whole = wide._linear(theta)
             whole.source_flow = np.array(whole.source_flow)
             whole.source_flow[seen] = network.source_flow
-            whole.source_flow *= wide._amplitude
+            whole.source_flow *= wide.amplitude
             solver = wide.compliance_solver
             tolerance = min(COUPLED_ORIFICE_TOLERANCE, solver.tolerance)
             solve_load = wide.load.make_solver(
                 whole, self.twin.load_factor(theta), tolerance=tolerance
             )
-            state = [x[seen] / self._amplitude for x in solver.solve(whole, solve_load)]
+            state = [x[seen] / self.amplitude for x in solver.solve(whole, solve_load)]
             self.solved = solver.solved and wide.load.solved
             positions, outflow = whole.outflows
-            network.outflows = positions, outflow[:, seen] / self._amplitude
+            network.outflows = positions, outflow[:, seen] / self.amplitude
             if self.load.orifice is not None:
                 network.load = "state", tuple(state)
         else:
             wide, seen = self._extended_for_orifice
-            whole.source_flow = whole.source_flow * wide._amplitude
+            whole.source_flow = whole.source_flow * wide.amplitude
             state = wide.load.balance(whole, self.twin.load_factor(theta))
             self.solved = wide.load.solved
-            network.load = "state", tuple(x[seen] / self._amplitude for x in state)
+            network.load = "state", tuple(x[seen] / self.amplitude for x in state)
 
     def _balance_load(self, network: FrequencyDomainLine, theta: np.ndarray) -> None:
         """Set the full-amplitude state at the load of `network`, whose outflows are given."""
         if self.load.orifice is not None:
             scaled = copy(network)
-            scaled.source_flow = network.source_flow * self._amplitude
+            scaled.source_flow = network.source_flow * self.amplitude
             if network.outflows is not None:
                 positions, outflow = network.outflows
-                scaled.outflows = positions, outflow * self._amplitude
+                scaled.outflows = positions, outflow * self.amplitude
             state = self.load.balance(scaled, self.twin.load_factor(theta))
-            network.load = "state", tuple(x / self._amplitude for x in state)
+            network.load = "state", tuple(x / self.amplitude for x in state)
         self.solved = self.load.solved
 
     @cached_property
