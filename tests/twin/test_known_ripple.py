@@ -62,3 +62,12 @@ def test_derivatives_are_those_of_the_readings():
             ends.append(np.concatenate(forward(moved), axis=1))
         quotient = (ends[1] - ends[0]) / 2e-3
         assert np.linalg.norm(slopes[k] - quotient) < 0.02 * np.linalg.norm(quotient)
+
+
+def test_what_has_no_shaft_has_no_ripple():
+    """An input impedance that could be measured beside the recordings, made from one of them."""
+    twin, theta, nominal, _ = lines(())
+    (known, *_) = with_known_ripple(nominal)
+    impedance = replace(known, kind="input_impedance", label="new", orders=None, source="known")
+    plain = replace(impedance, corrected_ripple=None)
+    assert np.array_equal(twin.predict([impedance], theta)[0], twin.predict([plain], theta)[0])

@@ -86,7 +86,7 @@ class ForwardModel:
         amplitude = np.ones(len(self.s), complex)
         for o, part in zip(self.observations, self.slices):
             known = getattr(o, "corrected_ripple", None)
-            if known is not None:
+            if known is not None and o.orders is not None:
                 amplitude[part] = known.at(o.label, np.asarray(o.orders))
         return amplitude
 
