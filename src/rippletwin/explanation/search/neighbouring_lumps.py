@@ -23,6 +23,7 @@ from rippletwin.twin.effects.library import EFFECTS, next_instance
 from rippletwin.twin.parameters import coordinates
 
 LUMP, PIECE = "line_volume", "passive_piece"
+SHORTEST = 0.01  # m, with which a piece begins
 
 
 def merge_neighbours(workers: Workers, search: Search) -> tuple[Search, Fit | None]:
@@ -49,10 +50,12 @@ def merge_neighbours(workers: Workers, search: Search) -> tuple[Search, Fit | No
 def _rows(workers: Workers, best: Fit) -> list[list]:
     """Groups of at least two volumes of `best` whose neighbours act as one pipe, in the order of
     their positions."""
-    highest_hz = max(float(np.max(o.frequency_hz)) for o in workers.observations)
-    values, groups = best.twin.values(), []
     volumes = [m for m in best.hypothesis if m[0] is EFFECTS[LUMP]]
-    last = -np.inf
+    if len(volumes) < 2:
+        return []
+    highest_hz = max(float(np.max(o.frequency_hz)) for o in workers.observations)
+    values, last = best.twin.values(), -np.inf
+    groups: list[list] = []
     for member in sorted(volumes, key=lambda m: values[f"{LUMP}@{m[1]}.position"]):
         position = values[f"{LUMP}@{member[1]}.position"]
         k = segment_at(best.twin.arrays(best.twin.theta).lengths, position)
@@ -70,7 +73,7 @@ def _piece_values(best: Fit, members: list, label: str) -> dict[str, float]:
     values = best.twin.values()
     positions = [values[f"{LUMP}@{place}.position"] for _, place in members]
     volume = sum(values[f"{LUMP}@{place}.volume"] for _, place in members)
-    length = float(np.ptp(positions)) * len(members) / (len(members) - 1)
+    length = max(float(np.ptp(positions)) * len(members) / (len(members) - 1), SHORTEST)
     arrays = best.twin.arrays(best.twin.theta)
     bore = arrays.diameters[segment_at(arrays.lengths, float(np.mean(positions)))]
     softer = 1.0 + volume / (0.25 * np.pi * bore**2 * length)
