@@ -10,7 +10,7 @@ from rippletwin.calibration.misfit import score_fit
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.ripple_correction import correct_ripple
 from rippletwin.harmonics import one_period, peak_amplitudes
-from rippletwin.twin.corrected_ripple import CorrectedRipple
+from rippletwin.spectra.corrected_ripple import CorrectedRipple
 from synthetic_observations import make
 
 

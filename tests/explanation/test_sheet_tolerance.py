@@ -76,28 +76,38 @@ def plain_fit():
 
 
 @pytest.mark.parametrize(
-    ("gains", "taken"), [((2.9, 1.0), None), ((3.0, 1.0), 0), ((3.5, 20.0), 1), ((-9.0, 3.0), 1)]
+    ("wide", "stated", "taken"),
+    [
+        ((-9.0, -3.0), None, None),  # nothing to learn from: no third fit
+        ((2.9, 1.0), 0.0, None),
+        ((3.0, 1.0), 0.0, 3.0),
+        ((3.5, 20.0), 16.0, 20.0),
+        ((3.5, 20.0), 18.0, 18.0),  # the better mode needs no wider tolerances
+        ((-9.0, -2.0), 1.0, 1.0),
+    ],
 )
-def test_wider_tolerances_are_taken_where_they_gain(plain_fit, monkeypatch, gains, taken):
-    """Proves that the better of two fits is taken, the one from the present values and the one
-    begun anew, from 3 of log evidence on; both have twice the data sheet's tolerances, because the
-    fit itself asks for none."""
+def test_wider_tolerances_are_taken_where_they_gain(plain_fit, monkeypatch, wide, stated, taken):
+    """Proves that wider tolerances are taken from 3 of log evidence on over those stated, the mode
+    being the same, and that a better mode which they find is taken in either case. The wider ones
+    are twice the data sheet's, because the fit itself asks for none."""
     fit, workers = plain_fit
     monkeypatch.setattr(sheet_tolerance, "estimate_tolerance_scale", lambda fit: 1.0)
     asked = []
 
     def run(jobs):
-        asked.extend(jobs)
+        asked.append(jobs)
+        gains = wide if len(asked) == 1 else [stated]
         return [replace(fit, evidence=fit.evidence + gain) for gain in gains]
 
-    wider = fit_with_wider_tolerances(
+    found = fit_with_wider_tolerances(
         SimpleNamespace(observations=workers.observations, fit=run), fit
     )
-    assert [job.base.rig.tolerance_scale for job in asked] == [2.0, 2.0]
-    assert [type(job.start) for job in asked] == [FromTheta, Continuation]
-    assert (wider is None) == (taken is None)
+    assert [job.base.rig.tolerance_scale for job in asked[0]] == [2.0, 2.0]
+    assert [type(job.start) for job in asked[0]] == [FromTheta, Continuation]
+    assert (len(asked) == 1) == (stated is None)
+    assert (found is None) == (taken is None)
     if taken is not None:
-        assert wider.evidence == pytest.approx(fit.evidence + gains[taken])
+        assert found.evidence == pytest.approx(fit.evidence + taken)
 
 
 def test_tolerances_four_times_as_wide_are_not_widened(plain_fit):

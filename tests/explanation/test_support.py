@@ -14,6 +14,7 @@ from rippletwin.explanation.checks.support import (
     Judged,
     Support,
     judge_beside_network,
+    judge_beside_piece,
     judge_effects,
 )
 from rippletwin.explanation.localise.elements import NONE
@@ -32,6 +33,7 @@ VOLUME = (EFFECTS["line_volume"], Place("position"))
 LEAK = (EFFECTS["leak"], Place("position"))
 CERTAIN = (EFFECTS["end_radiation"], Place("load"))
 FRICTION = (EFFECTS["unsteady_friction"], Place("line"))
+PIECE = (EFFECTS["passive_piece"], Place("position"))
 NETWORK = (EFFECTS["passive_network"], Place("position", form="shunt"))
 BASE = made_fit(0.0)
 BARE = (NONE, None)
@@ -141,6 +143,27 @@ def test_an_effect_that_is_always_there_stays(levels):
     levels |= {"end_radiation": ("suggested", 0.0), "viscoelastic_wall": ("suggested", 5.0)}
     judged = judge_effects(None, BASE, made_fit(100.0, CERTAIN, HOSE))
     assert judged.best.names == ("end_radiation",)
+
+
+# ---- beside a piece of another pipe ----
+
+
+def test_the_effects_beside_a_piece_keep_what_they_have_beside_it(levels):
+    """The piece is in all models that are judged; the judgement is of the named effects alone, and
+    its best fit has these alone."""
+    levels |= {"line_volume": ("suggested", 3.0), "leak": ("established", 50.0)}
+    levels["passive_piece"] = ("established", 90.0)
+    judged = judge_beside_piece(None, BASE, made_fit(100.0, VOLUME, LEAK, PIECE))
+    assert judged.best.names == ("leak",)
+    assert [(s.name, s.level) for s in judged.supports] == [("leak", "established")]
+    assert len(judged.without) == 1 and judged.without[0].stated.names == ()
+
+
+def test_a_piece_that_is_only_suggested_takes_nothing_with_it(levels):
+    """It is dropped as any effect, and the others are judged without it."""
+    levels |= {"leak": ("established", 50.0), "passive_piece": ("suggested", 1.0)}
+    judged = judge_beside_piece(None, BASE, made_fit(100.0, LEAK, PIECE))
+    assert judged.best.names == ("leak",) and len(judged.supports) == 1
 
 
 # ---- beside a network ----

@@ -12,8 +12,8 @@ import pytest
 
 from rippletwin.errors import InputError
 from rippletwin.line.time_domain.weighting_functions import conduction_terms
+from rippletwin.spectra.corrected_ripple import CorrectedRipple
 from rippletwin.twin import twin_file
-from rippletwin.twin.corrected_ripple import CorrectedRipple
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS, candidates
 from rippletwin.twin.effects.thermal_boundary_layer import thermal_factor

@@ -22,7 +22,7 @@ from rippletwin.calibration.error_model import ErrorModel
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.shaft_angles import find_best_turn, fit_shaft_angles
-from rippletwin.twin.corrected_ripple import CorrectedRipple
+from rippletwin.spectra.corrected_ripple import CorrectedRipple
 
 
 @dataclass(frozen=True)

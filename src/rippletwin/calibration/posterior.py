@@ -184,7 +184,8 @@ class Posterior:
         scale = self.count / max(self.count - taken, 1.0)
         linear = self.forward.linear_load(theta)
         if linear is not None:
-            self._errors.products = PRODUCT_ERROR**2 * _mean_square(prediction - linear)
+            products = self.forward.amplitude * (prediction - linear)
+            self._errors.products = PRODUCT_ERROR**2 * _mean_square(products)
         self._errors.estimate(self._rotate(prediction), scale, near, self.max_model_error)
 
     def follow_source(self, prediction: np.ndarray) -> None:

@@ -9,13 +9,15 @@ ripple of each recording.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.shaft_angles import find_best_turn
-from rippletwin.twin.corrected_ripple import CorrectedRipple
+from rippletwin.spectra.corrected_ripple import CorrectedRipple
+from rippletwin.twin.forward_model import ForwardModel
 
 
 def correct_ripple(fit: Fit, observations: Sequence) -> CorrectedRipple:
@@ -39,3 +41,19 @@ def correct_ripple(fit: Fit, observations: Sequence) -> CorrectedRipple:
             weighted = posterior.power[part][b] * np.conj(ratios[o.label][b]) * ratios[first][a]
             turns[o.label] = find_best_turn(weighted, common)[0]
     return CorrectedRipple(orders, ratios, turns)
+
+
+def with_corrected_ripple(fit: Fit, observations: Sequence, data: Sequence) -> list:
+    """`data`, the observations that were fitted with another nominal ripple or the same, with the
+    corrected ripple that `fit` finds: their nonlinear flow is then that of the ripple that is
+    there."""
+    corrected, theta = correct_ripple(fit, observations), fit.twin.theta
+    before, after = (ForwardModel(fit.twin, each) for each in (observations, data))
+    ratio = before.source.at(theta)[0] / after.source.at(theta)[0]
+    ratios = {
+        o.label: corrected.ratios[o.label] * ratio[part]
+        for o, part in zip(observations, before.slices)
+        if o.label in corrected.ratios
+    }
+    corrected = replace(corrected, ratios=ratios)
+    return [replace(o, corrected_ripple=corrected) if o.label in ratios else o for o in data]

@@ -47,6 +47,7 @@ PARAMETERS = {
     "gas_volume": "volume of the gas at 10 MPa",
     "gain_error": "gain error",
     "viscosity": "kinematic viscosity",
+    "viscosity_slope": "relative change of the viscosity over that of the wave speeds",
     "port_timing": "lag of the port timing",
     "end_correction": "end correction in radii",
 }

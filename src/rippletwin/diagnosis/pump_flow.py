@@ -43,8 +43,8 @@ NUMBERS = (*UNCERTAIN, "port_timing_deg")  # in the order of `moved_pumps`
 
 
 def with_fitted_pump(twin: Twin, mean_flow: float | None = None, speed_hz: float = 1.0) -> Twin:
-    """The twin with its pump's numbers as fitted, and neither they nor shaft angles parameters: the
-    angle between two recordings belongs to the diagnosis.
+    """The twin with its pump's numbers as fitted, and neither they nor shaft angles and states of
+    recordings parameters: those between two recordings belong to the diagnosis.
 
     Where the data sheet gives the number of pistons alone, the default pump is scaled to deliver
     `mean_flow`, m3/s, at `speed_hz`, rev/s.
@@ -52,7 +52,7 @@ def with_fitted_pump(twin: Twin, mean_flow: float | None = None, speed_hz: float
     pump = {key: value for key, value in twin.rig.pump.items() if value is not None}
     if set(pump) == {"pistons"} and mean_flow is not None:
         pump = _scaled(Geometry.from_dict(pump), mean_flow / speed_hz)
-    own = {p.name for p in twin.parameters if p.place == "pump"}
+    own = {"viscosity_slope", *(p.name for p in twin.parameters if p.place == "pump")}
     own.update(f"{kind}[{label}]" for label in twin.labels for kind in ("angle", "state"))
     fitted = {key: value for key, value in twin.fitted_pump().items() if value is not None}
     pump = _with_stated_discharge(pump | fitted, pump.get("discharge_coefficient"))

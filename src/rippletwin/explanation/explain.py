@@ -8,26 +8,27 @@ The steps of the method, each with the module that takes it:
  4. Search: stepwise selection of effects                         search.stepwise_search
  5. Search again with the modulation by the explained line        stages.staged_search
  6. Couple the pump to the line and resume the search             stages.staged_search
- 7. Judge the support of each effect, drop what has none          checks.support
- 8. Find the intervals of the effects' parameters                 checks.profile_intervals
- 9. Fit passive networks, which need no name                      search.passive_networks
-10. Judge the effects beside a network that stands in, and find
+ 7. Take volumes side by side for one stretch of pipe             search.neighbouring_lumps
+ 8. Judge the support of each effect, drop what has none          checks.support
+ 9. Find the intervals of the effects' parameters                 checks.profile_intervals
+10. Fit passive networks, which need no name                      search.passive_networks
+11. Judge the effects beside a network that stands in, and find
     the intervals of both                                         checks.support,
                                                                   checks.profile_intervals
-11. Fit gas in place of volumes of liquid                         search.gas_rivals
-12. Find swapped sensors and inverted signs                       checks.sensor_wiring
-13. Read the alarms: misfit, pull, disagreement, drift            checks.alarms
-14. Repeat the best fits with an unknown source                   localise.source_free_fits
-15. Cross-validate the base and the explanation                   checks.cross_validation
-16. Draw the null distribution of the evidence, if asked for      checks.bootstrap
-17. Test the data sheet: prior sensitivity of accepted effects    checks.prior_sensitivity
-18. Withhold a name from what is in doubt                         checks.support
-19. Decide; cross-validate the line alone if that is accepted     verdict.decision,
+12. Fit gas in place of volumes of liquid                         search.gas_rivals
+13. Find swapped sensors and inverted signs                       checks.sensor_wiring
+14. Read the alarms: misfit, pull, disagreement, drift            checks.alarms
+15. Repeat the best fits with an unknown source                   localise.source_free_fits
+16. Cross-validate the base and the explanation                   checks.cross_validation
+17. Draw the null distribution of the evidence, if asked for      checks.bootstrap
+18. Test the data sheet: prior sensitivity of accepted effects    checks.prior_sensitivity
+19. Withhold a name from what is in doubt                         checks.support
+20. Decide; cross-validate the line alone if that is accepted     verdict.decision,
                                                                   checks.cross_validation
-20. Add the tolerances of the sensors to the intervals            checks.sensor_tolerance
-21. Locate the mismatch and what remains, by free corrections     localise.free_corrections,
+21. Add the tolerances of the sensors to the intervals            checks.sensor_tolerance
+22. Locate the mismatch and what remains, by free corrections     localise.free_corrections,
                                                                   localise.remainder
-22. Analyse the shaft orders by the explained line                localise.shaft_orders,
+23. Analyse the shaft orders by the explained line                localise.shaft_orders,
                                                                   localise.shaft_order_intervals
 
 `verdict.verdict_file` writes the result.
@@ -56,6 +57,7 @@ from rippletwin.explanation.checks.sensor_wiring import find_swapped_sensors
 from rippletwin.explanation.checks.support import (
     Judged,
     judge_beside_network,
+    judge_beside_piece,
     judge_effects,
     withhold_what_is_in_doubt,
 )
@@ -66,6 +68,7 @@ from rippletwin.explanation.localise.shaft_order_intervals import add_amplitude_
 from rippletwin.explanation.localise.shaft_orders import analyse_shaft_orders
 from rippletwin.explanation.localise.source_free_fits import refit_source_free
 from rippletwin.explanation.search.gas_rivals import fit_gas_rivals
+from rippletwin.explanation.search.neighbouring_lumps import merge_neighbours
 from rippletwin.explanation.search.passive_networks import accepted_network, fit_passive_networks
 from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.stages.preparation import HIGHEST_HZ, observe_all, select_fitted_as
@@ -120,7 +123,7 @@ def explain_observations(
     contradiction: str = "",
     draws: int = 0,
 ) -> Explanation:
-    """Explain observations: steps 3 to 22.
+    """Explain observations: steps 3 to 23.
 
     early, late    observations of the two halves of periodic recordings
     contradiction  why the data contradict themselves, if they do; then nothing is searched for
@@ -141,7 +144,7 @@ def explain_observations(
     with open_workers(base, data, processes) as workers:
         if not contradiction:
             search, judged, contradiction = _judge_explanation(workers, search, halves)
-        # Steps 13 to 16: checks
+        # Steps 14 to 17: checks
         point_fits = fit_each_observation(workers, search.base)
         alarms = read_alarms(search.base, data, point_fits, early, late, rig.delay)
         source_free_fits = refit_source_free(workers, search.leading_fits)
@@ -153,7 +156,7 @@ def explain_observations(
         null_distribution = None
         if draws and search.best.hypothesis:
             null_distribution = bootstrap_null(search.base, data, draws, processes, progress)
-        # Steps 17 to 19: the data sheet, and the decision
+        # Steps 18 to 20: the data sheet, and the decision
         sensitivity: tuple[PriorSensitivity, ...] = ()
         if judged.supports:
             sensitivity = compare_without_each_effect(workers, search.best, judged.without)
@@ -165,7 +168,7 @@ def explain_observations(
         if explanation.hypothesis and not decision.accepted.hypothesis:
             # The explanation is rejected: the scores are those of the line alone.
             validation = cross_validate(workers, search.base, search.base, halves, calibrated)
-    # Steps 20 to 22: the sensors' tolerances, and where the mismatch is
+    # Steps 21 to 23: the sensors' tolerances, and where the mismatch is
     accepted = add_sensor_tolerance(decision.accepted, data)
     decision = replace(decision, accepted=accepted)
     location = locate_mismatch(search.base, data)
@@ -196,12 +199,16 @@ def explain_observations(
 def _judge_explanation(
     workers: Workers, search: Search, halves: Halves | None
 ) -> tuple[Search, Judged, str]:
-    """Steps 7 to 12: the search with the explanation that the checks leave and its competitors,
+    """Steps 7 to 13: the search with the explanation that the checks leave and its competitors,
     the support of its effects, and the contradiction in words where the sensors are wired wrongly.
     """
-    judged = judge_effects(workers, search.base, search.best, halves)
+    search, piece = merge_neighbours(workers, search)
+    if piece is None:
+        judged = judge_effects(workers, search.base, search.best, halves)
+    else:
+        judged = judge_beside_piece(workers, search.base, piece, halves)
     judged = replace(judged, best=add_profile_intervals(workers, judged.best))
-    networks = fit_passive_networks(workers, judged.best)
+    networks = fit_passive_networks(workers, judged.best, piece)
     search = replace(search, best=judged.best, passive_networks=networks)
     network = accepted_network(search)
     if network is not None:

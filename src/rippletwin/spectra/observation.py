@@ -13,6 +13,7 @@ from rippletwin.case.model import FlowRipple, Recording, Rig, Sensor
 from rippletwin.errors import InputError
 from rippletwin.harmonics import peak_amplitudes
 from rippletwin.spectra.angular_resampling import Revolutions, cut_revolutions
+from rippletwin.spectra.corrected_ripple import CorrectedRipple
 from rippletwin.spectra.frequency_selection import select_frequencies
 from rippletwin.spectra.speed_regression import mean_speed, regress_to_mean_speed
 from rippletwin.spectra.transfer_function import coherent_spectra
@@ -33,7 +34,8 @@ class Observation:
     source is not the shaft. Fits use nothing below `min_frequency_hz`. mean (S,) is the mean
     pressure, Pa. `source` is what is known of the flow source: "known" (impedance), "nominal" (a
     flow ripple or a pump model) or "free". `modulation` b, rad: the shaft leads uniform rotation by
-    Re(b exp(j t)) rad, and modulates the nominal ripple.
+    Re(b exp(j t)) rad, and modulates the nominal ripple. `corrected_ripple` is what is known of the
+    ripple beyond the nominal one: what load and compliance do in no proportion follows from it.
     """
 
     kind: str
@@ -51,6 +53,7 @@ class Observation:
     normalised: bool = False
     min_frequency_hz: float = 0.0
     modulation: complex = 0.0
+    corrected_ripple: CorrectedRipple | None = None
 
     @property
     def variance(self) -> np.ndarray:

@@ -223,19 +223,19 @@ class DifferentiableForward(ForwardModel):
             sensor_positions=v.positions,
             sensor_factor=v.gains,
         )
-        density = rig.fluid.density
+        density, viscosity = rig.fluid.density, self._viscosity(coordinates, v)
         for k, (a, d) in enumerate(zip(v.wave_speeds, v.diameters)):
             network.series[k] = series_impedance(
-                self.s, density=density, viscosity=v.viscosity, diameter=d, friction=twin.friction
+                self.s, density=density, viscosity=viscosity, diameter=d, friction=twin.friction
             )
             network.shunt[k] = shunt_admittance(self.s, density=density, wave_speed=a, diameter=d)
-        network.shunt *= self._state_factor(coordinates)
-        state = self.line_state(v)
+        network.shunt *= self._softness(coordinates)
+        line = self.line_state(coordinates, v)
         for effect, place, own in twin.applied_effects(coordinates):
             own = {name: x[:, None] for name, x in own.items()}
             if "position" in own:
                 own["position"] = own["position"][0, 0]
-            effect.apply(network, state, own, place)
+            effect.apply(network, line, own, place)
         for k, length in enumerate(v.lengths):
             network.series[k] *= length / base.lengths[k]
             network.shunt[k] *= length / base.lengths[k]

@@ -40,7 +40,8 @@ class ForwardModel:
     reflection coefficient (1, F), see `twin.reflection`.
 
     observations may be `OperatingCondition`s. `slices` has each one's columns among all F; `solved`
-    says whether orifice and nonlinear compliance of the last prediction are in a steady state.
+    says whether orifice and nonlinear compliance of the last prediction are in a steady state;
+    `amplitude` (F,) is what is known of the source over the nominal one.
     """
 
     def __init__(self, twin: Twin, observations: Sequence):
@@ -70,6 +71,7 @@ class ForwardModel:
         self._series_cache: dict[int, tuple] = {}
         self._ripples = [point.ripple for point in points]
         self._periodic = [r for r, ripple in enumerate(self._ripples) if ripple is not None]
+        self.amplitude = self._known_amplitude()
         self.solved = True
         self._last_linear: tuple[bytes, FrequencyDomainLine] | None = None
         periodic = [self.slices[r] for r in self._periodic]
@@ -77,6 +79,16 @@ class ForwardModel:
 
     def __call__(self, theta: np.ndarray) -> list[np.ndarray]:
         return self._read(self.network(theta), theta)
+
+    def _known_amplitude(self) -> np.ndarray:
+        """(F,) by which the ripple of each recording is multiplied where load and compliance are
+        nonlinear, what is known of it over the nominal one; 1 where nothing is."""
+        amplitude = np.ones(len(self.s), complex)
+        for o, part in zip(self.observations, self.slices):
+            known = getattr(o, "corrected_ripple", None)
+            if known is not None and o.orders is not None:
+                amplitude[part] = known.at(o.label, np.asarray(o.orders))
+        return amplitude
 
     def unit_response(self, theta: np.ndarray) -> list[np.ndarray]:
         """Predictions, list of (S, F), Pa s/m3, at theta (P,) for a unit flow at every frequency,
@@ -133,10 +145,11 @@ class ForwardModel:
     def _make_linear(self, theta: np.ndarray) -> FrequencyDomainLine:
         twin, rig = self.twin, self.twin.rig
         v = twin.arrays(theta)
+        viscosity = self._viscosity(theta, v)
         series = np.array(
-            [self._series(k, d, v.viscosity) for k, d in enumerate(v.diameters)], dtype=complex
+            [self._series(k, d, viscosity) for k, d in enumerate(v.diameters)], dtype=complex
         )
-        shunt = self._state_factor(theta) * shunt_admittance(
+        shunt = self._softness(theta) * shunt_admittance(
             self.s,
             density=rig.fluid.density,
             wave_speed=v.wave_speeds[:, None],
@@ -155,33 +168,45 @@ class ForwardModel:
             sensor_factor=v.gains,
         )
         if twin.effects:
-            state = self.line_state(v)
+            line = self.line_state(theta, v)
             for effect, place, values in twin.applied_effects(theta):
-                effect.apply(network, state, values, place)
+                effect.apply(network, line, values, place)
         return network
 
-    def _state_factor(self, theta: np.ndarray) -> np.ndarray | float:
-        """What the state of each recording makes of shunt admittances, (..., F); `theta` may be
+    def _states(self, theta: np.ndarray) -> np.ndarray:
+        """Factor (..., R) on the wave speeds while each of R recordings was made; `theta` may be
         (P, B)."""
-        if not self.twin.changing_state:
-            return 1.0
-        factor = np.ones((*np.shape(theta)[1:], len(self.s)))
-        for o, part in zip(self.observations, self.slices):
+        factors = np.ones((*np.shape(theta)[1:], len(self.observations)))
+        for r, o in enumerate(self.observations):
             k = self.twin.index.get(f"state[{o.label}]")
             if k is not None:
-                speed = self.twin.parameters[k].value(theta[k])
-                factor[..., part] = np.asarray(speed**-2.0)[..., None]
-        return factor
+                factors[..., r] = self.twin.parameters[k].value(theta[k])
+        return factors
 
-    def line_state(self, v: Arrays) -> LineState:
-        """The numbers of the line that effects need, with `v` of `Twin.arrays`."""
+    def _softness(self, theta: np.ndarray) -> np.ndarray | float:
+        """What the state of each recording makes of shunt admittances, (..., F)."""
+        if not self.twin.changing_state:
+            return 1.0
+        return (self._states(theta) ** -2.0)[..., self.recording]
+
+    def _viscosity(self, theta: np.ndarray, v: Arrays) -> np.ndarray | float:
+        """Kinematic viscosity (..., F) while each recording was made, m2/s."""
+        if not self.twin.changing_state:
+            return v.viscosity
+        k = self.twin.index["viscosity_slope"]
+        slope = np.asarray(self.twin.parameters[k].value(theta[k]))[..., None]
+        return v.viscosity * (self._states(theta) ** slope)[..., self.recording]
+
+    def line_state(self, theta: np.ndarray, v: Arrays) -> LineState:
+        """The numbers of the line that effects need, with `v` of `Twin.arrays` at theta (P,) or
+        (P, B)."""
         fluid = self.twin.rig.fluid
         resistance = None
         if self.twin.rig.load.kind == "orifice":
             resistance = 1.0 / self.load.orifice_admittance(v.load)
         return LineState(
             density=fluid.density,
-            viscosity=v.viscosity,
+            viscosity=self._viscosity(theta, v),
             diameters=v.diameters,
             wave_speeds=v.wave_speeds,
             lengths=v.lengths,
@@ -197,9 +222,10 @@ class ForwardModel:
             effects=self.twin.effects,
         )
 
-    def _series(self, segment: int, diameter: float, viscosity: float) -> np.ndarray:
+    def _series(self, segment: int, diameter: float, viscosity: np.ndarray | float) -> np.ndarray:
+        key = diameter, np.asarray(viscosity).tobytes()
         last, value = self._series_cache.get(segment, (None, None))
-        if last != (diameter, viscosity):
+        if last != key:
             value = series_impedance(
                 self.s,
                 density=self.twin.rig.fluid.density,
@@ -207,7 +233,7 @@ class ForwardModel:
                 diameter=diameter,
                 friction=self.twin.friction,
             )
-            self._series_cache[segment] = (diameter, viscosity), value
+            self._series_cache[segment] = key, value
         return value
 
     def _balance(
@@ -223,27 +249,35 @@ class ForwardModel:
             whole = wide._linear(theta)
             whole.source_flow = np.array(whole.source_flow)
             whole.source_flow[seen] = network.source_flow
+            whole.source_flow *= wide.amplitude
             solver = wide.compliance_solver
             tolerance = min(COUPLED_ORIFICE_TOLERANCE, solver.tolerance)
             solve_load = wide.load.make_solver(
                 whole, self.twin.load_factor(theta), tolerance=tolerance
             )
-            state = [x[seen] for x in solver.solve(whole, solve_load)]
+            state = [x[seen] / self.amplitude for x in solver.solve(whole, solve_load)]
             self.solved = solver.solved and wide.load.solved
             positions, outflow = whole.outflows
-            network.outflows = positions, outflow[:, seen]
+            network.outflows = positions, outflow[:, seen] / self.amplitude
             if self.load.orifice is not None:
                 network.load = "state", tuple(state)
         else:
             wide, seen = self._extended_for_orifice
-            pressure, flow = wide.load.balance(whole, self.twin.load_factor(theta))
+            whole.source_flow = whole.source_flow * wide.amplitude
+            state = wide.load.balance(whole, self.twin.load_factor(theta))
             self.solved = wide.load.solved
-            network.load = "state", (pressure[seen], flow[seen])
+            network.load = "state", tuple(x[seen] / self.amplitude for x in state)
 
     def _balance_load(self, network: FrequencyDomainLine, theta: np.ndarray) -> None:
         """Set the full-amplitude state at the load of `network`, whose outflows are given."""
         if self.load.orifice is not None:
-            network.load = "state", tuple(self.load.balance(network, self.twin.load_factor(theta)))
+            scaled = copy(network)
+            scaled.source_flow = network.source_flow * self.amplitude
+            if network.outflows is not None:
+                positions, outflow = network.outflows
+                scaled.outflows = positions, outflow * self.amplitude
+            state = self.load.balance(scaled, self.twin.load_factor(theta))
+            network.load = "state", tuple(x / self.amplitude for x in state)
         self.solved = self.load.solved
 
     @cached_property

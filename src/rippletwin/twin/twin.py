@@ -14,6 +14,8 @@ and every prior is N(0, 1). Its entries, in this order (segments and recordings 
     angle[LABEL]                            shaft angle at a recording's first sample, rad; no prior
     state[LABEL]                            factor on all wave speeds while a recording was made,
                                             where `changing_state` says so
+    viscosity_slope                         relative change of the viscosity over that of these
+                                            wave speeds, from recording to recording
     LABEL.NAME                              parameters of the effects, with their own priors
 
 An effect at its place is a pair (effect, place) of `rippletwin.twin.effects`; its LABEL is
@@ -31,8 +33,8 @@ import numpy as np
 
 from rippletwin.case.model import FlowRipple, Rig, Sensor
 from rippletwin.line.frequency_domain.pipe_immittance import FRICTION_LAWS
+from rippletwin.spectra.corrected_ripple import CorrectedRipple
 from rippletwin.twin import parameters as coordinates
-from rippletwin.twin.corrected_ripple import CorrectedRipple
 from rippletwin.twin.forward_model import ForwardModel
 from rippletwin.twin.nominal_ripples import NominalRipples
 from rippletwin.twin.operating_point import (
@@ -47,7 +49,7 @@ from rippletwin.twin.parameters import (
     line_parameters,
     load_parameters,
     pump_parameters,
-    state_parameter,
+    state_parameters,
 )
 from rippletwin.twin.priors import Priors
 
@@ -133,7 +135,7 @@ class Twin:
             *gain_parameters(rig, bool(self.labels)),
             *(pump_parameters(rig) if self.uncertain_pump else ()),
             *(angle_parameter(label) for label in self.labels),
-            *(state_parameter(label) for label in self.labels if self.changing_state),
+            *(state_parameters(self.labels) if self.changing_state else ()),
             *effect_parameters(self.effects, self._effect_parameters),
         )
         self.index = {p.name: k for k, p in enumerate(self.parameters)}

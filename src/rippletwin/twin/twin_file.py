@@ -11,7 +11,7 @@ import numpy as np
 
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor, Uncertainty
 from rippletwin.errors import InputError
-from rippletwin.twin.corrected_ripple import CorrectedRipple
+from rippletwin.spectra.corrected_ripple import CorrectedRipple
 from rippletwin.twin.effects.base import Effect, Place
 from rippletwin.twin.effects.library import add_effects, find_effect
 from rippletwin.twin.operating_point import OperatingCondition

@@ -103,6 +103,20 @@ def judge_effects(workers: Workers, base: Fit, best: Fit, halves: Halves | None 
         best = without[weakest].stated
 
 
+def judge_beside_piece(
+    workers: Workers, base: Fit, pieced: Fit, halves: Halves | None = None
+) -> Judged:
+    """`judge_effects` of the named effects of `pieced`, whose newest effect is a passive network,
+    with that in all models: without it they would answer for what it explains."""
+    judged, piece = judge_effects(workers, base, pieced, halves), pieced.hypothesis[-1]
+    if piece not in judged.best.hypothesis:
+        return judged
+    k = judged.best.hypothesis.index(piece)
+    named = judged.without[k].stated
+    supports = judged.supports[:k] + judged.supports[k + 1 :]
+    return Judged(named, supports, fit_without_each_effect(workers, base, named))
+
+
 def judge_beside_network(
     workers: Workers, base: Fit, network: Fit, judged: Judged
 ) -> tuple[Fit, Judged]:

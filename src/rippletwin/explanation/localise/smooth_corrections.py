@@ -14,7 +14,7 @@ form:
 r whitened residual, J its Jacobian, G the changes that a unit of the correction makes. The
 amplitude a and the relative model error are unknown: the likelihood is averaged over grids of both.
 What linearising gains or loses at the most likely amplitudes is put right: there the square sum is
-calculated without it.
+calculated without it, but for what a nonlinear compliance takes up, which stays as at the mode.
 (Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63:425; Rasmussen and Williams 2006, Gaussian
 Processes for Machine Learning, eq. 2.30.)
 """
@@ -60,7 +60,10 @@ class SmoothCorrections:
         self._posterior = Posterior(fit.twin, observations, None, fit.source_free)
         self._prediction = self._posterior.predict(self.theta)
         self._posterior.estimate_errors(self._prediction, self.theta)
-        self.network = self._posterior.forward.network(self.theta)
+        # As in the Jacobian: to solve it for each correction takes long, most of all in vain.
+        forward = self._posterior.forward
+        forward.freeze_compliance = forward.has_nonlinear_compliance
+        self.network = forward.network(self.theta)
         self._observed = observable_of(self._posterior, self.network, self.theta)
         self._basis = smooth_basis(self.frequency_hz)
         slopes = self._posterior.slopes(self.theta, self._prediction)

@@ -13,10 +13,12 @@ from rippletwin.calibration.fit import Fit
 from rippletwin.explanation.fit_jobs import (
     Continuation,
     FitJob,
+    FromTheta,
     Workers,
     rank_by_evidence,
     score_extension,
 )
+from rippletwin.explanation.fit_starts import transfer_theta
 from rippletwin.explanation.search.single_effects import refined_starts
 from rippletwin.explanation.search.stepwise_moves import (
     MIN_PROMISE,
@@ -39,9 +41,13 @@ WRONG_MODE_FITS = 3  # of the best fits: those in wrong local modes are fitted a
 MAX_NETWORKS = 3  # in one line
 
 
-def fit_passive_networks(workers: Workers, best: Fit) -> list[Fit]:
+def fit_passive_networks(workers: Workers, best: Fit, known: Fit | None = None) -> list[Fit]:
     """Fits of passive networks alone and added to `best`, best first; none where `best` leaves
-    nothing that a network could explain, or no network promises anything."""
+    nothing that a network could explain, or no network promises anything.
+
+    known   a fit whose newest effect is a network that explains the data beside others: one more
+            start
+    """
     if leaves_nothing(best):
         return []
     networks = library.candidates(workers.base.rig, named=False)
@@ -51,6 +57,10 @@ def fit_passive_networks(workers: Workers, best: Fit) -> list[Fit]:
         jobs = [job for promise, job in scored if promise >= MIN_PROMISE]
         if not jobs:
             return []
+    if known is not None:
+        hypothesis = (*best.hypothesis, known.hypothesis[-1])
+        theta = transfer_theta(known, hypothesis, workers.base)
+        jobs.append(FitJob(hypothesis, FromTheta(theta)))
     fits = workers.fit(jobs)
     if not best.hypothesis or min(f.model_error for f in fits) > BIASED_MODEL_ERROR:
         usual = tuple(

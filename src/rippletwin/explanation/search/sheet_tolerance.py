@@ -68,11 +68,13 @@ def evidence_of_scales(mean: np.ndarray, covariance: np.ndarray) -> np.ndarray:
 
 
 def fit_with_wider_tolerances(workers: Workers, best: Fit) -> Fit | None:
-    """The hypothesis of `best` with wider tolerances of the data sheet, where that adds as much
-    evidence as tells two explanations apart; else None.
+    """A better fit of the hypothesis of `best` that wider tolerances of the data sheet find; else
+    None.
 
     The factor is that of `estimate_tolerance_scale`, or WIDER where that is 1. The fit goes on from
-    `best`, and is begun anew with random starts.
+    `best`, and is begun anew with random starts. The mode that it finds is fitted with the
+    tolerances of `best` too: the wider ones must add as much evidence as tells two explanations
+    apart.
     """
     scale = estimate_tolerance_scale(best)
     rig = scale_tolerances(best.twin.rig, WIDER if scale == 1.0 else scale)
@@ -86,8 +88,14 @@ def fit_with_wider_tolerances(workers: Workers, best: Fit) -> Fit | None:
     )
     fits = workers.fit([FitJob(best.hypothesis, start, base=base) for start in starts])
     wider = max(fits, key=lambda fit: fit.evidence)
-    gain = wider.evidence - best.evidence
-    return wider if gain >= EQUIVALENT_LOG_BAYES_FACTOR else None
+    if wider.evidence <= best.evidence - EQUIVALENT_LOG_BAYES_FACTOR:
+        return None
+    start = FromTheta(coordinates(best.twin.parameters, wider.twin.values()))
+    (stated,) = workers.fit([FitJob(best.hypothesis, start)])
+    narrow = max(best, stated, key=lambda fit: fit.evidence)
+    if wider.evidence >= narrow.evidence + EQUIVALENT_LOG_BAYES_FACTOR:
+        return wider
+    return None if narrow is best else narrow
 
 
 def scale_tolerances(rig: Rig, scale: float) -> Rig:

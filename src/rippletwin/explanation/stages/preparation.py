@@ -75,6 +75,7 @@ def select_fitted_as(
             half,
             flow_ripple=whole[half.label].flow_ripple,
             modulation=whole[half.label].modulation,
+            corrected_ripple=whole[half.label].corrected_ripple,
         )
         for half in halves
     ]

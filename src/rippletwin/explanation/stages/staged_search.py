@@ -1,7 +1,8 @@
 """Steps 4 to 6 of `explain`: search, and search again with what the first search has shown.
 
-The explained line gives a better modulation of the shaft, the pressure at the pump, to which a
-simulated pump responds, and the tolerances that the data sheet should have stated.
+The explained line gives a better modulation of the shaft, the ripple that is there, with which
+nonlinear flows are calculated, the pressure at the pump, to which a simulated pump responds, and
+the tolerances that the data sheet should have stated.
 """
 
 from __future__ import annotations
@@ -9,7 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
+from rippletwin.calibration.fit import Fit
+from rippletwin.calibration.ripple_correction import with_corrected_ripple
 from rippletwin.case.model import Rig
 from rippletwin.explanation.fit_jobs import FitJob, make_base, open_workers
 from rippletwin.explanation.localise.phase_modulation import (
@@ -26,11 +31,13 @@ from rippletwin.explanation.search.sheet_tolerance import (
 from rippletwin.explanation.search.stepwise_search import Search, resume_search, search_effects
 from rippletwin.explanation.stages.preparation import HIGHEST_HZ, prepare_base
 from rippletwin.spectra.observation import Observation
+from rippletwin.twin.forward_model import ForwardModel
 from rippletwin.twin.pump_line_coupling import couple_pump_to_line
 from rippletwin.twin.twin import Twin
 
 MAX_MODEL_ERROR_FOR_COUPLING = 10.0 * MIN_MODEL_ERROR
 """Relative model error above which pressure and flow at the pump are too uncertain."""
+NOTICED_CHANGE = 0.25  # of the least model error: a change of the prediction that is fitted again
 MAX_RESUMED = 2  # times
 
 Progress = Callable[[str, int, int], None]
@@ -102,15 +109,18 @@ def _search_again(
 def _resume_search(
     stage: Stage, search: Search, processes: int, progress: Progress | None
 ) -> tuple[Stage, Search]:
-    """Widen the data sheet's tolerances by what the fit shows, let a simulated pump respond to the
-    line's pressure, and resume the search."""
+    """Widen the data sheet's tolerances by what the fit shows, calculate what is nonlinear with the
+    ripple that it shows, let a simulated pump respond to the line's pressure, and resume the
+    search."""
     search, scale = _widen_tolerances(stage, search, processes)
-    coupled = None
-    if search.best.model_error < MAX_MODEL_ERROR_FOR_COUPLING:
-        coupled = couple_pump_to_line(search.best.twin, stage.observations)
-    if coupled is None and scale == 1.0:
+    best, data = search.best, stage.observations
+    if best.model_error < MAX_MODEL_ERROR_FOR_COUPLING:
+        coupled = couple_pump_to_line(best.twin, data) or data
+        corrected = with_corrected_ripple(best, data, coupled)
+        if coupled is not data or changes_prediction(best, data, corrected):
+            data = corrected
+    if data is stage.observations and scale == 1.0:
         return stage, search
-    data = coupled or stage.observations
     for _ in range(MAX_RESUMED):
         rig = scale_tolerances(stage.base.rig, scale)
         base = make_base(rig, data)
@@ -123,12 +133,23 @@ def _resume_search(
     return stage, search
 
 
+def changes_prediction(fit: Fit, before: Sequence[Observation], after: Sequence) -> bool:
+    """Whether a fit predicts other readings for the observations `after` than for those `before`,
+    by more than a part of the least model error."""
+    old, new = (
+        np.concatenate(ForwardModel(fit.twin, data)(fit.twin.theta), axis=1)
+        for data in (before, after)
+    )
+    change = np.mean(np.abs(new - old) ** 2, axis=0) / np.mean(np.abs(old) ** 2, axis=0)
+    return bool(np.sqrt(np.mean(change)) > NOTICED_CHANGE * MIN_MODEL_ERROR)
+
+
 def _widen_tolerances(stage: Stage, search: Search, processes: int) -> tuple[Search, float]:
-    """The search with its best explanation under wider tolerances of the data sheet, if they gain,
-    and the factor on them."""
+    """The search with the better fit that wider tolerances of the data sheet find, if any, and the
+    factor on them."""
     with open_workers(stage.base, stage.observations, processes) as workers:
-        wider = fit_with_wider_tolerances(workers, search.best)
-    if wider is None:
+        better = fit_with_wider_tolerances(workers, search.best)
+    if better is None:
         return search, 1.0
-    factor = wider.twin.rig.tolerance_scale / stage.base.rig.tolerance_scale
-    return replace(search, best=wider), factor * estimate_tolerance_scale(wider)
+    factor = better.twin.rig.tolerance_scale / stage.base.rig.tolerance_scale
+    return replace(search, best=better), factor * estimate_tolerance_scale(better)

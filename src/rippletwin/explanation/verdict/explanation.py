@@ -18,7 +18,7 @@ from rippletwin.explanation.localise.shaft_orders import ShaftOrders
 from rippletwin.explanation.search.stepwise_search import Search
 from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
 from rippletwin.explanation.verdict.decision import Decision
-from rippletwin.twin.corrected_ripple import CorrectedRipple
+from rippletwin.spectra.corrected_ripple import CorrectedRipple
 from rippletwin.twin.twin import Twin
 
 

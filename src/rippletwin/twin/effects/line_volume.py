@@ -22,7 +22,11 @@ EFFECT = Effect(
     source="Wylie & Streeter 1993, sec. 12.5 (lumped capacitance)",
     parameters=lambda rig, place: (
         position_parameter(rig),
-        Parameter("volume", "m3", lognormal(5e-5 * (rig.line[0].diameter / 0.02) ** 3, 1.2)),
+        # From the bore of a sensor's adapter, a tenth of a cm3, to a filter's housing. Fits start
+        # at ten times the median: a small volume is found beside other effects.
+        Parameter(
+            "volume", "m3", lognormal(5e-6 * (rig.line[0].diameter / 0.02) ** 3, 2.0), (1.15,)
+        ),
     ),
     places=position_place,
     apply=_apply,

@@ -13,16 +13,17 @@ from rippletwin.twin.effects.base import Effect, line_place
 
 def friction_excess(s, viscosity, diameter, density):
     """Z'_unsteady - Z'_steady (..., F), Pa s/m4, at s (F,); `viscosity` and `diameter` broadcast to
-    (..., 1) or are scalars."""
-    rate = 4.0 * viscosity / diameter**2
-    if np.ndim(viscosity):
-        # A batch has few distinct nu/R^2, and friction takes long.
-        distinct, inverse = np.unique(rate, return_inverse=True)
-        distinct = distinct[:, None]
-        excess = distinct * (scaled_friction(s / distinct) - 8.0) - s
-        excess = excess[inverse.ravel()].reshape(*np.shape(rate)[:-1], -1)
-    else:
+    (..., F) or (..., 1), m2/s and m."""
+    rate = 4.0 * viscosity / diameter**2  # nu/R^2
+    if np.ndim(rate) <= 2:
         excess = rate * (scaled_friction(s / rate) - 8.0) - s
+    else:  # a batch has few distinct rows, and friction takes long
+        rows = rate.reshape(-1, rate.shape[-1])
+        key = rows @ np.sqrt(np.arange(1.0, rows.shape[1] + 1.0))
+        _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
+        distinct = rows[first]
+        excess = distinct * (scaled_friction(s / distinct) - 8.0) - s
+        excess = excess[inverse.ravel()].reshape(*rate.shape[:-1], -1)
     return excess * (density / (0.25 * np.pi)) / diameter**2
 
 
