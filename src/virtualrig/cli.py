@@ -77,7 +77,12 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True)
     make = commands.add_parser("record", help="record operating points into a new case folder")
     make.add_argument("--out", type=Path, required=True, help="case folder to write (new or empty)")
-    make.add_argument("--seed", type=int, default=0, help="noise, wander, settings, shaft angles")
+    make.add_argument(
+        "--seed",
+        type=int,
+        default=0,
+        help="of the noise, the wander of the speed, the settings and the shaft angles",
+    )
     make.add_argument("--processes", type=int, default=1, help="operating points at a time")
     make.add_argument("--seconds", type=float, help="length of every recording")
     make.add_argument(

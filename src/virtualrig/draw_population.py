@@ -85,7 +85,7 @@ def draw_rig(commit: str, number: int | str, rig: int) -> DrawnRig:
 
 
 def draw_sheet(rng: np.random.Generator) -> dict:
-    """A data sheet with a pump of 13 to 60 cm3 a revolution; its sensors are clear of joints."""
+    """A data sheet with a pump of 8 to 54 cm3 a revolution; its sensors are clear of joints."""
     sheet = draw_data_sheet(rng)
     pump = sheet["pump"]
     pump["piston_diameter"] = _digits(rng.uniform(0.012, 0.018))

@@ -38,8 +38,9 @@ of the data sheet."""
     type=int,
     default=0,
     metavar="N",
-    help="Where something is named, N recordings drawn without it and fitted with the whole "
-    "library say what chance gives (at least 10; each takes a good part of the first search).",
+    help="Where something is named, draw N recordings without it and fit them with the whole "
+    "library: the evidence that chance adds is the threshold (at least 10; each takes a good part "
+    "of the first search).",
 )
 @options.fail_on(FOUND, "This is the verdict, or physics is missing.")
 def command(

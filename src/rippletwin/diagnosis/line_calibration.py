@@ -4,7 +4,7 @@ A twin whose pump is not the true one bends its line where a fit to the whole ri
 diameters and viscosity make up for a wrong flow. Nothing of that is true for a change. So the line
 is fitted again to the healthy recordings with the flow at the pump free at each order: only ratios
 between sensors count, and these are the line's alone (Johnston and Drew 1996, Proc. IMechE I 210,
-on unknown sources). The healthy flow is in the anchor, where it needs no model.
+65, on unknown sources). The healthy flow is in the anchor, where it needs no model.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ with the covariance R of the equations' errors (sensor noise and model error) an
 variance P. It is Tikhonov regularisation with physical weights: where two sensors are half a wave
 apart and read the same, the load's equation determines the rest; without it the estimate goes to
 zero instead of to infinity. (Two-sensor inversion and its blind frequencies: Johnston & Drew 1996,
-Proc. IMechE I 210, 125.)
+Proc. IMechE I 210, 65.)
 """
 
 from __future__ import annotations

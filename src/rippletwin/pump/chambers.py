@@ -7,7 +7,7 @@ Sys. Meas. Control 111, 307; here without the oil's inertia in the ports):
 
 so that dc = dp/B_eff with 1/B_eff = 1/B + x p0/p^2: liquid of bulk modulus B with the volume
 fraction x of air at pressure p0, compressed isothermally (Merritt 1967, Hydraulic Control
-Systems, eq. 2-14). Air keeps p positive where a closed chamber would pull the liquid apart.
+Systems, ch. 2). Air keeps p positive where a closed chamber would pull the liquid apart.
 
 Flows through ports and leaks are turbulent orifices, linear within `SMOOTHING` of no drop. That
 makes the equations stiff (rates near 1e7 1/s), so each step is a two-stage diagonally implicit

@@ -9,7 +9,7 @@ pressure it takes in the flow
 Ports and volumes vary with the shaft angle. A harmonic's response at its own frequency is the mean
 over a revolution: the diagonal of the harmonic transfer matrix (Wereley 1991, Analysis and Control
 of Linear Periodically Time Varying Systems, ch. 3). With the flow into a constant pressure this is
-the pump's Norton source (Johnston & Drew 1996, Proc. IMechE I 210, 137).
+the pump's Norton source (Johnston & Drew 1996, Proc. IMechE I 210, 65).
 """
 
 from __future__ import annotations

@@ -57,7 +57,7 @@ EFFECT = Effect(
     equation="dV/V = alpha ((p_atm/p)^(1/n) - (p_atm/(p + p'))^(1/n)) beside p'/(rho a^2); to a "
     "small ripple Y' = A s (1/(rho a^2) + alpha (p_atm/p)^(1/n)/(n p))",
     source="Wylie & Streeter 1993, Fluid Transients in Systems, sec. 1.4; "
-    "Merritt 1967, Hydraulic Control Systems, eq. 2-11",
+    "Merritt 1967, Hydraulic Control Systems, ch. 2",
     parameters=lambda rig, place: (
         Parameter("gas_fraction", "1", lognormal(5e-3, 1.2)),
         polytropic_parameter(),
