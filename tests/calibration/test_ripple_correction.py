@@ -8,7 +8,7 @@ import pytest
 from rippletwin.calibration.fit import conclude_fit
 from rippletwin.calibration.misfit import score_fit
 from rippletwin.calibration.posterior import Posterior
-from rippletwin.calibration.ripple_correction import correct_ripple
+from rippletwin.calibration.ripple_correction import correct_ripple, with_corrected_ripple
 from rippletwin.harmonics import one_period, peak_amplitudes
 from rippletwin.spectra.corrected_ripple import CorrectedRipple
 from synthetic_observations import make
@@ -71,3 +71,30 @@ def test_what_turns_the_shaft_is_no_error_of_the_ripple():
     )
     np.testing.assert_allclose(turned.at("c", orders), ratio, rtol=1e-12)
     np.testing.assert_array_equal(CorrectedRipple({}, {}, {}).at("c", orders), 1.0)
+
+
+def test_the_corrected_ripple_is_the_same_beside_another_nominal_one(fitted):
+    """The recordings with the ripple that is there as the nominal one: nothing is left to correct.
+    With the nominal ripple of the fit the correction is that of the fit."""
+    fit, data = fitted
+    true = [
+        replace(o, flow_ripple=replace(o.flow_ripple, flow=_with_errors(o.flow_ripple.flow)))
+        for o in data
+    ]
+    found = correct_ripple(fit, data)
+    for o, same, other in zip(
+        data, with_corrected_ripple(fit, data, data), with_corrected_ripple(fit, data, true)
+    ):
+        power = np.mean(np.abs(o.values), axis=0)
+        strong = power > 0.01 * np.max(power)
+        known = same.corrected_ripple.at(o.label, o.orders)
+        np.testing.assert_allclose(known, found.at(o.label, o.orders))
+        left = other.corrected_ripple.at(o.label, o.orders)[strong]
+        np.testing.assert_allclose(left, 1.0, atol=0.02)
+
+
+def _with_errors(flow):
+    """A nominal flow with the error `by_order` that the recordings have."""
+    amplitudes = peak_amplitudes(flow)
+    amplitudes[1:] *= by_order(np.arange(1, len(amplitudes)))
+    return one_period(amplitudes, len(flow))
