@@ -144,9 +144,10 @@ class FitJob:
 
 def run_fit_job(base: Twin, observations: Sequence, job: FitJob) -> Fit:
     """Run a job on the observations, with the twin `base` unless the job has one of its own."""
+    base = base if job.base is None else job.base
     if job.observations is not None:
         observations = [observations[k] for k in job.observations]
-    base = base if job.base is None else job.base
+        base = base.with_(reference=[o.label for o in observations if o.label in base.labels])
     return job.start.fit(base, job.hypothesis, observations, job.source_free)
 
 

@@ -190,12 +190,20 @@ class ForwardModel:
         return (self._states(theta) ** -2.0)[..., self.recording]
 
     def _viscosity(self, theta: np.ndarray, v: Arrays) -> np.ndarray | float:
-        """Kinematic viscosity (..., F) while each recording was made, m2/s."""
-        if not self.twin.changing_state:
+        """Kinematic viscosity (..., F) while each recording was made, m2/s.
+
+        What all recordings have in common is in the viscosity itself: a state would take a part of
+        its error, and move wave speeds with it.
+        """
+        twin = self.twin
+        if not twin.changing_state:
             return v.viscosity
-        k = self.twin.index["viscosity_slope"]
-        slope = np.asarray(self.twin.parameters[k].value(theta[k]))[..., None]
-        return v.viscosity * (self._states(theta) ** slope)[..., self.recording]
+        k = twin.index["viscosity_slope"]
+        slope = np.asarray(twin.parameters[k].value(theta[k]))[..., None]
+        known = [twin.index[f"state[{label}]"] for label in twin.reference or twin.labels]
+        mean = np.exp(np.mean([np.log(twin.parameters[i].value(theta[i])) for i in known], axis=0))
+        about_mean = self._states(theta) / mean[..., None]
+        return v.viscosity * (about_mean**slope)[..., self.recording]
 
     def line_state(self, theta: np.ndarray, v: Arrays) -> LineState:
         """The numbers of the line that effects need, with `v` of `Twin.arrays` at theta (P,) or

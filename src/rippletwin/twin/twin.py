@@ -15,7 +15,7 @@ and every prior is N(0, 1). Its entries, in this order (segments and recordings 
     state[LABEL]                            factor on all wave speeds while a recording was made,
                                             where `changing_state` says so
     viscosity_slope                         relative change of the viscosity over that of these
-                                            wave speeds, from recording to recording
+                                            wave speeds, about the mean of the recordings
     LABEL.NAME                              parameters of the effects, with their own priors
 
 An effect at its place is a pair (effect, place) of `rippletwin.twin.effects`; its LABEL is
@@ -93,6 +93,8 @@ class Twin:
         model calculates how they change the ripple.
     changing_state : whether the line's temperature differs between recordings, where there are two
         or more.
+    reference : labels of the recordings at whose mean state the viscosity is the parameter's; None
+        for all.
     ripple : the pump's flow ripple as recordings correct it, for simulations; predictions of
         observations, which a fit compares with them, take the nominal ripple.
 
@@ -110,6 +112,7 @@ class Twin:
         guessed_load: bool | None = None,
         uncertain_pump: bool = False,
         changing_state: bool = False,
+        reference: Sequence[str] | None = None,
         ripple: CorrectedRipple | None = None,
     ):
         if friction not in FRICTION_LAWS:
@@ -128,6 +131,7 @@ class Twin:
         self.guessed_load = bool(guessed_load)
         self.uncertain_pump = bool(uncertain_pump and self.labels and len(rig.pump) > 1)
         self.changing_state = bool(changing_state and len(self.labels) > 1)
+        self.reference = reference
         self._effect_parameters = [effect.parameters(rig, place) for effect, place in self.effects]
         self.parameters = (
             *line_parameters(rig),
@@ -265,6 +269,7 @@ class Twin:
             "guessed_load": self.guessed_load,
             "uncertain_pump": self.uncertain_pump,
             "changing_state": self.changing_state,
+            "reference": self.reference,
             "theta": None if "effects" in changes else self.theta,
             "ripple": None if "effects" in changes else self.ripple,
         }
