@@ -75,6 +75,14 @@ def test_a_job_may_have_its_own_base_and_observations(workers, calls):
     assert thetas == [theta] and source_free and not exact
 
 
+def test_a_part_of_the_recordings_is_its_own_reference(workers, calls):
+    """Where recordings have states, the viscosity of a fit to some is that at their mean state."""
+    base = Twin(workers.base.rig, workers.observations, changing_state=True)
+    start = FromTheta(np.zeros(len(base.theta)), exact=False)
+    workers.fit([FitJob((), start, (1,), base), FitJob((), start, None, base)])
+    assert [base.reference for _, base, *_ in calls] == [["point 2"], None]
+
+
 def test_a_start_near_a_fit_moves_the_newest_effect_only(workers, calls):
     """All starts have the neighbour's coordinates but for those of the added effect, which starts
     from its scan and, weak, from more positions than the line has wavelengths."""

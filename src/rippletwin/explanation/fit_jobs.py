@@ -147,7 +147,9 @@ def run_fit_job(base: Twin, observations: Sequence, job: FitJob) -> Fit:
     base = base if job.base is None else job.base
     if job.observations is not None:
         observations = [observations[k] for k in job.observations]
-        base = base.with_(reference=[o.label for o in observations if o.label in base.labels])
+        if base.changing_state:
+            own = [o.label for o in observations if o.label in base.labels]
+            base = base.with_(reference=own)
     return job.start.fit(base, job.hypothesis, observations, job.source_free)
 
 
