@@ -272,9 +272,10 @@ class ForwardModel:
         else:
             wide, seen = self._extended_for_orifice
             whole.source_flow = whole.source_flow * wide.amplitude
-            state = wide.load.balance(whole, self.twin.load_factor(theta))
+            pressure, flow = wide.load.balance(whole, self.twin.load_factor(theta))
             self.solved = wide.load.solved
-            network.load = "state", tuple(x[seen] / self.amplitude for x in state)
+            here = self.amplitude
+            network.load = "state", (pressure[seen] / here, flow[seen] / here)
 
     def _balance_load(self, network: FrequencyDomainLine, theta: np.ndarray) -> None:
         """Set the full-amplitude state at the load of `network`, whose outflows are given."""

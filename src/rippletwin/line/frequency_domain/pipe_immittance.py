@@ -17,7 +17,12 @@ FRICTION_LAWS = ("none", "steady", "unsteady")
 
 
 def series_impedance(
-    s: np.ndarray, *, density: float, viscosity: float, diameter: float, friction: str = "unsteady"
+    s: np.ndarray,
+    *,
+    density: float,
+    viscosity: np.ndarray | float,
+    diameter: float,
+    friction: str = "unsteady",
 ) -> np.ndarray:
     """Series impedance Z'(s) of a full pipe in Pa s/m4.
 

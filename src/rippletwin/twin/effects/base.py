@@ -48,7 +48,7 @@ class LineState:
     """The quantities of a line that effects use; each may have a batch dimension (B, 1).
 
     density          kg/m3
-    viscosity        kinematic, m2/s
+    viscosity        kinematic, m2/s, (..., F) or scalar: each recording's own
     friction         law of the line with all its effects, as in `series_impedance`
     diameters, lengths   (n,) of m, wave_speeds (n,) of m/s: one entry a segment, pump first
     mean_pressure    Pa at the load, (F,) or scalar: each frequency's own operating point's
@@ -62,7 +62,7 @@ class LineState:
     """
 
     density: float
-    viscosity: float
+    viscosity: np.ndarray | float
     diameters: np.ndarray
     wave_speeds: np.ndarray
     lengths: np.ndarray
