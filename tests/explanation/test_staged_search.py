@@ -1,24 +1,12 @@
 """When a search is resumed because the ripple is better known."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from rippletwin.calibration.fit import conclude_fit
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.explanation.stages.staged_search import changes_prediction
-from rippletwin.spectra.corrected_ripple import CorrectedRipple
-from synthetic_observations import POINTS, make
-
-
-def with_ratio(observations, ratio):
-    known = CorrectedRipple(
-        {o.label: np.asarray(o.orders) for o in observations},
-        {o.label: np.full(len(o.orders), ratio + 0j) for o in observations},
-        {o.label: 0.0 for o in observations},
-    )
-    return [replace(o, corrected_ripple=known) for o in observations]
+from synthetic_observations import POINTS, make, with_known_ripple
 
 
 @pytest.mark.parametrize(
@@ -32,4 +20,4 @@ def test_a_better_known_ripple_matters_where_the_load_is_not_linear(depth, ratio
     model = Posterior(truth, data)
     model.estimate_errors(model.predict(truth.theta), truth.theta)
     fit = conclude_fit(model, (), truth.theta)
-    assert changes_prediction(fit, data, with_ratio(data, ratio)) is changes
+    assert changes_prediction(fit, data, with_known_ripple(data, ratio)) is changes

@@ -7,6 +7,7 @@ import numpy as np
 from paper_rig import paper_rig
 from rippletwin.case.model import FlowRipple
 from rippletwin.harmonics import one_period, peak_amplitudes
+from rippletwin.spectra.corrected_ripple import CorrectedRipple
 from rippletwin.spectra.observation import Observation
 from rippletwin.twin.forward_model import ForwardModel
 from rippletwin.twin.twin import Twin
@@ -83,3 +84,13 @@ def make(rng, effects=(), values=None, sensors=3, points=POINTS, source=0.03, no
         error = rng.normal(size=(*h.shape, 2)) @ np.array([1, 1j]) / np.sqrt(2)
         recorded.append(replace(o, values=h + error * np.sqrt(o.covariance[0, 0, 0].real)))
     return bench, recorded, twin.with_(theta=theta)
+
+
+def with_known_ripple(observations, ratio):
+    """The observations with a corrected ripple of `ratio` times the nominal one at every order."""
+    known = CorrectedRipple(
+        {o.label: np.asarray(o.orders) for o in observations},
+        {o.label: np.full(len(o.orders), ratio + 0j) for o in observations},
+        {o.label: 0.0 for o in observations},
+    )
+    return [replace(o, corrected_ripple=known) for o in observations]

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rippletwin.spectra.corrected_ripple import CorrectedRipple
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
 from rippletwin.twin.forward_jacobian import DifferentiableForward
 from rippletwin.twin.twin import Twin
 from synthetic_effects import AIR, TRUTH
-from synthetic_observations import POINTS, make
+from synthetic_observations import POINTS, make, with_known_ripple
 
 TIMES = 1.6  # the ripple that is there over the nominal one
 
@@ -26,21 +25,12 @@ def lines(effects):
     return Twin(bench, nominal, effects=effects), theta, nominal, real
 
 
-def with_known_ripple(observations):
-    known = CorrectedRipple(
-        {o.label: np.asarray(o.orders) for o in observations},
-        {o.label: np.full(len(o.orders), TIMES + 0j) for o in observations},
-        {o.label: 0.0 for o in observations},
-    )
-    return [replace(o, corrected_ripple=known) for o in observations]
-
-
 @pytest.mark.parametrize("effects", [(), AIR])
 def test_readings_are_those_of_the_real_ripple_in_proportion(effects):
     """The readings of a ripple 1.6 times the nominal one, over 1.6: exactly so, with an orifice and
     with air in the line. With the nominal ripple alone they are wrong by more than 0.1 %."""
     twin, theta, nominal, real = lines(effects)
-    known = twin.predict(with_known_ripple(nominal), theta)
+    known = twin.predict(with_known_ripple(nominal, TIMES), theta)
     for at_nominal, as_known, there in zip(
         twin.predict(nominal, theta), known, twin.predict(real, theta)
     ):
@@ -52,7 +42,7 @@ def test_readings_are_those_of_the_real_ripple_in_proportion(effects):
 def test_derivatives_are_those_of_the_readings():
     """Against central differences, of a wave speed, the load and the shaft's angle."""
     twin, theta, nominal, _ = lines(())
-    forward = DifferentiableForward(twin, with_known_ripple(nominal))
+    forward = DifferentiableForward(twin, with_known_ripple(nominal, TIMES))
     slopes = forward.derivatives(theta)
     for name in ("wave_speed[2]", "load", "angle[point 1]"):
         k, ends = twin.index[name], []
@@ -67,7 +57,7 @@ def test_derivatives_are_those_of_the_readings():
 def test_what_has_no_shaft_has_no_ripple():
     """An input impedance that could be measured beside the recordings, made from one of them."""
     twin, theta, nominal, _ = lines(())
-    (known, *_) = with_known_ripple(nominal)
+    (known, *_) = with_known_ripple(nominal, TIMES)
     impedance = replace(known, kind="input_impedance", label="new", orders=None, source="known")
     plain = replace(impedance, corrected_ripple=None)
     assert np.array_equal(twin.predict([impedance], theta)[0], twin.predict([plain], theta)[0])

@@ -212,6 +212,7 @@ class DifferentiableForward(ForwardModel):
             reflection=twin.reflection(coordinates),
             gains=twin.gains(coordinates),
         )
+        v = self._as_recorded(coordinates, v)
         source, admittance = self._sources(theta, base, shape)
         network = FrequencyDomainLine(
             s=self.s,
@@ -223,14 +224,14 @@ class DifferentiableForward(ForwardModel):
             sensor_positions=v.positions,
             sensor_factor=v.gains,
         )
-        density, viscosity = rig.fluid.density, self._viscosity(coordinates, v)
+        density = rig.fluid.density
         for k, (a, d) in enumerate(zip(v.wave_speeds, v.diameters)):
             network.series[k] = series_impedance(
-                self.s, density=density, viscosity=viscosity, diameter=d, friction=twin.friction
+                self.s, density=density, viscosity=v.viscosity, diameter=d, friction=twin.friction
             )
             network.shunt[k] = shunt_admittance(self.s, density=density, wave_speed=a, diameter=d)
         network.shunt *= self._softness(coordinates)
-        line = self.line_state(coordinates, v)
+        line = self.line_state(v)
         for effect, place, own in twin.applied_effects(coordinates):
             own = {name: x[:, None] for name, x in own.items()}
             if "position" in own:

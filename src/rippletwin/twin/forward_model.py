@@ -144,10 +144,9 @@ class ForwardModel:
 
     def _make_linear(self, theta: np.ndarray) -> FrequencyDomainLine:
         twin, rig = self.twin, self.twin.rig
-        v = twin.arrays(theta)
-        viscosity = self._viscosity(theta, v)
+        v = self.arrays(theta)
         series = np.array(
-            [self._series(k, d, viscosity) for k, d in enumerate(v.diameters)], dtype=complex
+            [self._series(k, d, v.viscosity) for k, d in enumerate(v.diameters)], dtype=complex
         )
         shunt = self._softness(theta) * shunt_admittance(
             self.s,
@@ -168,7 +167,7 @@ class ForwardModel:
             sensor_factor=v.gains,
         )
         if twin.effects:
-            line = self.line_state(theta, v)
+            line = self.line_state(v)
             for effect, place, values in twin.applied_effects(theta):
                 effect.apply(network, line, values, place)
         return network
@@ -189,32 +188,35 @@ class ForwardModel:
             return 1.0
         return (self._states(theta) ** -2.0)[..., self.recording]
 
-    def _viscosity(self, theta: np.ndarray, v: Arrays) -> np.ndarray | float:
-        """Kinematic viscosity (..., F) while each recording was made, m2/s.
+    def arrays(self, theta: np.ndarray) -> Arrays:
+        """`Twin.arrays` at theta (P,), with the viscosity (F,) while each recording was made."""
+        return self._as_recorded(theta, self.twin.arrays(theta))
+
+    def _as_recorded(self, theta: np.ndarray, v: Arrays) -> Arrays:
+        """`v` with the viscosity (..., F) while each recording was made; `theta` may be (P, B).
 
         What all recordings have in common is in the viscosity itself: a state would take a part of
         its error, and move wave speeds with it.
         """
         twin = self.twin
         if not twin.changing_state:
-            return v.viscosity
+            return v
         k = twin.index["viscosity_slope"]
         slope = np.asarray(twin.parameters[k].value(theta[k]))[..., None]
         known = [twin.index[f"state[{label}]"] for label in twin.reference or twin.labels]
         mean = np.exp(np.mean([np.log(twin.parameters[i].value(theta[i])) for i in known], axis=0))
         about_mean = self._states(theta) / mean[..., None]
-        return v.viscosity * (about_mean**slope)[..., self.recording]
+        return v._replace(viscosity=v.viscosity * (about_mean**slope)[..., self.recording])
 
-    def line_state(self, theta: np.ndarray, v: Arrays) -> LineState:
-        """The numbers of the line that effects need, with `v` of `Twin.arrays` at theta (P,) or
-        (P, B)."""
+    def line_state(self, v: Arrays) -> LineState:
+        """The numbers of the line that effects need, with `v` of `arrays`."""
         fluid = self.twin.rig.fluid
         resistance = None
         if self.twin.rig.load.kind == "orifice":
             resistance = 1.0 / self.load.orifice_admittance(v.load)
         return LineState(
             density=fluid.density,
-            viscosity=self._viscosity(theta, v),
+            viscosity=v.viscosity,
             diameters=v.diameters,
             wave_speeds=v.wave_speeds,
             lengths=v.lengths,

@@ -59,7 +59,7 @@ SOURCE_SD = 0.05
 
 class Arrays(NamedTuple):
     """The line at one theta, in SI units: segments (n,), sensors (S,); kinematic viscosity and load
-    factor are scalars.
+    factor are scalars. A forward model may have the viscosity (..., F) of each recording.
 
     `reflection` has the Schur parameters of an unknown load, each (..., 1); `gains` (S, ..., 1) is
     what uncalibrated sensors read over the pressure.
@@ -69,7 +69,7 @@ class Arrays(NamedTuple):
     diameters: np.ndarray
     lengths: np.ndarray
     positions: np.ndarray
-    viscosity: float
+    viscosity: np.ndarray | float
     load: float
     reflection: tuple = ()
     gains: np.ndarray | float = 1.0
@@ -303,7 +303,7 @@ class Twin:
         load = self.rig.load
         if load.coefficient is not None:
             load = replace(load, coefficient=load.coefficient * v.load)
-        fluid = replace(self.rig.fluid, kinematic_viscosity=v.viscosity)
+        fluid = replace(self.rig.fluid, kinematic_viscosity=float(v.viscosity))
         return replace(self.rig, line=line, sensors=sensors, load=load, fluid=fluid)
 
     def pump_changes(self, speed_hz: float, load_pressure: float) -> list[tuple]:

@@ -145,7 +145,7 @@ def _networks(
         shunt=without.shunt.copy(),
         inserts=list(without.inserts),
     )
-    state = forward.line_state(twin.theta, twin.arrays(twin.theta))
+    state = forward.line_state(forward.arrays(twin.theta))
     effect.apply(changed, state, values, place)
     return without, changed
 

@@ -54,12 +54,12 @@ def _rows(workers: Workers, best: Fit) -> list[list]:
     if len(volumes) < 2:
         return []
     highest_hz = max(float(np.max(o.frequency_hz)) for o in workers.observations)
-    values, last = best.twin.values(), -np.inf
+    values, lengths, last = best.twin.values(), best.twin.arrays(best.twin.theta).lengths, -np.inf
     groups: list[list] = []
     for member in sorted(volumes, key=lambda m: values[f"{LUMP}@{m[1]}.position"]):
         position = values[f"{LUMP}@{member[1]}.position"]
-        k = segment_at(best.twin.arrays(best.twin.theta).lengths, position)
-        reach = best.twin.rig.line[k].wave_speed / (2.0 * highest_hz)
+        speed = best.twin.rig.line[segment_at(lengths, position)].wave_speed
+        reach = speed / (2.0 * highest_hz)
         if position - last > reach:
             groups.append([])
         groups[-1].append(member)
