@@ -11,6 +11,7 @@ import pytest
 from harmonic_balance import balance_orifice
 from paper_rig import paper_rig
 from rippletwin.case.model import Load
+from rippletwin.errors import InputError
 from rippletwin.harmonics import flow_harmonics
 from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
@@ -104,6 +105,16 @@ def test_a_twin_survives_json_to_the_last_bit():
     again = twin_file.from_dict(json.loads(json.dumps(twin_file.to_dict(twin))))
     for one, two in zip(twin.predict(points), again.predict(points)):
         assert np.array_equal(one, two)
+
+
+def test_a_twin_of_another_version_is_refused_with_its_parameters():
+    """A file that lacks a parameter of this version, or has one that this version does not know, is
+    refused, and its names are told, whether or not their number is the same.
+    """
+    data = twin_file.to_dict(Twin(paper_rig(), [point(paper_rig())]))
+    data["values"]["stiffness"] = data["values"].pop("viscosity")
+    with pytest.raises(InputError, match=r"another version.*stiffness, viscosity"):
+        twin_file.from_dict(data)
 
 
 def test_an_effect_changes_the_prediction_and_brings_its_parameters():

@@ -141,7 +141,8 @@ def _line_of_twin(path: Path) -> tuple[Twin, np.ndarray | None]:
     own = tuple(f"{effect['name']}@" for effect in data["effects"])
     # Effects' own parameters come last. A label or a sensor's name may hold an @ too.
     count = sum(not name.startswith(own) for name in data["values"])
-    twin = from_dict(data | {"effects": [], "theta": data["theta"][:count]})
+    values = dict(list(data["values"].items())[:count])
+    twin = from_dict(data | {"effects": [], "theta": data["theta"][:count], "values": values})
     if data["covariance"] is None:
         return twin, None
     return twin, np.array(data["covariance"])[:count, :count]

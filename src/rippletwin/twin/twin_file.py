@@ -41,9 +41,10 @@ def to_dict(twin: Twin) -> dict:
 def from_dict(data: dict) -> Twin:
     """The twin that `to_dict` wrote.
 
-    Raises InputError where it has an effect of a user's file that this process does not know.
+    Raises InputError where it has an effect of a user's file that this process does not know, or
+    parameters of another version.
     """
-    return Twin(
+    twin = Twin(
         _rig(data["rig"]),
         [OperatingCondition(label) for label in data["recordings"]],
         friction=data["friction"],
@@ -54,9 +55,21 @@ def from_dict(data: dict) -> Twin:
         guessed_load=data["guessed_load"],
         uncertain_pump=data.get("uncertain_pump", False),
         changing_state=data.get("changing_state", False),
-        theta=np.array(data["theta"]),
         ripple=CorrectedRipple.from_dict(ripple) if (ripple := data.get("flow_ripple")) else None,
     )
+    _check_parameters(twin, data["values"])
+    return twin.with_(theta=np.array(data["theta"]))
+
+
+def _check_parameters(twin: Twin, values: dict) -> None:
+    """Raise InputError where the parameters of a file's twin are not those of this version."""
+    if different := sorted(twin.index.keys() ^ values.keys()):
+        raise InputError(
+            "twin.json",
+            "twin.values",
+            f"are those of another version of rippletwin ({', '.join(different)})",
+            "Run calibrate or explain again",
+        )
 
 
 def _effect(effect: Effect, place: Place) -> dict:
