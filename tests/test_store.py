@@ -97,6 +97,31 @@ def test_a_disk_without_room_loses_nothing(tmp_path):
     assert path.read_text() == "old" and [e.name for e in tmp_path.iterdir()] == ["verdict.json"]
 
 
+FULL_TEXTS = """
+import resource, sys
+from rippletwin import store
+resource.setrlimit(resource.RLIMIT_FSIZE, (4096, resource.RLIM_INFINITY))
+store.write_texts(sys.argv[1], {"twin.json": "new", "verdict.json": "x" * 100_000})
+"""
+
+
+@pytest.mark.skipif(not hasattr(resource, "RLIMIT_FSIZE"), reason="no limit of a file's size here")
+def test_files_that_belong_together_are_all_written_or_none(tmp_path):
+    """The second of two files does not fit: the first keeps its old text too, so that no verdict
+    stands beside the twin of another run. With room both are new."""
+    old = {"twin.json": "old", "verdict.json": "old"}
+    store.write_texts(tmp_path / "out", old)
+    done = subprocess.run(
+        [sys.executable, "-c", FULL_TEXTS, tmp_path / "out"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1 and "OSError: [Errno 27]" in done.stderr
+    assert "verdict.json" in done.stderr
+    assert {e.name: e.read_text() for e in (tmp_path / "out").iterdir()} == old
+
+
 FULL_STORE = """
 import resource, sys
 import numpy as np, xarray as xr

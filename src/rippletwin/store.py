@@ -7,7 +7,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -99,6 +99,16 @@ def write_text(path: str | Path, text: str) -> Path:
     with whole(path) as scratch:
         scratch.write_text(text, encoding="utf-8")
     return Path(path)
+
+
+def write_texts(folder: str | Path, texts: dict[str, str]) -> None:
+    """Write text files (UTF-8) that belong together into `folder`, by name: all or, where one does
+    not fit on the disk, none. They are put in place in the order given, once all are written."""
+    with ExitStack() as written:
+        # the last that is entered is the first that is put in place
+        for name, text in reversed(texts.items()):
+            scratch = written.enter_context(whole(Path(folder) / name))
+            scratch.write_text(text, encoding="utf-8")
 
 
 def write_table(path: str | Path, table: pd.DataFrame) -> None:

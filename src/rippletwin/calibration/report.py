@@ -207,13 +207,9 @@ def compute_ripples(
 
 
 def save(calibration: Calibration, folder: str | Path) -> None:
-    """Write twin.json and report.md into `folder`, each whole or not at all."""
-    folder = Path(folder)
-    for name, text in (
-        ("twin.json", json.dumps(to_dict(calibration), indent=1) + "\n"),
-        ("report.md", to_markdown(calibration)),
-    ):
-        store.write_text(folder / name, text)
+    """Write twin.json and report.md into `folder`, both whole or not at all."""
+    twin = json.dumps(to_dict(calibration), indent=1) + "\n"
+    store.write_texts(folder, {"twin.json": twin, "report.md": to_markdown(calibration)})
 
 
 def _root(weights: np.ndarray, covariance: np.ndarray) -> float:

@@ -230,20 +230,17 @@ def _fit_scores(e: Explanation) -> dict:
 def write_verdict(explanation: Explanation, folder: str | Path) -> dict:
     """Write verdict.json and twin.json into `folder`, made if needed; returns the verdict.
 
-    Each file appears whole or not at all.
+    Both files appear whole or not at all.
     """
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
     result = verdict_dict(explanation)
     covariance = {"covariance": explanation.decision.accepted.covariance}
-    _write_json(folder / "twin.json", twin_file.to_dict(explanation.twin) | covariance)
-    _write_json(folder / "verdict.json", result)
+    twin = twin_file.to_dict(explanation.twin) | covariance
+    store.write_texts(folder, {"twin.json": _as_json(twin), "verdict.json": _as_json(result)})
     return result
 
 
-def _write_json(path: Path, data: dict) -> None:
-    text = json.dumps(data, indent=1, default=_plain, allow_nan=False)
-    store.write_text(path, text + "\n")
+def _as_json(data: dict) -> str:
+    return json.dumps(data, indent=1, default=_plain, allow_nan=False) + "\n"
 
 
 def _plain(value):
