@@ -175,6 +175,7 @@ def gas_volume(rig: RigContext, level: float) -> DrawnEffect:
         level,
         position,
         {
+            "position": position,
             "gas_volume": volume * (pressure / STATED_PRESSURE) ** (1 / exponent),
             "polytropic_exponent": exponent,
         },
