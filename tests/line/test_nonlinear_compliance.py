@@ -28,7 +28,11 @@ def driven(amplitude, curvature):
     line.load = "anechoic", None
     line.nonlinear_compliances = [
         NonlinearCompliance(
-            0, AREA, np.full(len(S), PRESSURE), np.full((1, len(S)), curvature, dtype=float)
+            0.0,
+            LENGTH,
+            AREA * LENGTH,
+            np.full(len(S), PRESSURE),
+            np.full((1, len(S)), float(curvature)),
         )
     ]
     p, q = line.load_state()

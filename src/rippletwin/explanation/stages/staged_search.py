@@ -16,7 +16,7 @@ from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.ripple_correction import with_corrected_ripple
 from rippletwin.case.model import Rig
-from rippletwin.explanation.fit_jobs import FitJob, make_base, open_workers
+from rippletwin.explanation.fit_jobs import FitJob, job_from, make_base, open_workers
 from rippletwin.explanation.localise.phase_modulation import (
     estimate_phase_modulation,
     modulation_differs,
@@ -39,6 +39,7 @@ MAX_MODEL_ERROR_FOR_COUPLING = 10.0 * MIN_MODEL_ERROR
 """Relative model error above which pressure and flow at the pump are too uncertain."""
 NOTICED_CHANGE = 0.25  # of the least model error: a change of the prediction that is fitted again
 MAX_RESUMED = 2  # times
+MAX_SETTLED = 4  # fits of one hypothesis, each with the ripple that the last one found
 
 Progress = Callable[[str, int, int], None]
 
@@ -124,13 +125,28 @@ def _resume_search(
     for _ in range(MAX_RESUMED):
         rig = scale_tolerances(stage.base.rig, scale)
         base = make_base(rig, data)
+        search = with_coordinates_of(search, base)
+        data, best = _settle_ripple(base, data, search.best)
         with open_workers(base, data, processes) as workers:
-            search = resume_search(workers, with_coordinates_of(search, base), progress)
+            search = resume_search(workers, replace(search, best=best), progress)
         stage = Stage(base, data, stage.modulation)
         scale = estimate_tolerance_scale(search.best)  # the response of the pump may have hidden it
         if scale == 1.0:
             break
     return stage, search
+
+
+def _settle_ripple(base: Twin, data: list[Observation], best: Fit) -> tuple[list, Fit]:
+    """The data whose nonlinear flows are those of the ripple that a fit of `best` to them finds, and
+    that fit: products of harmonics go with the square of the ripple, and the ripple with them."""
+    for _ in range(MAX_SETTLED):
+        with open_workers(base, data, 1) as workers:
+            (best,) = workers.fit([job_from(best)])
+        corrected = with_corrected_ripple(best, data, data)
+        if not changes_prediction(best, data, corrected):
+            break
+        data = corrected
+    return data, best
 
 
 def changes_prediction(fit: Fit, before: Sequence[Observation], after: Sequence) -> bool:

@@ -1,12 +1,12 @@
 """Pressure-dependent (nonlinear) compliance of a line at full amplitude, for many recordings.
 
-Where the compressibility depends on the pressure itself, a length dx stores g(p) dx beyond its
-linear part: the harmonics of one recording couple all along the line, and s g(p) dx is an outflow
-(`prescribed_outflows`). Outflows and the state at the load are found by fixed-point iteration with
-Anderson acceleration. g is a tenth or less of the linear storage, but at a sharp resonance the
-outflows of one pass change the pressure as much as the source does, and at several resonances by
-more: the acceleration must store as many directions as there are such resonances. Recordings do
-not couple, and each is accelerated separately.
+Where the compressibility depends on the pressure itself, a piece of the line or a volume of gas on
+it stores g(p) beyond its linear part: the harmonics of one recording couple all along the line, and
+s g(p) is an outflow (`prescribed_outflows`). Outflows and the state at the load are found by
+fixed-point iteration with Anderson acceleration. g is a fraction of the linear storage, but at a
+sharp resonance the outflows of one pass change the pressure as much as the source does, and at
+several resonances by more: the acceleration must store as many directions as there are such
+resonances. Recordings do not couple, and each is accelerated separately.
 """
 
 from __future__ import annotations
@@ -32,17 +32,18 @@ MAX_RELATIVE_PRESSURE = 0.9  # |x| at which the law is clipped: the series diver
 
 
 class NonlinearCompliance(NamedTuple):
-    """Law of one segment: it stores the share sum_k c_k x^k, k = 2, 3 ..., of its volume beyond its
-    linear part where the pressure is x P above the mean.
+    """What stores `volume` sum_k c_k x^k, k = 2, 3 ..., beyond its linear part, where the pressure
+    is x P above the mean.
 
-    segment   from 0
-    area      cross section, m2
-    pressure  (F,) P in Pa, of the recording of each frequency
-    series    (K, F) the c_k, likewise
+    start, stop  m from the pump: it is evenly spread between them, or lumped where they are equal
+    volume       m3; 1 where the c_k are volumes themselves
+    pressure     (F,) P in Pa, of the recording of each frequency
+    series       (K, F) the c_k, likewise
     """
 
-    segment: int
-    area: float
+    start: float
+    stop: float
+    volume: float
     pressure: np.ndarray
     series: np.ndarray
 
@@ -158,15 +159,16 @@ def _apply_law(law, wave):
 
 
 def _cells(network):
-    """Middles (N,) and volumes of the cells of nonlinear segments, and each cell's compliance."""
+    """Middles (N,), m, and volumes, m3, of all cells, and the compliance of each."""
+    wavenumber = np.abs(np.sqrt(network.series * network.shunt).imag).max(axis=1)
     ends = np.cumsum(network.lengths)
     x, volume, index = [], [], []
     for n, compliance in enumerate(network.nonlinear_compliances):
-        k = compliance.segment
-        wavenumber = np.abs(np.sqrt(network.series[k] * network.shunt[k]).imag).max()
-        cells = int(np.ceil(network.lengths[k] * wavenumber * CELLS_PER_WAVELENGTH / (2 * np.pi)))
-        length = network.lengths[k] / cells
-        x.append(ends[k] - network.lengths[k] + length * (np.arange(cells) + 0.5))
-        volume.append(np.full(cells, length * compliance.area))
+        start, length = compliance.start, compliance.stop - compliance.start
+        segment = np.searchsorted(ends, start + 0.5 * length)
+        wavelengths = length * wavenumber[min(segment, len(ends) - 1)] / (2 * np.pi)
+        cells = max(int(np.ceil(wavelengths * CELLS_PER_WAVELENGTH)), 1)
+        x.append(start + length / cells * (np.arange(cells) + 0.5))
+        volume.append(np.full(cells, compliance.volume / cells))
         index.append(np.full(cells, n))
     return np.concatenate(x), np.concatenate(volume), np.concatenate(index)

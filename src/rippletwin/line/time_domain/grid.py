@@ -16,7 +16,7 @@ from rippletwin.line.time_domain.discretisation import (
     discretise_element,
 )
 from rippletwin.line.time_domain.kernel_arrays import JunctionArrays, PipeArrays, StateArrays
-from rippletwin.line.time_domain.line_elements import ENDS, Branch, TimeDomainLine
+from rippletwin.line.time_domain.line_elements import ENDS, Branch, Storage, TimeDomainLine
 
 
 class Grid:
@@ -45,17 +45,25 @@ class Grid:
         self.filters = np.zeros((len(self.ladder) + 1, 5))  # the last is the load's valve
         if self.line.end.valve is not None:
             self.filters[-1] = discretise_element(self.line.end.valve, self.dt)
+        laws: list[tuple[float, ...]] = []
         for r, rung in enumerate(self.ladder):
             if isinstance(rung, Branch):
                 self.kinds[r] = moc_kernel.BRANCH, len(self.pipes)
                 self.pipes.append(rung.pipe)
                 self.viscosity_ratios.append(rung.viscosity_ratio)
                 self.starts.append(rung.position)
+            elif isinstance(rung, Storage):
+                self.kinds[r] = moc_kernel.STORAGE, len(laws)
+                self.filters[r, 1] = self.dt
+                laws.append(rung.law)
             else:
                 self.kinds[r, 0] = {"shunt": moc_kernel.SHUNT, "series": moc_kernel.SERIES}[
                     rung.kind
                 ]
                 self.filters[r] = discretise_element(rung, self.dt)
+        self.storages = np.zeros((max(len(laws), 1), max(map(len, [(), *laws]))))
+        for row, law in zip(self.storages, laws):
+            row[: len(law)] = law
 
     def _lay_nodes(self):
         """Nodes of each pipe: its left end, N cells on, and its right end theta cells further."""
@@ -168,6 +176,9 @@ class Grid:
                 self.pressure[self.offsets[k] : self.offsets[k + 1]] = self.pressure[node]
                 self.steady[self.offsets[k] : self.offsets[k + 1]] = steady[node]
                 continue
+            if self.kinds[r, 0] == moc_kernel.STORAGE:
+                self._set_storage(r, self.pressure[node], steady[node])
+                continue
             now = self.mean, reference
             if rung.kind == "shunt":
                 now = self.pressure[node], steady[node]
@@ -200,6 +211,13 @@ class Grid:
         u, (b0, _, b2, _, a2) = now - reference, self.filters[r]
         y = u * element.immittance(0.0)
         self.filter_states[r] = y - b0 * u, b2 * u - a2 * y
+
+    def _set_storage(self, r, now, reference):
+        """Set the steady state of a storage at the pressure `now`."""
+        self.references[r] = reference
+        law = self.storages[self.kinds[r, 1]]
+        self.filter_states[r, 1] = np.polyval([*law[:0:-1], 0.0], (now - reference) / law[0])
+        moc_kernel.linearise_storage(law, self.filters[r], now - reference, self.filter_states[r])
 
     def advance(self, nodes):
         """One period: pressure, Pa, and flow, m3/s, (N, M) at `nodes` (N,); updates the state."""

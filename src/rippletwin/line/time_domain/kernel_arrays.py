@@ -42,8 +42,12 @@ class JunctionArrays(NamedTuple):
     """Constants of the junctions and of the load.
 
     rungs       (junctions + 1,) first rung of each
-    kinds       (R, 2) SHUNT, SERIES or BRANCH, and a branch's pipe
-    filters     (R + 1, 5) b0, b1, b2, a1, a2 of each rung's element; the last is the load's valve
+    kinds       (R, 2) SHUNT, SERIES, BRANCH or STORAGE; a branch's pipe, a storage's row in
+                `storages`
+    filters     (R + 1, 5) b0, b1, b2, a1, a2 of each rung's element; the last is the load's valve.
+                Of a storage b0 is the tangent at its last pressure, which is changed in place, and
+                b1 the time step
+    storages    (N, 1 + L) P in Pa and c_k, m3, of each storage; one row of zeros without any
     references  (R + 1,) steady pressure or flow from which an element's input is measured
     load        (law, coefficient, pressure behind it, constant flow, conductance), law 0 linear,
                 1 open, 2 orifice
@@ -52,6 +56,7 @@ class JunctionArrays(NamedTuple):
     rungs: np.ndarray
     kinds: np.ndarray
     filters: np.ndarray
+    storages: np.ndarray
     references: np.ndarray
     load: tuple
 

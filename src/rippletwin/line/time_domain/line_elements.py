@@ -71,6 +71,15 @@ class Element:
 
 
 @dataclass(frozen=True)
+class Storage:
+    """A nonlinear capacitance at `position` (m): it stores the volume sum_k c_k x^k, m3, where the
+    pressure is x P above the steady state; `law` is (P in Pa, c_1, c_2 ...)."""
+
+    position: float
+    law: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Branch:
     """A `pipe` with its far end closed, at `position` (m).
 
@@ -111,7 +120,8 @@ class TimeDomainLine:
     positions  (S,) m where pressure and flow are wanted (flow beside an element: pump's side)
     mean_flow  m3/s of the steady state from which elements measure; that of `flow` by default
     source     shunt elements parallel to the pump; their position does not matter
-    inserts    elements and branches on the line, those at one position in order from the pump
+    inserts    elements, storages and branches on the line, those at one position in order from the
+               pump
     load       elements right before the end, in order; their position does not matter
     sensors    (index into positions, H) pairs: H(s) is what a sensor reads over the pressure,
                at s (F,) of which the first is 0
@@ -127,7 +137,7 @@ class TimeDomainLine:
     positions: Sequence[float] = ()
     mean_flow: float | None = None
     source: list[Element] = field(default_factory=list)
-    inserts: list[Element | Branch] = field(default_factory=list)
+    inserts: list[Element | Storage | Branch] = field(default_factory=list)
     load: list[Element] = field(default_factory=list)
     sensors: list[tuple[int, Callable[[np.ndarray], np.ndarray]]] = field(default_factory=list)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-SHUNT, SERIES, BRANCH = range(3)  # kinds of a rung
+SHUNT, SERIES, BRANCH, STORAGE = range(4)  # kinds of a rung
 VALVE = -1  # row of the load's valve among the filters
 VALVE_PASSES = 3  # of its opening, which hardly changes within a step
 NEW_RATE_SHARE = 0.501  # of the new rate in the mean over a step; 1/2 would keep a jump for ever
@@ -168,6 +168,22 @@ def _filter(coefficients, u, state):
 
 
 @njit(cache=True, error_model="numpy")
+def linearise_storage(law, filter_, u, state):
+    """Set a storage's next step, q = b0 u + z, to the tangent of its law at the deviation `u`, Pa.
+
+    state[1] is what has been stored, and what the present rate adds in the old rate's share of the
+    step. The tangent's error in one step is corrected in the next.
+    """
+    x, over = u / law[0], 1.0 / (NEW_RATE_SHARE * filter_[1])
+    volume = slope = 0.0
+    for k in range(len(law) - 1, 0, -1):
+        slope = slope * x + k * law[k]
+        volume = (volume + law[k]) * x
+    filter_[0] = over * slope / law[0]
+    state[0] = over * (volume - state[1]) - filter_[0] * u
+
+
+@njit(cache=True, error_model="numpy")
 def _orifice_drop(excess, b, coefficient):
     """x |x| with b x |x| + K x = excess: the pressure over an orifice of coefficient K."""
     size = abs(excess)
@@ -196,12 +212,12 @@ def _solve_junction(supply, slope, first, stop, junctions, state, ends, kept, jo
             b += ends[1, kinds[r, 1], 0]
             continue
         g, past = filters[r, 0], state[r, 0] - filters[r, 0] * references[r]
-        if kind == SHUNT:
-            s -= past
-            b += g
-        else:
+        if kind == SERIES:
             s = (s - b * past) / (1.0 + b * g)
             b = b / (1.0 + b * g)
+        else:
+            s -= past
+            b += g
     s += supply[1]
     b += slope[1]
     law, coefficient, outside = load
@@ -227,7 +243,11 @@ def _solve_junction(supply, slope, first, stop, junctions, state, ends, kept, jo
             q = (kept[r, 0] - kept[r, 1] * (p + past)) / (1.0 + kept[r, 1] * b0)
             p += b0 * q + past
             u = q - references[r]
-        _filter(filters[r], u, state[r])
+        if kind == STORAGE:
+            state[r, 1] += filters[r, 1] * (b0 * u + state[r, 0])
+            linearise_storage(junctions.storages[kinds[r, 1]], filters[r], u, state[r])
+        else:
+            _filter(filters[r], u, state[r])
     return p, far
 
 

@@ -82,14 +82,24 @@ class LineState:
         return 0.25 * np.pi * self.diameters[k] ** 2
 
     def absolute_pressure_in(self, k: int):
-        """Mean pressure in the middle of segment k, Pa absolute.
+        """Mean pressure in the middle of segment k, Pa absolute."""
+        return self._absolute_pressure(k, 0.5)
+
+    def absolute_pressure_at(self, position: float):
+        """Mean pressure at `position`, m, Pa absolute."""
+        k = segment_at(self.lengths, position)
+        behind = np.sum(self.lengths[: k + 1], axis=0) - position
+        return self._absolute_pressure(k, np.clip(behind / self.lengths[k], 0.0, 1.0))
+
+    def _absolute_pressure(self, k: int, share):
+        """Mean pressure where `share` of segment k is behind, Pa absolute.
 
         Steady laminar friction of the mean flow lifts it above that at the load (Hagen-Poiseuille).
         """
         if self.mean_flow is None or self.friction == "none":
             return absolute(self.mean_pressure)
         behind = sum(self._fall(j) for j in range(k + 1, len(self.lengths)))
-        rise = (0.5 * self._fall(k) + behind) * np.nan_to_num(self.mean_flow)
+        rise = (share * self._fall(k) + behind) * np.nan_to_num(self.mean_flow)
         return absolute(self.mean_pressure) + rise
 
     def _fall(self, k: int):

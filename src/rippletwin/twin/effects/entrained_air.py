@@ -8,46 +8,41 @@ couples the harmonics all along the line.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
-from scipy.special import binom
 
 from rippletwin.case.model import ATMOSPHERE
 from rippletwin.line.frequency_domain.nonlinear_compliance import NonlinearCompliance
 from rippletwin.twin.effects.base import Effect, line_place
-from rippletwin.twin.effects.lumped_elements import polytropic_parameter
+from rippletwin.twin.effects.lumped_elements import gas_series, polytropic_parameter
 from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal
 
-SERIES_TERMS = 6  # in x = p/mean; the next is 1e-3 of the second at x = 0.3
 
-
-def gas_series(gas_fraction, exponent, mean_pressure):
-    """[c_1, c_2 ...] of the volume share sum_k c_k x^k by which free air is compressed where the
-    pressure is x times the mean p above it: of -alpha (p_atm/p)^(1/n) ((1 + x)^(-1/n) - 1).
-
-    `gas_fraction` alpha is by volume at the atmosphere's pressure, `exponent` n the polytropic one,
-    `mean_pressure` in Pa absolute.
-    """
-    share = gas_fraction * (ATMOSPHERE / mean_pressure) ** (1.0 / exponent)
-    return [-share * binom(-1.0 / exponent, k) for k in range(1, SERIES_TERMS + 1)]
+def _series(values, mean_pressure):
+    """`gas_series` of the air's share of the line's volume, `mean_pressure` in Pa absolute."""
+    exponent = values["polytropic_exponent"]
+    share = values["gas_fraction"] * (ATMOSPHERE / mean_pressure) ** (1.0 / exponent)
+    return gas_series(share, exponent)
 
 
 def _apply(network, state, values, place):
-    for k in range(len(state.diameters)):
+    ends = np.concatenate([[0.0], np.cumsum(network.lengths)])
+    for k, (start, stop) in enumerate(pairwise(ends)):
         mean = np.broadcast_to(state.absolute_pressure_in(k), np.shape(network.shunt[k]))
-        first, *beyond = gas_series(values["gas_fraction"], values["polytropic_exponent"], mean)
+        first, *beyond = _series(values, mean)
         network.shunt[k] = network.shunt[k] + state.area(k) * network.s * first / mean
+        volume = state.area(k) * (stop - start)
         network.nonlinear_compliances.append(
-            NonlinearCompliance(k, state.area(k), mean, np.array(beyond))
+            NonlinearCompliance(start, stop, volume, mean, np.array(beyond))
         )
 
 
 def _apply_in_time(line, state, values, place):
     for k, pipe in enumerate(line.pipes):
         mean = float(state.absolute_pressure_in(k))
-        series = gas_series(values["gas_fraction"], values["polytropic_exponent"], mean)
-        line.pipes[k] = replace(pipe, law=(mean, *series))
+        line.pipes[k] = replace(pipe, law=(mean, *_series(values, mean)))
 
 
 EFFECT = Effect(

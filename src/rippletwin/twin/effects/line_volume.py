@@ -2,17 +2,34 @@
 
 from __future__ import annotations
 
-from rippletwin.twin.effects.base import Effect, position_parameter, position_place
-from rippletwin.twin.effects.lumped_elements import capacitance_at_position, volume_compliance
+from rippletwin.line.frequency_domain.line_network import Insert
+from rippletwin.line.time_domain.line_elements import capacitance
+from rippletwin.twin.effects.base import (
+    Effect,
+    on_line,
+    position_parameter,
+    position_place,
+    segment_at,
+)
+from rippletwin.twin.effects.lumped_elements import volume_compliance
 from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import lognormal
 
 
-def _compliance(state, k, values):
+def _compliance(lengths, state, values):
+    k = segment_at(lengths, values["position"])
     return volume_compliance(values["volume"], state.density, state.wave_speeds[k])
 
 
-_apply, _apply_in_time = capacitance_at_position(_compliance)
+def _apply(network, state, values, place):
+    admittance = network.s * _compliance(network.lengths, state, values)
+    network.inserts.append(Insert(on_line(network, values["position"]), "shunt", admittance))
+
+
+def _apply_in_time(line, state, values, place):
+    compliance = float(_compliance([pipe.length for pipe in line.pipes], state, values))
+    line.inserts.append(capacitance(on_line(line, values["position"]), compliance))
+
 
 EFFECT = Effect(
     name="line_volume",

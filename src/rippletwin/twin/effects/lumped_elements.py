@@ -1,18 +1,15 @@
-"""Lumped elements that several effects share: formulas, and a volume at a position."""
+"""Formulas of lumped elements that several effects share."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
+from scipy.special import binom
 
-from rippletwin.line.frequency_domain.line_network import Insert
-from rippletwin.line.time_domain.line_elements import capacitance
-from rippletwin.twin.effects.base import on_line, segment_at
 from rippletwin.twin.parameters import Parameter
 from rippletwin.twin.priors import normal
 
 REFERENCE_PRESSURE = 1e7  # Pa absolute, at which volumes of gas are stated
+SERIES_TERMS = 6  # of a gas in x = p/mean; the next is 1e-3 of the second at x = 0.3
 POLYTROPIC_EXPONENT = 1.2  # 1 at one temperature, 1.4 where there is no time to exchange heat
 
 
@@ -29,33 +26,27 @@ def polytropic_parameter() -> Parameter:
     return Parameter("polytropic_exponent", "1", normal(POLYTROPIC_EXPONENT, 0.12))
 
 
-def capacitance_at_position(compliance: Callable) -> tuple[Callable, Callable]:
-    """`apply` and `apply_in_time` of an effect that stores liquid at its position, q1 - q2 = s C p.
-
-    compliance   (state, k, values) -> C, m3/Pa, in segment k
-    """
-
-    def apply(network, state, values, place):
-        k = segment_at(network.lengths, values["position"])
-        admittance = network.s * compliance(state, k, values)
-        position = on_line(network, values["position"])
-        network.inserts.append(Insert(position, "shunt", admittance))
-
-    def apply_in_time(line, state, values, place):
-        k = segment_at([pipe.length for pipe in line.pipes], values["position"])
-        position = on_line(line, values["position"])
-        line.inserts.append(capacitance(position, float(compliance(state, k, values))))
-
-    return apply, apply_in_time
+def gas_volume_at(volume, exponent, pressure):
+    """V, m3, at `pressure`, Pa absolute, of gas whose volume is `volume`, m3, at 10 MPa:
+    V = volume (10 MPa/p)^(1/n) with the polytropic `exponent` n."""
+    return volume * (REFERENCE_PRESSURE / pressure) ** (1.0 / exponent)
 
 
 def gas_compliance(volume, exponent, pressure):
-    """V/(n p), m3/Pa, of gas at `pressure`, Pa absolute, whose volume is `volume`, m3, at 10 MPa:
-    V = volume (10 MPa/p)^(1/n) with the polytropic `exponent` n.
+    """V/(n p), m3/Pa, of gas at `pressure`, Pa absolute, whose volume is `volume`, m3, at 10 MPa.
 
     From p V^n = const; Wylie & Streeter 1993, Fluid Transients in Systems (air chamber).
     """
-    return volume * (REFERENCE_PRESSURE / pressure) ** (1.0 / exponent) / (exponent * pressure)
+    return gas_volume_at(volume, exponent, pressure) / (exponent * pressure)
+
+
+def gas_series(volume, exponent):
+    """[c_1, c_2 ...] of the volume sum_k c_k x^k by which gas of `volume` at a mean pressure is
+    compressed where the pressure is x times the mean above it: of -V ((1 + x)^(-1/n) - 1).
+
+    Shape and unit are those of `volume`, a share of a volume for example; n is the `exponent`.
+    """
+    return [-volume * binom(-1.0 / exponent, k) for k in range(1, SERIES_TERMS + 1)]
 
 
 def second_order_lag(s, natural_frequency, damping_ratio):
