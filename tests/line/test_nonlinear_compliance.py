@@ -19,22 +19,22 @@ IMPEDANCE = DENSITY * SPEED / AREA
 S = 2j * np.pi * 150.0 * ORDERS
 
 
-def driven(amplitude, curvature):
-    """A lossless pipe, endless both ways, that carries one harmonic of `amplitude` (Pa) and stores
-    c_2 x^2 over LENGTH, in thirty cells."""
+def compliance(curvature, start=0.0, stop=LENGTH, volume=AREA * LENGTH):
+    """What stores c_2 x^2 of its volume; the whole pipe by default."""
+    pressure = np.full(len(S), PRESSURE)
+    return NonlinearCompliance(
+        start, stop, volume, pressure, np.full((1, len(S)), float(curvature))
+    )
+
+
+def driven(amplitude, stored):
+    """A lossless pipe, endless both ways, that carries one harmonic of `amplitude` (Pa), with the
+    nonlinear compliance `stored`."""
     source = np.where(ORDERS == 1, 2.0 * amplitude / IMPEDANCE, 0.0).astype(complex)
     line = network(S, [Pipe(LENGTH, DIAMETER, SPEED)], "none", source_flow=source)
     line.source_admittance = 1.0 / IMPEDANCE
     line.load = "anechoic", None
-    line.nonlinear_compliances = [
-        NonlinearCompliance(
-            0.0,
-            LENGTH,
-            AREA * LENGTH,
-            np.full(len(S), PRESSURE),
-            np.full((1, len(S)), float(curvature)),
-        )
-    ]
+    line.nonlinear_compliances = [stored]
     p, q = line.load_state()
 
     def law(a, b, c):
@@ -51,7 +51,7 @@ def test_second_harmonic_grows_as_the_distance(curvature):
     harmonic rho a omega x |c_2| (p1/P)^2 / 2 (as Fubini's, Hamilton & Blackstock 1998, Nonlinear
     Acoustics, sec. 4.2): an analytic solution, and the first is left alone."""
     amplitude = 0.02 * PRESSURE
-    line, x = driven(amplitude, curvature), LENGTH * np.arange(5, 31, 5) / 30
+    line, x = driven(amplitude, compliance(curvature)), LENGTH * np.arange(5, 31, 5) / 30
     forward = 0.5 * (line.pressure_at(x) + IMPEDANCE * line.flow_at(x))
     omega = abs(S[0])
     second = 0.5 * DENSITY * SPEED * omega * x * abs(curvature) * (amplitude / PRESSURE) ** 2
@@ -62,7 +62,7 @@ def test_second_harmonic_grows_as_the_distance(curvature):
 def test_nonlinear_storage_conserves_energy():
     """Lossless pipe: the mean power that enters leaves at the end, in whatever harmonic (energy
     is conserved, for what is stored in a crest comes back)."""
-    line, ends = driven(0.2 * PRESSURE, -2e-3), [0.0, LENGTH]
+    line, ends = driven(0.2 * PRESSURE, compliance(-2e-3)), [0.0, LENGTH]
     power = 0.5 * np.real(line.pressure_at(ends) * line.flow_at(ends).conj())
     assert np.sum(power[0]) == pytest.approx(np.sum(power[1]), rel=1e-3)
     assert power[1, 0] < 0.995 * power[0, 0]  # some of it in other harmonics
@@ -70,7 +70,7 @@ def test_nonlinear_storage_conserves_energy():
 
 def test_zero_series_is_the_linear_line():
     """Series of zeros: the linear line, to rounding."""
-    line = driven(0.05 * PRESSURE, 0.0)
+    line = driven(0.05 * PRESSURE, compliance(0.0))
     forced = line.pressure_at([1.0])
     line.outflows = None
     np.testing.assert_allclose(forced, line.pressure_at([1.0]), atol=1e-9 * np.abs(forced).max())
@@ -183,3 +183,14 @@ def test_a_problem_without_a_solution_is_not_claimed_solved():
     found = full.find_fixed_point(lambda x: 0.5 * x + 1.0, (4, 10))
     assert full.solved
     np.testing.assert_allclose(found, 2.0, rtol=10 * OUTFLOW_TOLERANCE)
+
+
+def test_a_lump_makes_the_second_harmonic_of_its_flow():
+    """A volume of gas amid a lossless, endless pipe: beside its linear part it takes in
+    V c_2 x^2, whose flow at twice the frequency s_2 V c_2 (p1/P)^2/2 leaves half of it to either
+    side, a pressure of half the impedance times it (analytic, to second order)."""
+    volume, curvature, place = 1e-6, -0.4, 0.4 * LENGTH
+    line = driven(0.005 * PRESSURE, compliance(curvature, place, place, volume))
+    first, second = line.pressure_at([place])[0, :2]
+    flow = S[1] * volume * curvature * 0.5 * (first / PRESSURE) ** 2
+    assert second == pytest.approx(-0.5 * IMPEDANCE * flow, rel=1e-3)

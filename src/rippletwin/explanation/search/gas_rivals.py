@@ -1,8 +1,9 @@
-"""Gas in place of liquid: what recordings at one mean pressure cannot tell apart.
+"""Gas in place of liquid, which recordings at one mean pressure hardly tell apart.
 
 Only a change with pressure discriminates a volume of the line's liquid from a smaller one of gas,
-whose compliance is V/(n p). Where all recordings have one mean pressure the search does without the
-gas, and each volume that it accepts gets a rival: as much gas as yields alike.
+whose compliance is V/(n p): another mean pressure, or a ripple so large that crests meet a stiffer
+gas than troughs. Where all recordings have one mean pressure the search does without the gas, and
+each volume that it accepts gets a rival: as much gas as yields alike.
 """
 
 from __future__ import annotations

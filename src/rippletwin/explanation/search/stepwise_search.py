@@ -17,7 +17,7 @@ from rippletwin.explanation.fit_jobs import (
     progress_callback,
     rank_by_evidence,
 )
-from rippletwin.explanation.search.gas_rivals import GAS, has_one_pressure
+from rippletwin.explanation.search.gas_rivals import GAS, fit_gas_rivals, has_one_pressure
 from rippletwin.explanation.search.position_search import move_to_best_position
 from rippletwin.explanation.search.single_effects import fit_single_effects
 from rippletwin.explanation.search.stepwise_moves import (
@@ -51,7 +51,8 @@ def applicable_candidates(
     """The effects at their places that these observations can show.
 
     An input impedance shows neither source nor sensors. Entrained air needs a mean pressure, hence
-    a periodic recording. A volume of gas needs two: at one it is a volume of liquid (`gas_rivals`).
+    a periodic recording. A volume of gas needs two: at one it is tried in place of a volume of
+    liquid that was accepted (`gas_rivals`).
     """
     kinds = {o.kind for o in observations}
     applicable = []
@@ -199,7 +200,8 @@ def _move_without_extension(
         moved = _revise(workers, pair, candidates)
         if frozenset(moved.hypothesis) not in visited:
             return moved, other_positions, []
-    substitutes = fit_substitutes(workers, best, candidates)
+    substitutes = [*fit_substitutes(workers, best, candidates), *fit_gas_rivals(workers, best)]
+    substitutes = rank_by_evidence(substitutes)
     moved = _better_substitute(workers, best, substitutes, candidates)
     is_new = frozenset(moved.hypothesis) not in visited
     return moved if is_new else None, other_positions, substitutes

@@ -137,8 +137,9 @@ def _resume_search(
 
 
 def _settle_ripple(base: Twin, data: list[Observation], best: Fit) -> tuple[list, Fit]:
-    """The data whose nonlinear flows are those of the ripple that a fit of `best` to them finds, and
-    that fit: products of harmonics go with the square of the ripple, and the ripple with them."""
+    """The data whose nonlinear flows are those of the ripple that `best` finds in them, and `best`
+    refitted: products of harmonics follow from the ripple, and the ripple that is found from them.
+    """
     for _ in range(MAX_SETTLED):
         with open_workers(base, data, 1) as workers:
             (best,) = workers.fit([job_from(best)])
