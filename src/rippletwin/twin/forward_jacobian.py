@@ -73,25 +73,14 @@ class DifferentiableForward(ForwardModel):
         solver = self._extended_for_compliance[0].compliance_solver
         usual, solver.tolerance = solver.tolerance, SOLVED_TOLERANCE
         readings = np.concatenate(self(theta), axis=1)
-        frozen = self._outflows, self._remainder
-        start = self._frozen_readings(theta, frozen)
-        correction = np.zeros((len(theta), *readings.shape), complex)
+        frozen = self.derivatives(theta)
+        correction = np.zeros_like(frozen)
         for k in (*self._together, *self._positions):
             moved = theta.copy()
             moved[k] += SOLVED_STEP
-            change = np.concatenate(self(moved), axis=1) - readings
-            # Over the same step, for the curvature of the linear line is no part of the correction:
-            # it is small beside one stiff direction, and large beside a soft one.
-            correction[k] = (change - self._frozen_readings(moved, frozen) + start) / SOLVED_STEP
+            slope = (np.concatenate(self(moved), axis=1) - readings) / SOLVED_STEP
+            correction[k] = slope - frozen[k]
         self.jacobian_correction, solver.tolerance = correction, usual
-
-    def _frozen_readings(self, theta: np.ndarray, frozen: tuple) -> np.ndarray:
-        """Readings (S, F), Pa, at theta (P,) with the nonlinear flows `frozen`."""
-        self._outflows, self._remainder = frozen
-        self._frozen_at, self._freeze = None, True
-        readings = np.concatenate(self._read(self.network(theta), theta), axis=1)
-        self._freeze = False
-        return readings
 
     def linear_load(self, theta: np.ndarray) -> np.ndarray | None:
         """Readings (S, F), Pa, with a linear orifice and the outflows of theta (P,); None without

@@ -45,15 +45,10 @@ def fit_gas_rivals(workers: Workers, best: Fit) -> list[Fit]:
 
     None where the mean pressures differ, for then the search has tried the gas, and none in a gas.
     """
-    rig = workers.base.rig
-    if rig.fluid.is_gas or not has_one_pressure(workers.observations):
+    volumes = [k for k, (effect, _) in enumerate(best.hypothesis) if effect.name == LIQUID]
+    if not volumes or workers.base.rig.fluid.is_gas or not has_one_pressure(workers.observations):
         return []
-    jobs = [
-        _job_with_gas(workers, best, k)
-        for k, (effect, _) in enumerate(best.hypothesis)
-        if effect.name == LIQUID
-    ]
-    return workers.fit(jobs)
+    return workers.fit([_job_with_gas(workers, best, k) for k in volumes])
 
 
 def _job_with_gas(workers: Workers, best: Fit, k: int) -> FitJob:

@@ -21,6 +21,7 @@ from rippletwin.explanation.fit_jobs import (
     score_extension,
 )
 from rippletwin.explanation.fit_starts import common_coordinates, scan_starts
+from rippletwin.explanation.search.gas_rivals import fit_gas_rivals
 from rippletwin.explanation.thresholds import (
     GOOD_MODEL_ERROR,
     MIN_LOG_BAYES_FACTOR,
@@ -169,7 +170,7 @@ def fit_substitutes(workers: Workers, best: Fit, candidates: Sequence) -> list[F
 
     Each effect is exchanged for every other on the same element and for itself at every other
     place. These were not tried beside effects that were accepted later. An effect that is always
-    present is not exchanged.
+    present is not exchanged. Volumes of liquid have their `gas_rivals`.
     """
     members = best.hypothesis if len(best.hypothesis) > 1 else ()
     jobs = []
@@ -178,7 +179,7 @@ def fit_substitutes(workers: Workers, best: Fit, candidates: Sequence) -> list[F
             continue
         alike = [c for c in candidates if c[1].element == place.element or c[0] is effect]
         jobs += [FitJob(hypothesis, NearFit(best)) for hypothesis in _exchanges(members, k, alike)]
-    return rank_by_evidence(workers.fit(jobs))
+    return rank_by_evidence([*workers.fit(jobs), *fit_gas_rivals(workers, best)])
 
 
 def simplify_effects(workers: Workers, best: Fit, candidates: Sequence) -> Fit:

@@ -17,7 +17,7 @@ from rippletwin.explanation.fit_jobs import (
     progress_callback,
     rank_by_evidence,
 )
-from rippletwin.explanation.search.gas_rivals import GAS, fit_gas_rivals, has_one_pressure
+from rippletwin.explanation.search.gas_rivals import GAS, has_one_pressure
 from rippletwin.explanation.search.position_search import move_to_best_position
 from rippletwin.explanation.search.single_effects import fit_single_effects
 from rippletwin.explanation.search.stepwise_moves import (
@@ -200,8 +200,7 @@ def _move_without_extension(
         moved = _revise(workers, pair, candidates)
         if frozenset(moved.hypothesis) not in visited:
             return moved, other_positions, []
-    substitutes = [*fit_substitutes(workers, best, candidates), *fit_gas_rivals(workers, best)]
-    substitutes = rank_by_evidence(substitutes)
+    substitutes = fit_substitutes(workers, best, candidates)
     moved = _better_substitute(workers, best, substitutes, candidates)
     is_new = frozenset(moved.hypothesis) not in visited
     return moved if is_new else None, other_positions, substitutes
