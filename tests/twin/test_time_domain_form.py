@@ -17,7 +17,8 @@ from rippletwin.twin.time_domain_form import MAX_FIT_ERROR
 from two_domains import ORDERS, PRESSURE, SPEED_HZ, STEPS, corrected, misfit, rig, ripple
 
 BEYOND = (
-    "entrained_air", "gas_volume", "unsteady_friction", "load_dynamics-load (spool)", "leak", "passive_piece",
+    "entrained_air", "gas_volume", "unsteady_friction", "load_dynamics-load (spool)", "leak",
+    "passive_piece",
 )  # fmt: skip
 """Nonlinear, a change of Z' along the line, of the mean flow, or a two-port that takes a stretch of
 the line away: these need a form of their own."""
