@@ -45,7 +45,7 @@ class Grid:
         self.filters = np.zeros((len(self.ladder) + 1, 5))  # the last is the load's valve
         if self.line.end.valve is not None:
             self.filters[-1] = discretise_element(self.line.end.valve, self.dt)
-        laws: list[tuple[float, ...]] = []
+        laws = []
         for r, rung in enumerate(self.ladder):
             if isinstance(rung, Branch):
                 self.kinds[r] = moc_kernel.BRANCH, len(self.pipes)
