@@ -108,7 +108,7 @@ store.write_texts(sys.argv[1], {"twin.json": "new", "verdict.json": "x" * 100_00
 @pytest.mark.skipif(not hasattr(resource, "RLIMIT_FSIZE"), reason="no limit of a file's size here")
 def test_files_that_belong_together_are_all_written_or_none(tmp_path):
     """The second of two files does not fit: the first keeps its old text too, so that no verdict
-    stands beside the twin of another run. With room both are new."""
+    stands beside the twin of another run."""
     old = {"twin.json": "old", "verdict.json": "old"}
     store.write_texts(tmp_path / "out", old)
     done = subprocess.run(

@@ -170,7 +170,8 @@ def fit_substitutes(workers: Workers, best: Fit, candidates: Sequence) -> list[F
 
     Each effect is exchanged for every other on the same element and for itself at every other
     place. These were not tried beside effects that were accepted later. An effect that is always
-    present is not exchanged. Volumes of liquid have their `gas_rivals`.
+    present is not exchanged. Where the search does without gas, it is tried in place of each volume
+    of liquid (`gas_rivals`).
     """
     members = best.hypothesis if len(best.hypothesis) > 1 else ()
     jobs = []

@@ -214,10 +214,10 @@ class Grid:
 
     def _set_storage(self, r, now, reference):
         """Set the steady state of a storage at the pressure `now`."""
-        self.references[r] = reference
+        self.references[r], u = reference, now - reference
         law = self.storages[self.kinds[r, 1]]
-        self.filter_states[r, 1] = np.polyval([*law[:0:-1], 0.0], (now - reference) / law[0])
-        moc_kernel.linearise_storage(law, self.filters[r], now - reference, self.filter_states[r])
+        self.filter_states[r, 1], _ = moc_kernel.evaluate_law(law, u / law[0])
+        moc_kernel.linearise_storage(law, self.filters[r], u, self.filter_states[r])
 
     def advance(self, nodes):
         """One period: pressure, Pa, and flow, m3/s, (N, M) at `nodes` (N,); updates the state."""

@@ -62,6 +62,16 @@ def _update_wall(keep, follow, share, pressure, strain, lag):
             lag[i] += c * b[i]
 
 
+@INLINED
+def evaluate_law(law, x):
+    """(sum_k c_k x^k, its slope in x) of a nonlinear compliance; `law` is (P, c_1, c_2 ...)."""
+    value = slope = 0.0
+    for k in range(len(law) - 1, 0, -1):
+        slope = slope * x + k * law[k]
+        value = (value + law[k]) * x
+    return value, slope
+
+
 @njit(cache=True, error_model="numpy")
 def _linearise_law(law, steady, pressure, stored, soft, give, lag):
     """Linearise the storage law at the present pressure: add its slope to `give`, its offset to
@@ -72,11 +82,7 @@ def _linearise_law(law, steady, pressure, stored, soft, give, lag):
     """
     new, old = 0.5 / NEW_RATE_SHARE, (1.0 - NEW_RATE_SHARE) / NEW_RATE_SHARE
     for i in range(len(lag)):
-        x = (pressure[i] - steady[i]) / law[0]
-        share = slope = 0.0
-        for k in range(len(law) - 1, 0, -1):
-            slope = slope * x + k * law[k]
-            share = (share + law[k]) * x
+        share, slope = evaluate_law(law, (pressure[i] - steady[i]) / law[0])
         slope /= law[0]
         give[i] = soft + new * slope
         stored[2, i] = new * (slope * pressure[i] - share + stored[0, i]) + old * stored[1, i]
@@ -174,11 +180,8 @@ def linearise_storage(law, filter_, u, state):
     state[1] is what has been stored, and what the present rate adds in the old rate's share of the
     step. The tangent's error in one step is corrected in the next.
     """
-    x, over = u / law[0], 1.0 / (NEW_RATE_SHARE * filter_[1])
-    volume = slope = 0.0
-    for k in range(len(law) - 1, 0, -1):
-        slope = slope * x + k * law[k]
-        volume = (volume + law[k]) * x
+    volume, slope = evaluate_law(law, u / law[0])
+    over = 1.0 / (NEW_RATE_SHARE * filter_[1])
     filter_[0] = over * slope / law[0]
     state[0] = over * (volume - state[1]) - filter_[0] * u
 
