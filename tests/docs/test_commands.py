@@ -85,7 +85,7 @@ NOT_RUN = {
         "it takes minutes",
         "python benchmarks/bench_mesh.py --help",
     ),
-    "python benchmarks/gpu_training.py": (
+    "python benchmarks/gpu_training.py cnn1d_341_100 resnet34_1d cnn2d_3_1": (
         "it needs a GPU",
         "python benchmarks/gpu_training.py --help",
     ),
