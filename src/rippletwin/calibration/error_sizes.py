@@ -25,7 +25,8 @@ SMOOTH_SDS = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 0.6])
 above 2 kHz (docs/explanation/pump.md): 0.3."""
 REACH, VALUES_ALONG = 3.0, 7
 """Factor to either side of a size within which it is sought, and values that are tried there."""
-CLOSE = 1.1  # ratio of three more values about the least
+SHARES_ALONG = np.linspace(0.0, 1.0, VALUES_ALONG)
+CLOSE_RATIOS = 1.1 ** np.arange(-1.0, 2.0)  # three more values about the least
 
 Costs = Callable[[Sequence[np.ndarray]], np.ndarray]
 """Costs (T, G, D) of values (T,), (G,) and (D,) of tau, sigma and delta."""
@@ -54,7 +55,7 @@ def find_most_likely_sizes(
         MODEL_ERRORS,
     ]
     if near:
-        sizes = [float(np.clip(x, grid[0], grid[-1])) for grid, x in zip(grids, present)]
+        sizes = [float(min(max(x, grid[0]), grid[-1])) for grid, x in zip(grids, present)]
     else:
         cost = costs(grids)
         best = np.unravel_index(np.argmin(cost), cost.shape)
@@ -71,22 +72,23 @@ def _least_along(costs: Costs, sizes: Sequence[float], axis: int, low: float, hi
     def vertex(values: np.ndarray) -> float:
         along = [np.array([value]) for value in sizes]
         along[axis] = values
-        return _vertex(values, costs(along).ravel())
+        return _vertex(values.tolist(), costs(along).ravel().tolist())
 
     size = sizes[axis]
-    found = vertex(np.geomspace(max(low, size / REACH), min(high, size * REACH), VALUES_ALONG))
+    first, last = max(low, size / REACH), min(high, size * REACH)
+    found = vertex(first * (last / first) ** SHARES_ALONG)
     if low < found < high:
-        found = vertex(found * CLOSE ** np.arange(-1.0, 2.0))
-    return float(np.clip(found, low, high))
+        found = vertex(found * CLOSE_RATIOS)
+    return min(max(found, low), high)
 
 
-def _vertex(values: np.ndarray, cost: np.ndarray) -> float:
+def _vertex(values: Sequence[float], cost: Sequence[float]) -> float:
     """Where the parabola through the least of several costs and its neighbours is least, `values`
     being in a geometric series; the first or the last value where that has the least cost."""
-    k = int(np.argmin(cost))
+    k = min(range(len(cost)), key=cost.__getitem__)
     if not 0 < k < len(values) - 1:
-        return float(values[k])
+        return values[k]
     before, least, after = cost[k - 1 : k + 2]
     rise = before + after - 2.0 * least
     shift = 0.5 * (before - after) / rise if rise > 0.0 else 0.0
-    return float(values[k] * (values[1] / values[0]) ** shift)
+    return values[k] * (values[1] / values[0]) ** shift
