@@ -3,6 +3,7 @@
 A reference without a healthy window scales them by its first one.
 """
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +19,10 @@ settings = SstSettings(**snakemake.params.sst)
 first = int(np.argmax(reference.state.values == "H"))  # 0 where none is
 scaling = np.tile(reference.signal.values[first : first + 1], 2)
 settings = replace(settings, scale=amplitude_scale(scaling, rate, settings))
-for source, target in zip(snakemake.input.samples, snakemake.output, strict=True):
+
+
+def save_images(source: str, target: str) -> int:
+    """Number of the images of the windows of `source`, which it saves to `target`."""
     samples = store.load(source)
     images = sst_images(samples.signal.values, rate, settings)
     axes = (samples.signal.dims[0], "channel", "frequency", "column")
@@ -27,6 +31,11 @@ for source, target in zip(snakemake.input.samples, snakemake.output, strict=True
         target,
         compressed=False,
     )
+    return len(images)
+
+
+with ThreadPoolExecutor(snakemake.threads) as pool:  # the transform releases the interpreter
+    counts = list(pool.map(save_images, snakemake.input.samples, snakemake.output))
 report_progress(
-    f"{len(images)} images of {settings.size} x {settings.size} a store, scale {settings.scale:.3g}"
+    f"{counts[-1]} images of {settings.size} x {settings.size} a store, scale {settings.scale:.3g}"
 )
