@@ -21,10 +21,9 @@ class Named(list):
 
 
 def run_script(
-    name: str, folder: Path, output: dict, wildcards: dict, params: dict, threads: int = 1, **files
+    name: str, folder: Path, output: dict, wildcards: dict, params: dict, **files
 ) -> None:
-    """Run workflow/scripts/NAME.py on so many `threads`; `files` are its inputs, its log goes into
-    `folder`."""
+    """Run workflow/scripts/NAME.py; `files` are its inputs, its log goes into `folder`."""
     job = SimpleNamespace(
         rule=name,
         input=Named({"effects": ()} | files),
@@ -32,7 +31,7 @@ def run_script(
         wildcards=Named(wildcards),
         params=SimpleNamespace(**params),
         log=[str(folder / "log.txt")],
-        threads=threads,
+        threads=1,
     )
     before = sys.stdout, sys.stderr, sys.excepthook
     sys.path.insert(0, str(SCRIPTS))

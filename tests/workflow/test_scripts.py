@@ -211,37 +211,6 @@ def test_images_are_scaled_by_the_healthy_window_or_the_first(tmp_path, states):
     np.testing.assert_allclose(store.load(tmp_path / "images.zarr").signal, expected, rtol=1e-5)
 
 
-def test_threads_make_the_images_that_one_makes(tmp_path):
-    """Stores whose images are made at the same time have the bytes of those made one by one, each
-    those of its own windows."""
-    rng = np.random.default_rng(0)
-    for k in range(5):
-        noise = rng.standard_normal((3, 1, SAMPLES))
-        windows = xr.Dataset(
-            {"signal": (("window", "channel", "time"), noise)},
-            coords={"state": ("window", list("SHS"))},
-            attrs={"speed_hz": SPEED},
-        )
-        store.save(windows, tmp_path / f"{k}.zarr")
-    made = {}
-    for threads in (1, 3):
-        stores = [tmp_path / f"images_{threads}_{k}.zarr" for k in range(5)]
-        run_script(
-            "synchrosqueeze",
-            tmp_path,
-            {target.name: target for target in stores},
-            {},
-            {"sst": SST},
-            threads=threads,
-            samples=[tmp_path / f"{k}.zarr" for k in range(5)],
-            reference=tmp_path / "0.zarr",
-        )
-        made[threads] = [store.load(target).signal.values for target in stores]
-    for one, other in zip(made[1], made[3], strict=True):
-        np.testing.assert_array_equal(one, other)
-    assert not np.array_equal(made[1][0], made[1][1])
-
-
 def simulate_fault(folder, state, leak_area, pipe_length):
     """The store that the script writes for a recording of `SAMPLES` points a revolution."""
     store.save(

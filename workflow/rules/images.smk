@@ -19,7 +19,6 @@ rule synchrosqueeze:
         "../scripts/synchrosqueeze.py"
 
 
-# On two cores other jobs fill the second one. On many, networks would wait for one core's images.
 use rule synchrosqueeze as synchrosqueeze_seeds with:
     input:
         samples=every_seed("samples/{dataset}/{faults}/{seed}x2.zarr"),
@@ -31,4 +30,3 @@ use rule synchrosqueeze as synchrosqueeze_seeds with:
         f"{RESULTS}/logs/synchrosqueeze_seeds/{{dataset}}/{{faults}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/synchrosqueeze_seeds/{{dataset}}/{{faults}}.tsv"
-    threads: max(1, workflow.cores // 4)

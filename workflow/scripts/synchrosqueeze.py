@@ -3,7 +3,6 @@
 A reference without a healthy window scales them by its first one.
 """
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -19,10 +18,7 @@ settings = SstSettings(**snakemake.params.sst)
 first = int(np.argmax(reference.state.values == "H"))  # 0 where none is
 scaling = np.tile(reference.signal.values[first : first + 1], 2)
 settings = replace(settings, scale=amplitude_scale(scaling, rate, settings))
-
-
-def save_images(source: str, target: str) -> int:
-    """Number of the images of the windows of `source`, which it saves to `target`."""
+for source, target in zip(snakemake.input.samples, snakemake.output, strict=True):
     samples = store.load(source)
     images = sst_images(samples.signal.values, rate, settings)
     axes = (samples.signal.dims[0], "channel", "frequency", "column")
@@ -31,11 +27,6 @@ def save_images(source: str, target: str) -> int:
         target,
         compressed=False,
     )
-    return len(images)
-
-
-with ThreadPoolExecutor(snakemake.threads) as pool:  # the transform releases the interpreter
-    counts = list(pool.map(save_images, snakemake.input.samples, snakemake.output))
 report_progress(
-    f"{counts[-1]} images of {settings.size} x {settings.size} a store, scale {settings.scale:.3g}"
+    f"{len(images)} images of {settings.size} x {settings.size} a store, scale {settings.scale:.3g}"
 )

@@ -184,7 +184,7 @@ def _resize(source: int, target: int) -> np.ndarray:
     return (weight / weight.sum(1, keepdims=True)).astype(np.float32)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True)
 def _fold(spectrum, weights, first, last, frequency, folded):
     """Wavelet-weighted lines, and their time derivative over 2 pi j, summed modulo COLUMNS."""
     folded[:] = 0
@@ -196,7 +196,7 @@ def _fold(spectrum, weights, first, last, frequency, folded):
             folded[1, a, line % columns] += value * frequency[line]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, fastmath=True)
 def _reassign(coefficient, derivative, edges, out):
     """Add each coefficient to the row whose edges enclose its frequency Re(W' conj W) / |W|^2."""
     rows = out.shape[0]
