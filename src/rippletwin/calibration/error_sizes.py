@@ -75,11 +75,12 @@ def _least_along(costs: Costs, sizes: Sequence[float], axis: int, low: float, hi
         return _vertex(values.tolist(), costs(along).ravel().tolist())
 
     size = sizes[axis]
+    # NumPy's geomspace and clip would take longer than the costs of so few values.
     first, last = max(low, size / REACH), min(high, size * REACH)
     found = vertex(first * (last / first) ** SHARES_ALONG)
     if low < found < high:
         found = vertex(found * CLOSE_RATIOS)
-    return min(max(found, low), high)
+    return float(min(max(found, low), high))
 
 
 def _vertex(values: Sequence[float], cost: Sequence[float]) -> float:
