@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator, Sequence
+from functools import cache
 from pathlib import Path
 
 import jsonschema
@@ -24,11 +25,16 @@ MAX_VALUE_CHARACTERS = 60  # of a wrong value that a message shows
 
 def check_config(config: dict, schema: Path) -> None:
     """Raise WorkflowError with a line for each key that violates the schema, a YAML file."""
-    validator = jsonschema.Draft202012Validator(yaml.safe_load(schema.read_text("utf-8")))
-    errors = sorted(validator.iter_errors(config), key=lambda error: list(map(str, error.path)))
+    errors = sorted(_validator(schema).iter_errors(config), key=lambda error: list(map(str, error.path)))
     lines = [line for error in errors for line in _lines(error)]
     if lines:
         raise WorkflowError("\n".join([*lines, "config/README.md explains every key."]))
+
+
+@cache
+def _validator(schema: Path) -> jsonschema.Draft202012Validator:
+    """What checks a configuration, made once from a YAML file."""
+    return jsonschema.Draft202012Validator(yaml.safe_load(schema.read_text("utf-8")))
 
 
 def check_names(key: str, names: Sequence[str], known: Sequence[str]) -> None:
