@@ -25,7 +25,9 @@ MAX_VALUE_CHARACTERS = 60  # of a wrong value that a message shows
 
 def check_config(config: dict, schema: Path) -> None:
     """Raise WorkflowError with a line for each key that violates the schema, a YAML file."""
-    errors = sorted(_validator(schema).iter_errors(config), key=lambda error: list(map(str, error.path)))
+    errors = sorted(
+        _validator(schema).iter_errors(config), key=lambda error: list(map(str, error.path))
+    )
     lines = [line for error in errors for line in _lines(error)]
     if lines:
         raise WorkflowError("\n".join([*lines, "config/README.md explains every key."]))

@@ -7,7 +7,7 @@ imports. Rules therefore name these files as inputs.
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -23,6 +23,7 @@ PLUGIN_FOLDERS = {
 """Modules that import by a computed name -> the folder whose modules they import."""
 
 SUFFIXES = {".py", ".yaml"}  # code and data of a package
+BLOCKS = ("body", "orelse", "handlers", "finalbody", "cases")  # statements of a statement
 
 
 def source_files_of(path: Path | str) -> list[Path]:
@@ -58,11 +59,7 @@ def _imported_files(file: Path) -> frozenset[Path]:
 
 def _imported_names(file: Path) -> Iterator[str]:
     """Dotted names in a file's import statements, wherever they are but for type checkers only."""
-    tree = ast.parse(file.read_text("utf-8"))
-    for node in ast.walk(tree):
-        if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
-            node.body = []
-    for node in ast.walk(tree):
+    for node in _statements(ast.parse(file.read_text("utf-8")).body):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -70,6 +67,20 @@ def _imported_names(file: Path) -> Iterator[str]:
             name = ".".join([*parents, *filter(None, [node.module])])
             yield name
             yield from (f"{name}.{alias.name}" for alias in node.names)
+
+
+def _statements(nodes: Iterable[ast.AST]) -> Iterator[ast.AST]:
+    """Statements and all within them, but for what type checkers only read. Expressions, nine
+    nodes of ten, are not looked at: they hold no statement."""
+    for node in nodes:
+        yield node
+        for block in BLOCKS:
+            if not (block == "body" and _is_for_type_checkers(node)):
+                yield from _statements(getattr(node, block, ()))
+
+
+def _is_for_type_checkers(node: ast.AST) -> bool:
+    return isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
 
 
 def _package_of(file: Path, level: int) -> tuple[str, ...]:
@@ -83,17 +94,13 @@ def _package_of(file: Path, level: int) -> tuple[str, ...]:
 @cache
 def _files_run_by(name: str) -> frozenset[Path]:
     """This repository's files that `import name` runs: each package's __init__ and the module."""
-    parts = name.split(".")
-    return frozenset(
-        file
-        for root in IMPORT_ROOTS
-        for depth in range(1, len(parts) + 1)
-        for file in (
-            root.joinpath(*parts[:depth], "__init__.py"),
-            root.joinpath(*parts[: depth - 1], f"{parts[depth - 1]}.py"),
-        )
-        if file.is_file()
-    )
+    package, _, _ = name.rpartition(".")
+    path = name.replace(".", "/")
+    candidates = [
+        root / end for root in IMPORT_ROOTS for end in (f"{path}/__init__.py", f"{path}.py")
+    ]
+    found = frozenset(file for file in candidates if file.is_file())
+    return found | _files_run_by(package) if package else found
 
 
 def _absolute(path: Path | str) -> Path:

@@ -67,6 +67,7 @@ def test_the_threshold_is_exceeded_in_two_of_a_hundred_cases():
     assert few.p_value(-100.0) == 1.0
 
 
+@pytest.mark.long
 def test_no_draw_without_an_effect_reaches_the_threshold(fitted, monkeypatch):
     """In twelve draws without an effect, with three effects refitted to each, none adds the log
     evidence that a name needs. Fewer than ten draws are refused."""

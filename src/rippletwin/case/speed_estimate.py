@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.fft import rfft
 
 HARMONICS = 12  # of the nominal speed; every candidate is seen up to the same frequency
 SEARCH = (0.5, 2.0)
@@ -55,7 +54,7 @@ def _spectrum(pressure: np.ndarray, sampling_rate_hz: float) -> tuple[np.ndarray
     for row in pressure:
         for start in range(0, blocks * size, size):
             block = row[start : start + size]
-            power += np.abs(rfft((block - np.mean(block, dtype=float)) * window)) ** 2
+            power += np.abs(np.fft.rfft((block - np.mean(block, dtype=float)) * window)) ** 2
     return np.fft.rfftfreq(size, 1 / sampling_rate_hz), power
 
 
