@@ -13,6 +13,7 @@ from good_recordings import WRITE, Good
 from made_results import write_results
 from rippletwin.case.load import load_case
 from rippletwin.errors import InputError
+from rippletwin.learning.kept_networks import load_networks
 from rippletwin.report.page import report_case
 from rippletwin.twin.twin_file import load_twin
 
@@ -32,6 +33,23 @@ def test_a_recording(tmp_path, name):
     good.path.write_bytes(edited(good.content, edits))
     with pytest.raises(InputError) as caught, little_memory():
         load_case(tmp_path)
+    assert refused(caught.value)
+
+
+def test_a_column_name_that_is_no_text(tmp_path):
+    """A byte of a Parquet file's column name is changed to one that UTF-8 does not know."""
+    good = Good(tmp_path, "r.parquet", WRITE["r.parquet"])
+    good.path.write_bytes(good.content.replace(b"p1", b"p\xf0"))
+    with pytest.raises(InputError, match="cannot be read"):
+        load_case(tmp_path)
+
+
+def test_networks_in_the_older_format_of_torch(tmp_path):
+    """A text of 3.7 GiB in 59 bytes: refused before torch allocates it."""
+    path = tmp_path / "networks.pt"
+    path.write_bytes(b"X" + 58 * b"\xdf")
+    with pytest.raises(InputError, match="no kept networks") as caught, little_memory():
+        load_networks(path)
     assert refused(caught.value)
 
 

@@ -17,6 +17,8 @@ from rippletwin.learning.training import activation_statistics, predict
 FORMAT = 2
 """Of the files: counts up when what networks calculate, or what is kept of them, changes."""
 
+ARCHIVE = b"PK\x03\x04"
+
 
 @dataclass(frozen=True)
 class KeptNetworks:
@@ -72,6 +74,8 @@ def load_networks(path: str | Path) -> KeptNetworks:
     """
     remedy = "Let the workflow make it anew"
     try:
+        if not _is_archive(path):
+            raise ValueError("torch's older format, in which a damaged length takes all memory")
         data = torch.load(path, weights_only=True)
         parts, written = data.pop("conformal"), data.pop("format", 1)
         if written == FORMAT:
@@ -85,3 +89,9 @@ def load_networks(path: str | Path) -> KeptNetworks:
         raise InputError(path, "networks", "holds no kept networks", remedy) from None
     found = f"is {written}, and this version of rippletwin reads {FORMAT}"
     raise InputError(path, "format", found, remedy)
+
+
+def _is_archive(path: str | Path) -> bool:
+    """Whether a file begins as the zip archives that torch writes."""
+    with open(path, "rb") as file:
+        return file.read(len(ARCHIVE)) == ARCHIVE

@@ -68,16 +68,13 @@ def refuse_damaged(
     path: Path,
     guess: str,
     remedy: str = "Copy it again from where it was recorded",
-    errors: type[Exception] | tuple[type[Exception], ...] = Exception,
 ) -> Iterator[None]:
-    """Turn `errors` of the library that reads a file into an InputError.
-
-    Libraries raise a dozen kinds for a damaged file, hence all by default. `guess` is what the file
-    may be instead, as "or is no zarr store".
+    """Turn every error of the library that reads a file into an InputError: libraries raise a dozen
+    kinds for a damaged file. `guess` is what the file may be instead, as "or is no zarr store".
     """
     try:
         yield
     except InputError:
         raise
-    except errors as error:
+    except Exception as error:
         raise InputError(path, "file", f"cannot be read, {guess} ({error})", remedy) from error

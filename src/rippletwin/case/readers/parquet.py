@@ -16,9 +16,7 @@ from rippletwin.errors import InputError
 
 def read(path: Path, layout: Layout) -> Signals:
     """Read a Parquet recording; raises InputError."""
-    errors = pa.ArrowException, OSError
-    damaged = refuse_damaged(path, "is cut short or not Parquet", errors=errors)
-    with damaged, pq.ParquetFile(path) as file:
+    with refuse_damaged(path, "is cut short or not Parquet"), pq.ParquetFile(path) as file:
         names = file.schema_arrow.names
         chosen, time = choose(path, layout, names), find_time(path, layout, names)
         check_size(path, "file", file.metadata.num_rows * len(chosen))
