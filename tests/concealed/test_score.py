@@ -5,7 +5,6 @@ import pytest
 from concealed.failures import failure
 from concealed.score import (
     ACCEPTABLE_MISFIT,
-    PLAIN_CHANGE,
     assign_claims,
     intervals_hold,
     is_place_right,
@@ -196,9 +195,9 @@ def test_calibration_alone_raises_the_alarm_by_its_misfit(misfit, alarm):
 
 
 def test_what_a_row_takes_from_the_truth():
-    """A change counts as plain from its limit on; calibration absorbs no less than nothing."""
-    assert score_example(truth(change=PLAIN_CHANGE), verdict("consistent"))["plain"]
-    assert not score_example(truth(change=0.99 * PLAIN_CHANGE), verdict("consistent"))["plain"]
+    """A change counts as plain from 5 % on; calibration absorbs no less than nothing."""
+    assert score_example(truth(change=0.05), verdict("consistent"))["plain"]
+    assert not score_example(truth(change=0.0499), verdict("consistent"))["plain"]
     said = verdict("consistent")
     said["fit"]["before"]["in_sample"] = 0.6  # nominal 0.5
     row = score_example(truth(), said, log_evidence=7.0)
@@ -212,6 +211,8 @@ def test_what_a_row_takes_from_the_truth():
     [
         ((2.9, 3.2), True),
         ((3.04, 3.06), True),  # 1 % of 5 m from 3.0, and from 3.1
+        ((2.8, 2.94), False),  # 0.06 m below 3.0
+        ((3.16, 3.4), False),
         ((3.2, 3.4), False),
         ((2.0, 2.9), False),
     ],
