@@ -211,6 +211,8 @@ def test_what_a_row_takes_from_the_truth():
     [
         ((2.9, 3.2), True),
         ((3.04, 3.06), True),  # 1 % of 5 m from 3.0, and from 3.1
+        ((2.8, 3.0), True),  # the actual place alone
+        ((3.1, 3.4), True),  # that of the drawing alone
         ((2.8, 2.94), False),  # 0.06 m below 3.0
         ((3.16, 3.4), False),
         ((3.2, 3.4), False),
@@ -270,6 +272,12 @@ def test_named_first_is_what_has_most_evidence_beside_nuisance(evidence, first):
     said = with_evidence(verdict("named", FRICTION, GAIN, claim("leak")), **evidence)
     row = score_example(truth(nuisance=[TRUE_FRICTION]), said)
     assert row["right"] and row["named_first"] is first
+
+
+def test_named_first_may_be_either_effect_of_a_pair():
+    """Both are concealed, and one has all the evidence."""
+    said = with_evidence(verdict("named", claim("side_branch"), claim("leak")), leak=20.0)
+    assert score_example(pair_truth(), said)["named_first"]
 
 
 def test_named_first_needs_an_established_name():
