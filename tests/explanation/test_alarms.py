@@ -195,6 +195,17 @@ def test_another_shaft_angle_is_no_drift(turn):
     assert np.max(np.abs(difference)) < 1e-3
 
 
+def test_the_angle_follows_the_orders_that_are_known():
+    """The second of two orders has noise a hundred times its value and another phase. The first,
+    without noise, is aligned to 1 % of its value."""
+    early, late = at_common_orders(*halves(0.2))
+    noise = np.einsum("f,ij->fij", [1.0, 1e14], np.eye(len(early.values)))
+    wrong = late.values * np.array([1.0, -1.0])
+    late = replace(late, values=wrong, covariance=noise)
+    difference, _ = aligned_difference(replace(early, covariance=noise), late, delay=0.0)
+    assert np.max(np.abs(difference[:, 0])) < 1e3
+
+
 def test_what_one_state_allows():
     """Noise of both halves, a model error of the mean power over the sensors, and the phase that a
     sharp resonance changes by at another speed."""
