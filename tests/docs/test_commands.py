@@ -50,6 +50,26 @@ NOT_RUN = {
         "it takes minutes",
         "python benchmarks/processors.py --help",
     ),
+    'python -m pytest -m long -k "killed and 100" tests/workflow/test_killed_runs.py': (
+        HOURS,
+        "python -m pytest --collect-only -q -m long tests/workflow/test_killed_runs.py",
+    ),
+    "python tests/fuzz/guided.py twin --inputs 200000": (
+        HOURS,
+        "python -m py_compile tests/fuzz/guided.py",
+    ),
+    "python benchmarks/mutants.py scoring verdict --count 100 --seed 56": (
+        HOURS,
+        "python benchmarks/mutants.py --help",
+    ),
+    "python benchmarks/mutants.py readers --count 60 --seed 56": (
+        HOURS,
+        "python benchmarks/mutants.py --help",
+    ),
+    "python benchmarks/processors_networks.py": (
+        HOURS,
+        "python benchmarks/processors_networks.py --help",
+    ),
     "python benchmarks/soak.py my_case": (HOURS, "python benchmarks/soak.py --help"),
     "python3 -m venv .venv": (NETWORK, "python3 -m venv --help"),
     ". .venv/bin/activate": ("it needs the environment above", "true"),
