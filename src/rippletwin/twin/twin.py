@@ -286,7 +286,7 @@ class Twin:
         from rippletwin.pump.ripple_sensitivity import KEYS
 
         values, pump = self.values(), dict(self.rig.pump)
-        fitted = {p.name for p in self.parameters if p.place == "pump"}
+        fitted = (p.name for p in self.parameters if p.place == "pump")
         return pump | {KEYS[name]: values[name] for name in fitted}
 
     def calibrated_rig(self) -> Rig:
