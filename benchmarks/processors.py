@@ -3,8 +3,8 @@
     python benchmarks/processors.py CASE
 
 CASE is explained, and its recordings diagnosed, again and again on the machine at hand, while the
-libraries are told to work as on another processor: OpenBLAS with the kernels of one without AVX512,
-numpy without AVX512, and numba with code for any x86-64. Rounding differs then, and with it the
+libraries are told to work as on another processor: OpenBLAS with the kernels of one without AVX,
+numpy without AVX, and numba with code for any x86-64. Rounding differs then, and with it the
 last digits of all sums. Prints whether verdict, effects, support and states stay, and by how much
 their numbers move, in shares of half a 95 % interval.
 """
@@ -21,13 +21,13 @@ from tempfile import TemporaryDirectory
 
 from rippletwin.case.load import load_case
 
-OPENBLAS = {"OPENBLAS_CORETYPE": "Haswell"}
-NUMPY = {"NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR"}
+OPENBLAS = {"OPENBLAS_CORETYPE": "Nehalem"}
+NUMPY = {"NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL AVX512_SPR"}
 NUMBA = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
 VARIANTS = {
     "the same again": {},
-    "OpenBLAS as without AVX512": OPENBLAS,
-    "numpy as without AVX512": NUMPY,
+    "OpenBLAS as without AVX": OPENBLAS,
+    "numpy as without AVX": NUMPY,
     "numba for any x86-64": NUMBA,
     "all three": OPENBLAS | NUMPY | NUMBA,
 }
