@@ -4,7 +4,7 @@ CORES ?= 2
 BENCH := .venv-bench
 # Per cent of lines and branches in src that the fast tests run at least.
 LEAST_COVERAGE := 86
-# Each process begins with a run of test files of its own: most of what a file prepares is prepared once.
+# Processes take tests in the order of the files, not by turns: most of what a file prepares is prepared once.
 SHARED_OUT = -n $(CORES) --dist worksteal
 # One thread a process: two processes share two cores well, two processes of two threads do not.
 export OMP_NUM_THREADS = 1

@@ -102,8 +102,7 @@ def main() -> None:
             return json.dumps(diagnosis_dict(diagnose(case, twin, recordings)))
 
         flat = soak("explain", options.cases, explain_case)
-        if options.recordings:
-            flat &= soak("diagnose", options.recordings, diagnose_recording)
+        flat &= soak("diagnose", options.recordings, diagnose_recording)
     if not flat:
         raise SystemExit("memory, descriptors or answers did not stay as they were")
 

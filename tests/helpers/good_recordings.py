@@ -41,12 +41,13 @@ def write_parquet(path):
     parquet.write_table(pyarrow.table(columns), path)
 
 
-def write_universal(path):
+def write_universal(path, steps=(1 / RATE, 1 / RATE)):
+    """Data sets 58 whose sensors have these time steps, s."""
     pyuff = pytest.importorskip("pyuff")
-    for name, row in zip(("p1", "p2"), PRESSURE):
+    for name, row, step in zip(("p1", "p2"), PRESSURE, steps):
         data = {"binary": 1, "id1": name, "func_type": 1, "data": row, "ord_data_type": 4}
         data |= {"rsp_node": 1, "rsp_dir": 1, "ref_node": 1, "ref_dir": 1, "abscissa_spacing": 1}
-        data |= {"x": np.arange(row.size) / RATE, "abscissa_min": 0.0, "abscissa_inc": 1 / RATE}
+        data |= {"x": step * np.arange(row.size), "abscissa_min": 0.0, "abscissa_inc": step}
         data |= {"orddenom_spec_data_type": 0}
         pyuff.UFF(str(path)).write_sets(pyuff.prepare_58(**data), "add")
 

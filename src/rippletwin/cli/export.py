@@ -70,10 +70,10 @@ def command(
     twin = None if twin_file is None else load_twin(twin_file, effects)
     read = load_case(case, band_hz=(min_frequency, max_frequency))
     known = {recording.label: recording for recording in read.recordings}
-    for label in (label for label in labels if label not in known):
-        raise InputError(
-            "command line", "--recording", f"no recording {label}", f"There are {', '.join(known)}"
-        )
+    for label in labels:
+        if label not in known:
+            remedy = f"There are {', '.join(known)}"
+            raise InputError("command line", "--recording", f"no recording {label}", remedy)
     warn(read.warnings)
     written = []
     chosen = [known[label] for label in dict.fromkeys(labels or known)]

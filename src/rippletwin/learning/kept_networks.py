@@ -17,7 +17,7 @@ from rippletwin.learning.training import activation_statistics, predict
 FORMAT = 2
 """Of the files: counts up when what networks calculate, or what is kept of them, changes."""
 
-ARCHIVE = b"PK\x03\x04"
+ARCHIVE = b"PK\x03\x04"  # the first bytes of a zip archive, which torch writes
 
 
 @dataclass(frozen=True)
@@ -74,9 +74,7 @@ def load_networks(path: str | Path) -> KeptNetworks:
     """
     remedy = "Let the workflow make it anew"
     try:
-        if not _is_archive(path):
-            raise ValueError("torch's older format, in which a damaged length takes all memory")
-        data = torch.load(path, weights_only=True)
+        data = _load_archive(path)
         parts, written = data.pop("conformal"), data.pop("format", 1)
         if written == FORMAT:
             conformal = [
@@ -91,7 +89,11 @@ def load_networks(path: str | Path) -> KeptNetworks:
     raise InputError(path, "format", found, remedy)
 
 
-def _is_archive(path: str | Path) -> bool:
-    """Whether a file begins as the zip archives that torch writes."""
+def _load_archive(path: str | Path) -> dict:
+    """The tensors and plain data of an archive. Raises ValueError for torch's older format, where a
+    damaged length takes all memory."""
     with open(path, "rb") as file:
-        return file.read(len(ARCHIVE)) == ARCHIVE
+        if file.read(len(ARCHIVE)) != ARCHIVE:
+            raise ValueError("no archive")
+        file.seek(0)
+        return torch.load(file, weights_only=True)
