@@ -147,6 +147,18 @@ def test_tdms_as_rig_yaml_describes_it(tmp_path):
     )
 
 
+def test_tdms_channels_of_two_lengths_are_refused(tmp_path):
+    """A sample less of the second sensor: nothing says which sample is missing."""
+    content = sheet()
+    content["recordings"][0]["file"] = "r.tdms"
+    write_case(tmp_path, content, None)
+    with TdmsWriter(tmp_path / "r.tdms") as writer:
+        for name, row in (("p1", PRESSURE[0]), ("p2", PRESSURE[1][:-1])):
+            writer.write_segment([ChannelObject("g", name, row, {"wf_increment": 1 / RATE})])
+    size = len(PRESSURE[0])
+    refused(tmp_path, "r.tdms", "channels", f"lengths differ: p1 {size}, p2 {size - 1}")
+
+
 COUNT = 600.0  # Pa
 
 
