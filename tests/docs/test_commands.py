@@ -62,6 +62,10 @@ NOT_RUN = {
         HOURS,
         "python benchmarks/mutants.py --help",
     ),
+    "python benchmarks/mutants.py readers --count 60 --seed 56": (
+        HOURS,
+        "python benchmarks/mutants.py --help",
+    ),
     "python benchmarks/processors_networks.py": (
         HOURS,
         "python benchmarks/processors_networks.py --help",
