@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
+from subprocess import CompletedProcess
 
+from forked_snakemake import run_snakemake
 from paths import ROOT
 
 MAKE_OUTPUTS = """
@@ -62,10 +62,9 @@ def make(folder: Path) -> None:
         (case / name).write_text("time_s,p1\n")
 
 
-def snakemake(folder: Path, *options: str) -> subprocess.CompletedProcess:
-    """Run it there; raises CalledProcessError with Snakemake's words when it fails."""
-    command = [sys.executable, "-m", "snakemake", "--cores", "2", "--configfile", "overlay.yaml"]
-    return subprocess.run([*command, *options], cwd=folder, capture_output=True, text=True)
+def snakemake(folder: Path, *options: str) -> CompletedProcess:
+    """Run it there."""
+    return run_snakemake(folder, "--cores", "2", "--configfile", "overlay.yaml", *options)
 
 
 def planned(folder: Path) -> tuple[set[str], str]:

@@ -1,18 +1,18 @@
 """The workflow plans the same jobs wherever it is started from."""
 
 import re
-import subprocess
-import sys
+from functools import cache
 
 import pytest
 
+from forked_snakemake import run_snakemake
 from paths import ROOT
 
 
+@cache
 def job_counts(*options: str) -> dict[str, int]:
     """Rule -> jobs that a dry run from the repository's root plans."""
-    command = [sys.executable, "-m", "snakemake", "--cores", "1", "--dry-run", "--quiet", "rules"]
-    result = subprocess.run([*command, *options], cwd=ROOT, capture_output=True, text=True)
+    result = run_snakemake(ROOT, "--cores", "1", "--dry-run", "--quiet", "rules", *options)
     text = result.stdout + result.stderr
     assert result.returncode == 0, text
     table = re.search(r"^Job stats:\njob .*\n-+ .*\n((?:.+\n)+)", text, re.M)
