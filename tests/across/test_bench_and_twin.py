@@ -24,7 +24,7 @@ from virtualrig.rig import build
 
 NO_VALUES = {"piston_spread", "speed_fluctuation"}  # parametrised differently by rig and twin
 ALLOWED_MISFIT = 0.002  # the twin approximates the mean pressure along the line
-QUICK = ("viscoelastic_wall", "leak")
+QUICK = ("leak",)
 SLOW = tuple(name for name in LIBRARY if name not in NO_VALUES and name not in QUICK)
 LEVEL = 0.7  # of the strength, from invisible (0) to plain (1)
 SPEED, PRESSURE = 1000.0, 6e6  # r/min, Pa

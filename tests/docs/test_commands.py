@@ -177,11 +177,9 @@ def stand_in(command: str) -> str:
 
 
 def make_folder(folder: Path) -> Path:
-    """A copy of the repository, as a reader has it."""
+    """A copy of the repository, as a reader has it; what numba has compiled comes with it."""
     for name in COPIED:
-        shutil.copytree(
-            ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", ".*")
-        )
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns(".*"))
     for name in COPIED_FILES:
         shutil.copy(ROOT / name, folder)
     author = "-c user.name=reader -c user.email=reader@example.org"

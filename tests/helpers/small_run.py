@@ -42,9 +42,12 @@ EVERY_STAGE = ("out/report.html", "out/calibration/twin.json", "out/propagated/c
 evaluate, and what these need and feed."""
 
 
-def write_case(folder: Path) -> None:
+def write_case(folder: Path, state: str = "slipper") -> None:
     """rig.yaml, the healthy pump's flow ripple, and recordings of the healthy pump and of one with
-    a leaking slipper, in `folder`."""
+    a leaking slipper, in `folder`.
+
+    state : what rig.yaml says of the second recording.
+    """
     folder.mkdir()
     point = {"speed_rpm": SPEED, "load_pressure": LOAD}
     sheet = {
@@ -63,7 +66,7 @@ def write_case(folder: Path) -> None:
         "load": {"kind": "orifice"},
         "recordings": [
             {"file": "healthy.h5", "state": "healthy", "flow_ripple": "flow.csv"} | point,
-            {"file": "slipper.h5", "state": "slipper"} | point,
+            {"file": "slipper.h5", "state": state} | point,
         ],
     }
     (folder / "rig.yaml").write_text(yaml.safe_dump(sheet))

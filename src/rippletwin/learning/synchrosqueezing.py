@@ -13,8 +13,9 @@ outside the band is dropped, not clamped to the edge rows.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numba
@@ -27,6 +28,9 @@ COLUMNS = 256  # instants at which the transform is taken
 MARGIN_OCTAVES = 0.6  # beyond the band's edges: wavelets there can have energy inside the band
 MIN_RESPONSE = 1e-8  # of a wavelet over its peak; spectrum lines below it are omitted
 MIN_COEFFICIENT = 1e-6  # over a window's largest; smaller ones have no meaningful frequency
+MANY_SIGNALS = 512  # from so many on, a faster inverse FFT is worth the seconds of torch's import
+
+_InverseFft = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -52,9 +56,11 @@ def sst_images(windows: np.ndarray, sampling_rate_hz: float, settings: SstSettin
     images = np.empty((*windows.shape[:-1], settings.size, settings.size), dtype=np.float32)
     flat = images.reshape(-1, settings.size, settings.size)
     signals = windows.reshape(-1, windows.shape[-1])
+    bank = _filter_bank(windows.shape[-1], float(sampling_rate_hz), settings)
+    inverse = _inverse_fft(len(signals))
     step = 64  # signals at a time, whose spectrograms fit into the cache
     for start in range(0, len(signals), step):
-        part = synchrosqueeze(signals[start : start + step], sampling_rate_hz, settings)
+        part = _transform(signals[start : start + step], bank, inverse)
         flat[start : start + step] = transform_images(part, settings)
     return images
 
@@ -85,21 +91,31 @@ def synchrosqueeze(
     window. A tone of amplitude A gives magnitude A in its row; the real part summed over rows is
     the signal, within the band, at those times.
     """
-    import torch  # takes seconds, which the axes of an image do not need
-
     signals = np.asarray(signals)
-    points = signals.shape[-1]
-    bank = _filter_bank(points, float(sampling_rate_hz), settings)
-    spectrum = scipy.fft.rfft(signals, axis=-1)[:, : len(bank.lines)] * (2 / points)
-    rows = len(bank.edges) - 1
-    out = np.zeros((len(signals), rows, COLUMNS), dtype=np.complex64)
+    bank = _filter_bank(signals.shape[-1], float(sampling_rate_hz), settings)
+    return _transform(signals, bank, _inverse_fft(len(signals)))
+
+
+def _transform(signals: np.ndarray, bank: _FilterBank, inverse: _InverseFft) -> np.ndarray:
+    """Synchrosqueezed transform with the wavelets of a bank."""
+    spectrum = scipy.fft.rfft(signals, axis=-1)[:, : len(bank.lines)] * (2 / signals.shape[-1])
+    out = np.zeros((len(signals), len(bank.edges) - 1, COLUMNS), dtype=np.complex64)
     folded = np.empty((2, len(bank.weights), COLUMNS), dtype=np.complex64)
     for signal, image in zip(spectrum.astype(np.complex64), out):
         _fold(signal, bank.weights, bank.first, bank.last, bank.lines, folded)
-        # torch's inverse FFT (MKL) is three times as fast as scipy's at this length
-        coefficients = torch.fft.ifft(torch.from_numpy(folded), norm="forward").numpy()
+        coefficients = inverse(folded)
         _reassign(coefficients[0], coefficients[1], bank.edges, image)
     return out
+
+
+def _inverse_fft(count: int) -> _InverseFft:
+    """Unnormalised, along the last axis, for `count` signals. At this length torch's (MKL) is up to
+    three times as fast as scipy's."""
+    if count < MANY_SIGNALS:
+        return partial(scipy.fft.ifft, norm="forward")
+    import torch
+
+    return lambda folded: torch.fft.ifft(torch.from_numpy(folded), norm="forward").numpy()
 
 
 class _FilterBank(NamedTuple):
