@@ -10,6 +10,8 @@ SHARED_OUT = -n $(CORES) --dist worksteal
 export OMP_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 export NUMBA_NUM_THREADS = 1
+# A run is a hundred processes: none compiles again what another one has compiled, whatever the environment says.
+export PYTHONDONTWRITEBYTECODE =
 
 .PHONY: run smoke test test-long coverage mutants fuzz lint docs-site bench pins audit clean
 

@@ -21,6 +21,7 @@ import yaml
 
 from case_folders import sheet, write_case
 from doc_pages import PAGES, Block, blocks, blocks_of, prose_of
+from forked_snakemake import run_snakemake
 from paths import ROOT
 
 LANGUAGES = {"sh", "text", "python", "yaml", "json", "mermaid"}
@@ -215,13 +216,21 @@ def write_overlay(folder: Path, page: str) -> None:
 
 
 def run(command: str, folder: Path) -> None:
-    """Run a command line in the shell, with this interpreter's programs and the folder's source."""
+    """Run a command line; one that fails is an error with what it printed."""
+    if command.startswith("snakemake "):
+        done = run_snakemake(folder, *shlex.split(command)[1:])
+    else:
+        done = run_in_shell(command, folder)
+    assert done.returncode == 0, f"{command}\n{done.stdout[-3000:]}\n{done.stderr[-3000:]}"
+
+
+def run_in_shell(command: str, folder: Path) -> subprocess.CompletedProcess:
+    """Run it in the shell, with this interpreter's programs and the folder's source."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     environment = {**os.environ, "PATH": path, "PYTHONPATH": str(folder / "src")}
-    done = subprocess.run(
+    return subprocess.run(
         ["bash", "-c", command], cwd=folder, env=environment, capture_output=True, text=True
     )
-    assert done.returncode == 0, f"{command}\n{done.stdout[-3000:]}\n{done.stderr[-3000:]}"
 
 
 def fast_commands() -> dict[str, Block]:

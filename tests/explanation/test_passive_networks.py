@@ -48,7 +48,7 @@ def test_a_leaking_joint_is_an_inertance_with_a_shunt_beside_it():
     piece, which is one, within 5 % of the line's length of the truth, and what is left of the model
     error is below 1 %; the line alone has more than 10 %. The verdict tells every network."""
     rig, observations, _ = make(
-        np.random.default_rng(2), ((JOINT, Place("position")),), points=POINTS[:2]
+        np.random.default_rng(2), ((JOINT, Place("position")),), points=POINTS[:1]
     )
     base, data = prepare_base(rig, observations)
     with open_workers(base, data, 1) as workers:

@@ -38,7 +38,7 @@ class Experiment:
     kills: int  # in each run
 
 
-# Networks, whose jobs the long experiment kills, are not asked of a recording of unknown state here.
+# A recording of unknown state asks no networks; the long experiment kills their jobs.
 FAST = Experiment(OVERLAY, "unknown", EVERY_STAGE, 1, 3)
 LONG = Experiment(SMOKE, None, ("all",), 5, 20)
 
