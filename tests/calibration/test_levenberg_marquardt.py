@@ -6,13 +6,13 @@ from rippletwin.calibration.frequency_continuation import refine
 from rippletwin.calibration.levenberg_marquardt import descend
 from rippletwin.calibration.posterior import Posterior
 from synthetic_effects import AIR, MUCH_AIR, TRUTH
-from synthetic_observations import make
+from synthetic_observations import POINTS, make
 
 
 def test_descent_ends_where_no_steady_state_is_found():
     """With so much air that no steady state is found the objective is infinite, although the last
     iterate is finite. A descent that begins there ends there, and its fit has no evidence."""
-    _, observations, truth = make(np.random.default_rng(1), AIR, MUCH_AIR)
+    _, observations, truth = make(np.random.default_rng(1), AIR, MUCH_AIR, points=POINTS[:1])
     posterior, theta = Posterior(truth, observations), truth.theta.copy()
     assert np.isfinite(posterior.objective(theta, posterior.predict(theta)))
     theta[truth.index["entrained_air@line.gas_fraction"]] += 3.5

@@ -172,7 +172,7 @@ def test_a_modulation_beside_unequal_pistons_is_named_and_measured():
     assert found.effects[0].value == pytest.approx(3e-3, rel=0.15)
 
 
-@pytest.mark.parametrize("pistons", [7, 9])
+@pytest.mark.parametrize("pistons", [pytest.param(7, marks=pytest.mark.long), 9])
 def test_unequal_pistons_alone_are_rarely_called_a_modulation(pistons):
     """Statistics, without a line: pistons early or late at random look like a modulation at the
     rate that is stated. Of 400 pumps 2 % are expected below a probability of 2 %, and 50 % below
