@@ -94,16 +94,22 @@ TABLES = {
 }
 
 
-@pytest.mark.parametrize("name", TABLES)
-@tried(1)
-@given(edits=EDITS)
-def test_text_of_a_table(tmp_path_factory, name, edits):
-    """Flow ripples, impedances and spectra as text."""
-    read, text = TABLES[name]
-    path = tmp_path_factory.getbasetemp() / "table.csv"
+@pytest.fixture(scope="module", params=TABLES)
+def table(request, tmp_path_factory):
+    """What reads a table, where it is, and its good text, which is read without complaint."""
+    read, text = TABLES[request.param]
+    path = tmp_path_factory.mktemp("table") / "table.csv"
     path.write_text(text)
     read(path)
-    path.write_bytes(edited(text.encode(), edits))
+    return read, path, text.encode()
+
+
+@tried(1)
+@given(edits=EDITS)
+def test_text_of_a_table(table, edits):
+    """Flow ripples, impedances and spectra as text."""
+    read, path, good = table
+    path.write_bytes(edited(good, edits))
     try:
         with little_memory():
             read(path)

@@ -39,7 +39,7 @@ def damaged(text: str, edits, tree, as_tree: bool) -> bytes:
     return edited(text.encode(), edits)
 
 
-@tried(2)
+@tried(1)
 @given(edits=EDITS, tree=TREE_EDITS, as_tree=st.booleans())
 def test_a_twin(folder, edits, tree, as_tree):
     """twin.json gives a twin, or is refused."""

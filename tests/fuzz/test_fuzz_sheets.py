@@ -41,7 +41,7 @@ def test_text_of_a_sheet(folder, edits):
     assert all(isinstance(error, InputError) for error in find_sheet_faults(path, content))
 
 
-@tried(4)
+@tried(2)
 @given(edits=TREE_EDITS)
 def test_values_of_a_sheet(folder, edits):
     """Values of the smallest sheet are others, missing, too many; what passes is read whole."""
@@ -61,7 +61,7 @@ def test_values_of_a_sheet(folder, edits):
         pass
 
 
-@tried(2)
+@tried(5)
 @given(edits=TREE_EDITS)
 def test_values_of_a_full_sheet(edits):
     """The same of the sheet with every key."""
