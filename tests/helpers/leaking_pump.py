@@ -63,8 +63,7 @@ def _pressure(fault, wave_speed, diameter):
         tuple(s.position for s in SENSORS),
         load_pressure=LOAD,
     )
-    faults = list(fault) if isinstance(fault, tuple) else fault
-    run = simulate(TRUE, OIL, SPEED, pipe, faults, samples_per_revolution=1536, min_steps=3072)
+    run = simulate(TRUE, OIL, SPEED, pipe, fault, samples_per_revolution=1536, min_steps=3072)
     return run.sensor_pressure
 
 
