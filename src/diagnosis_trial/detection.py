@@ -94,16 +94,16 @@ def fit_curve(
 
     Without a curve to `start` from it is sought from several.
     """
-    x, hit = np.log10(np.asarray(severity, float)), np.asarray(detected, bool)
+    x, sign = np.log10(np.asarray(severity, float)), np.where(detected, 1.0, -1.0)
     if len(x) < 5:
         return None
+    mean, spread = x.mean(), max(x.std(), 0.1)
 
     def minus_log_posterior(parameters: np.ndarray) -> float:
         middle, log_slope = parameters
-        argument = np.exp(log_slope) * (x - middle)
-        likelihood = np.sum(np.where(hit, log_expit(argument), log_expit(-argument)))
-        spread = max(x.std(), 0.1)
-        prior = ((middle - x.mean()) / (3 * spread)) ** 2 + (np.exp(log_slope) / SLOPE_SD) ** 2
+        slope = np.exp(log_slope)
+        likelihood = log_expit(slope * (x - middle) * sign).sum()
+        prior = ((middle - mean) / (3 * spread)) ** 2 + (slope / SLOPE_SD) ** 2
         return -likelihood + 0.5 * prior
 
     starts = [(m, s) for m in np.quantile(x, [0.1, 0.4, 0.8]) for s in (0.5, 2.0)]

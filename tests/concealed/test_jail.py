@@ -134,7 +134,7 @@ def test_the_tool_runs_inside(tmp_path):
     numbers can be read, and a twin predicts; compiled code goes to the folder it may write."""
     program = f"import sys; sys.path.append({str(HELPERS)!r})\n{TOOL}"
     result = run_confined(
-        program, read=[HELPERS], write=[tmp_path], NUMBA_CACHE_DIR=str(tmp_path),
+        program, read=[HELPERS], write=[tmp_path], NUMBA_CACHE_DIR=str(tmp_path), NUMBA_OPT="0",
         TMPDIR=str(tmp_path),
     )  # fmt: skip
     assert result.returncode == 0, result.stderr

@@ -57,14 +57,14 @@ def test_the_evidence_is_the_mean_likelihood_over_areas_and_errors(recordings):
     low, high = model.area_ends(SLIPPER)
     grid = [Errors(s, c) for s in SCATTERS for c in CHANGES]
     middle = np.log(found.mode.areas[0])
-    areas = np.arange(middle - 1.0, min(middle + 1.0, high), 0.02)  # elsewhere there is nothing
+    areas = np.arange(middle - 1.0, min(middle + 1.0, high), 0.04)  # elsewhere there is nothing
     each = [
         logsumexp(
             prior.log_weights().ravel() + model.log_likelihoods(_with_area(found.mode, 0, a), grid)
         )
         for a in areas
     ]
-    over_areas = logsumexp(each) + np.log(0.02 / (high - low))
+    over_areas = logsumexp(each) + np.log(0.04 / (high - low))
     again, _ = _at_best_pitch(
         model, Screen(model).screen_one(SLIPPER), Errors(prior.scatter, prior.change)
     )

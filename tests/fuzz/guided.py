@@ -21,7 +21,6 @@ from collections.abc import Callable
 from contextlib import redirect_stderr
 from functools import partial
 from pathlib import Path
-from unittest import mock
 
 import atheris
 
@@ -43,7 +42,7 @@ with (
     from config_errors import check_config
     from fuzzing import TOKENS, little_memory, refused
     from good_recordings import WRITE, Good
-    from made_results import write_results
+    from made_results import quick_page, write_results
     from noise_networks import kept, saved
     from rippletwin.case.load import load_case
     from rippletwin.case.rig_yaml import find_sheet_faults, parse_sheet
@@ -64,19 +63,9 @@ Reader = tuple[Path, Callable[[], object]]
 
 
 def prepare_recording(name: str, folder: Path) -> Reader:
-    """A recording in one of the formats. The sheet beside it stays as it is, and is parsed once:
-    instrumented parsing takes longer than reading the recording."""
+    """A recording in one of the formats."""
     good = Good(folder, name, WRITE[name])
-    parsed = parse_sheet(folder / "rig.yaml")
-
-    def read():
-        with (
-            mock.patch("rippletwin.case.load.parse_sheet", lambda path: parsed),
-            mock.patch("rippletwin.case.load.find_sheet_faults", lambda path, sheet: ()),
-        ):
-            load_case(folder)
-
-    return good.path, read
+    return good.path, good.load
 
 
 def prepare_table(name: str, folder: Path) -> Reader:
@@ -123,11 +112,11 @@ def prepare_twin(folder: Path) -> Reader:
 
 
 def prepare_result(name: str, folder: Path) -> Reader:
-    """A file that the page shows. Recordings' spectra take most of its time and are left out."""
-    write_results(folder)
+    """A file that the page shows."""
+    case = load_case(write_results(folder))
 
     def read():
-        with mock.patch("rippletwin.report.charts.order_spectrum", lambda *recording: None):
+        with quick_page(case):
             report_case(folder, folder / "report.html")
 
     return folder / name, read

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from case_folders import RATE
 from fuzzing import EDITS, TREE_EDITS, edited, edited_tree, little_memory, refused, tried
 from good_recordings import PRESSURE, WRITE, Good
-from rippletwin.case.load import load_case
 from rippletwin.case.tables import read_flow_ripple, read_impedance, read_repeats
 from rippletwin.errors import InputError
 
@@ -30,7 +29,7 @@ def test_bytes_of_a_recording(good, edits, in_head):
     good.path.write_bytes(edited(good.content, edits, HEAD if in_head else None))
     try:
         with little_memory():
-            load_case(good.folder)
+            good.load()
     except InputError as error:
         # scipy allocates what a damaged tag inside a variable claims, and touches no more of it
         # than the file holds
@@ -67,7 +66,7 @@ def test_files_of_a_store(stored, edits, tree, which, as_tree):
         path.write_bytes(edited(content, edits))
     try:
         with little_memory():
-            load_case(good.folder)
+            good.load()
     except InputError as error:
         assert refused(error)
 
@@ -95,16 +94,22 @@ TABLES = {
 }
 
 
-@pytest.mark.parametrize("name", TABLES)
-@tried(1)
-@given(edits=EDITS)
-def test_text_of_a_table(tmp_path_factory, name, edits):
-    """Flow ripples, impedances and spectra as text."""
-    read, text = TABLES[name]
-    path = tmp_path_factory.getbasetemp() / "table.csv"
+@pytest.fixture(scope="module", params=TABLES)
+def table(request, tmp_path_factory):
+    """What reads a table, where it is, and its good text, which is read without complaint."""
+    read, text = TABLES[request.param]
+    path = tmp_path_factory.mktemp("table") / "table.csv"
     path.write_text(text)
     read(path)
-    path.write_bytes(edited(text.encode(), edits))
+    return read, path, text.encode()
+
+
+@tried(1)
+@given(edits=EDITS)
+def test_text_of_a_table(table, edits):
+    """Flow ripples, impedances and spectra as text."""
+    read, path, good = table
+    path.write_bytes(edited(good, edits))
     try:
         with little_memory():
             read(path)

@@ -1,15 +1,15 @@
 """Files that the commands write and read again, damaged at random: refused in words or used."""
 
 import json
-from unittest import mock
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from fuzzing import EDITS, TREE_EDITS, edited, edited_tree, little_memory, refused, tried
-from made_results import write_results
+from made_results import quick_page, write_results
 from noise_networks import kept, saved
+from rippletwin.case.load import load_case
 from rippletwin.errors import InputError
 from rippletwin.learning.kept_networks import load_networks
 from rippletwin.report.page import report_case
@@ -26,10 +26,10 @@ RESULTS = (
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A case with results of explain and diagnose; its recordings' spectra, which take most of a
-    page's time, are left out."""
-    with mock.patch("rippletwin.report.charts.order_spectrum", lambda *recording: None):
-        yield write_results(tmp_path_factory.mktemp("case"))
+    """A case with results of explain and diagnose, of which pages are made quickly."""
+    folder = write_results(tmp_path_factory.mktemp("case"))
+    with quick_page(load_case(folder)):
+        yield folder
 
 
 def damaged(text: str, edits, tree, as_tree: bool) -> bytes:
@@ -39,7 +39,7 @@ def damaged(text: str, edits, tree, as_tree: bool) -> bytes:
     return edited(text.encode(), edits)
 
 
-@tried(2)
+@tried(1)
 @given(edits=EDITS, tree=TREE_EDITS, as_tree=st.booleans())
 def test_a_twin(folder, edits, tree, as_tree):
     """twin.json gives a twin, or is refused."""

@@ -7,11 +7,15 @@ are few, and always the same.
 from __future__ import annotations
 
 import json
+import math
 import os
 import resource
 import signal
+import struct
+from collections.abc import Callable
 from contextlib import contextmanager
 from pathlib import Path
+from random import Random
 from typing import Any
 
 from hypothesis import HealthCheck, Phase, settings
@@ -87,6 +91,12 @@ def refused(error: BaseException) -> bool:
     return bool(words)
 
 
+def made(make: Callable[[Random], Any]) -> st.SearchStrategy:
+    """Strategy of what `make` makes of random numbers. Hypothesis draws no more than their seed: an
+    edit that it draws part by part takes longer than most files take to be read."""
+    return st.binary(min_size=8, max_size=8).map(lambda seed: make(Random(seed)))
+
+
 # ---- bytes ----
 
 TOKENS = (
@@ -97,17 +107,16 @@ TOKENS = (
 )  # fmt: skip
 """What readers of text and of binary headers stumble over."""
 
-_WHERE = st.floats(0.0, 1.0, exclude_max=True)
-_BYTES = st.one_of(st.sampled_from(TOKENS), st.binary(min_size=1, max_size=8))
-_EDIT = st.one_of(
-    st.tuples(st.just("write"), _WHERE, _BYTES),
-    st.tuples(st.just("insert"), _WHERE, _BYTES),
-    st.tuples(st.just("remove"), _WHERE, st.integers(1, 64)),
-    st.tuples(st.just("repeat"), _WHERE, st.integers(1, 64)),
-    st.tuples(st.just("flip"), _WHERE, st.integers(0, 7)),
-    st.tuples(st.just("cut"), _WHERE, st.just(0)),
-)
-EDITS = st.lists(_EDIT, min_size=1, max_size=4)
+
+def _edit(random: Random) -> tuple[str, float, Any]:
+    kind = random.choice(("write", "insert", "remove", "repeat", "flip", "cut"))
+    if kind in ("write", "insert"):
+        some = random.choice(TOKENS), random.randbytes(random.randint(1, 8))
+        return kind, random.random(), random.choice(some)
+    return kind, random.random(), random.randint(0, 7) if kind == "flip" else random.randint(1, 64)
+
+
+EDITS = made(lambda random: [_edit(random) for _ in range(random.randint(1, 4))])
 """Edits of a file, for `edited`."""
 
 
@@ -133,29 +142,42 @@ def edited(good: bytes, edits: list[tuple[str, float, Any]], head: int | None = 
 
 # ---- trees of plain data ----
 
-_NUMBERS = st.one_of(
-    st.integers(-10, 10),
-    st.floats(),
-    st.sampled_from([0, -1, 1e-300, 1e300, -1e300, 2**63, 10**308, 1e-6, 1e6, 0.5, 1.0]),
-)
-_WORDS = st.one_of(
-    st.text(max_size=12),
-    st.sampled_from(["", "healthy", "unknown", "../x", "/etc/passwd", "\x00", "a" * 300, "p1"]),
-)
-VALUES = st.recursive(
-    st.one_of(st.none(), st.booleans(), _NUMBERS, _WORDS),
-    lambda inner: st.one_of(
-        st.lists(inner, max_size=3), st.dictionaries(st.text(max_size=6), inner, max_size=3)
-    ),
-    max_leaves=6,
-)
-TREE_EDITS = st.lists(
-    st.tuples(
-        st.sampled_from(["set", "drop", "add", "twice"]), _WHERE, VALUES, st.text(max_size=6)
-    ),
-    min_size=1,
-    max_size=3,
-)
+NUMBERS = (
+    0, -1, 1, 7, 0.5, 1.0, -0.0, 1e-6, 1e6, 1e-300, 1e300, -1e300, 5e-324, 2**63, 10**308,
+    math.nan, math.inf, -math.inf,
+)  # fmt: skip
+WORDS = ("", "healthy", "unknown", "../x", "/etc/passwd", "\x00", "a" * 300, "p1")
+LETTERS = [chr(code) for code in (*range(256), 0x2028, 0x202E, 0xFEFF, 0xFFFF, 0x1F600)]
+
+
+def _text(random: Random, most: int) -> str:
+    return "".join(random.choices(LETTERS, k=random.randint(0, most)))
+
+
+def _double(random: Random) -> float:
+    """Any bits of a double."""
+    return struct.unpack("d", random.randbytes(8))[0]
+
+
+def _value(random: Random, depth: int = 0) -> Any:
+    """Plain data of at most three levels: numbers and text, often odd, lists and mappings."""
+    kind = random.randrange(8 if depth < 2 else 6)
+    if kind == 0:
+        return random.choice((None, True, False))
+    if kind <= 3:
+        return random.choice((random.choice(NUMBERS), random.randint(-10, 10), _double(random)))
+    if kind <= 5:
+        return random.choice((random.choice(WORDS), _text(random, 12)))
+    parts = [_value(random, depth + 1) for _ in range(random.randint(0, 3))]
+    return parts if kind == 6 else {_text(random, 6): part for part in parts}
+
+
+def _tree_edit(random: Random) -> tuple[str, float, Any, str]:
+    kind = random.choice(("set", "drop", "add", "twice"))
+    return kind, random.random(), _value(random), _text(random, 6)
+
+
+TREE_EDITS = made(lambda random: [_tree_edit(random) for _ in range(random.randint(1, 3))])
 """Edits of a tree of dictionaries, lists and values, for `edited_tree`."""
 
 

@@ -1,11 +1,14 @@
 """A small good recording in every format of one file, for tests that damage it."""
 
+from unittest import mock
+
 import numpy as np
 import pytest
 import scipy.io
 
 from case_folders import RATE, ripple, sheet, write_case, write_hdf5
 from rippletwin.case.load import load_case
+from rippletwin.case.rig_yaml import parse_sheet
 
 PRESSURE = ripple(0.25)
 
@@ -74,6 +77,16 @@ class Good:
         write(self.path)
         assert load_case(folder).recordings
         self.content = self.path.read_bytes() if self.path.is_file() else b""
+        self._sheet = parse_sheet(folder / "rig.yaml")
+
+    def load(self):
+        """The case, as `load_case` reads it. The sheet stays as it is, and is parsed once: that
+        takes longer than to read the recording."""
+        with (
+            mock.patch("rippletwin.case.load.parse_sheet", lambda path: self._sheet),
+            mock.patch("rippletwin.case.load.find_sheet_faults", lambda path, sheet: ()),
+        ):
+            return load_case(self.folder)
 
     def __repr__(self):
         return self.path.name

@@ -7,6 +7,7 @@ recording to the next; the twin of the data sheet works in the frequency domain.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -34,13 +35,8 @@ def record(label, fault=None, turn=0.0, rng=None, wave_speed=WAVE_SPEED, diamete
     """An observation of the true pump with a fault, its shaft at `turn` (rad) past piston 0's outer
     dead centre at the first sample. The operator has set the load pressure anew."""
     rng = rng or np.random.default_rng(0)
-    pipe = Pipe(
-        Segment(LENGTH, diameter, wave_speed),
-        tuple(s.position for s in SENSORS),
-        load_pressure=LOAD,
-    )
-    run = simulate(TRUE, OIL, SPEED, pipe, fault, samples_per_revolution=1536, min_steps=3072)
-    values = 2.0 * np.fft.rfft(run.sensor_pressure)[:, ORDERS] / run.sensor_pressure.shape[1]
+    pressure = _pressure(tuple(fault) if isinstance(fault, list) else fault, wave_speed, diameter)
+    values = 2.0 * np.fft.rfft(pressure)[:, ORDERS] / pressure.shape[1]
     noise = rng.normal(size=(2, *values.shape)) / np.sqrt(2.0)
     values = values * np.exp(1j * ORDERS * turn) + NOISE * (noise[0] + 1j * noise[1])
     return Observation(
@@ -50,13 +46,25 @@ def record(label, fault=None, turn=0.0, rng=None, wave_speed=WAVE_SPEED, diamete
         orders=ORDERS,
         values=values,
         covariance=np.tile(NOISE**2 * np.eye(len(SENSORS), dtype=complex), (len(ORDERS), 1, 1)),
-        mean=run.sensor_pressure.mean(axis=1),
+        mean=pressure.mean(axis=1),
         speed_hz=SPEED / 60.0,
         load_pressure=LOAD,
         source="nominal",
         flow_ripple=None,
         sensors=SENSORS,
     )
+
+
+@cache
+def _pressure(fault, wave_speed, diameter):
+    """Pressure (sensors, samples) at the sensors over a revolution, Pa."""
+    pipe = Pipe(
+        Segment(LENGTH, diameter, wave_speed),
+        tuple(s.position for s in SENSORS),
+        load_pressure=LOAD,
+    )
+    run = simulate(TRUE, OIL, SPEED, pipe, fault, samples_per_revolution=1536, min_steps=3072)
+    return run.sensor_pressure
 
 
 def first_sensor(observation: Observation) -> Observation:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+from contextlib import contextmanager
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 
 from case_folders import ripple, sheet, write_case, write_hdf5
 from rippletwin.case.load import load_case
+from rippletwin.case.model import Case
 from rippletwin.diagnosis import diagnosed_numbers
 from rippletwin.diagnosis.diagnosed_numbers import DiagnosedNumbers, Leak
 from rippletwin.figures import explained_numbers
@@ -140,3 +143,14 @@ def write_results(folder: Path, pump: dict | None = None, **changed) -> Path:
     (folder / "diagnosed" / "diagnosis.json").write_text(diagnosis)
     diagnosed_numbers.save([made_change(HOSTILE)], folder / "diagnosed")
     return folder
+
+
+@contextmanager
+def quick_page(case: Case):
+    """Pages are those of a case whose recordings are read, and have no spectra of them: both take
+    most of a page's time."""
+    with (
+        mock.patch("rippletwin.report.results.load_case", lambda folder: case),
+        mock.patch("rippletwin.report.charts.order_spectrum", lambda *recording: None),
+    ):
+        yield

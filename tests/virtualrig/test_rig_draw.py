@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import replace
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -36,7 +37,11 @@ def test_cases_follow_from_commit_and_number_and_from_nothing_else():
 
 @pytest.fixture(scope="module")
 def drawn():
-    return [draw_case(60, "a", 1, k) for k in range(60)]
+    """Sixty cases with the data sheet's pump: to find one that is wrong by the drawn error takes a
+    hundred times longer than all else, and follows last."""
+    right = {"relative": {"bulk_modulus": 0.0}, "timing_deg": 0.0}
+    with mock.patch("virtualrig.draw.draw_wrong_pump", lambda *drawn: right):
+        return [draw_case(60, "a", 1, k) for k in range(60)]
 
 
 def test_drawn_rigs_have_the_documented_ranges(drawn):
@@ -99,7 +104,8 @@ def test_the_flow_ripple_is_wrong_by_the_drawn_error():
 def test_the_floor_is_the_misfit_that_the_wrong_pump_makes(drawn):
     """It is exactly zero where the true pump is the data sheet's. With the drawn pump it is the
     error of the flow, up to a factor of five by the line's resonances."""
-    d = next(d for d in drawn if d.truth["kind"] == "none" and len(d.points) == 1)
+    k = next(k for k, d in enumerate(drawn) if d.truth["kind"] == "none" and len(d.points) == 1)
+    d = draw_case(60, "a", 1, k)
     right = replace(d, seal=d.seal | {"pump": {}})
     exact = change_and_floor(right)
     assert exact == {"change": 0.0, "floor": 0.0}

@@ -1,5 +1,7 @@
 """Concealed cases on rigs with nuisance physics."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import yaml
@@ -75,10 +77,13 @@ def test_nuisance_physics_is_part_of_the_truth():
 
 
 @pytest.mark.parametrize("geometry", [True, False])
-def test_the_case_folder_says_nothing_of_the_truth(tmp_path, geometry):
+def test_the_case_folder_says_nothing_of_the_truth(tmp_path, monkeypatch, geometry):
     """rig.yaml has the data sheet's values; where it gives no geometry there are flow ripples. The
-    floor is the error of the sheet's pump: without it none can fit better."""
+    floor is the error of the sheet's pump: without it none can fit better. On a coarse mesh, at a
+    steady speed."""
+    monkeypatch.setattr("virtualrig.nuisance.NUMERICS", {"frequency": 1500.0})
     case = next(c for c in cases("none") if c.geometry is geometry and c.truth["points"] == 1)
+    case = replace(case, rig=replace(case.rig, nuisance=case.rig.nuisance | {"wander": 0.0}))
     truth = record_nuisance_case(case, tmp_path / "case", random_generator(COMMIT, NUMBER, "r"))
     sheet = yaml.safe_load((tmp_path / "case/rig.yaml").read_text())
     assert (set(sheet["pump"]) == {"pistons"}) is not geometry

@@ -96,21 +96,30 @@ HOLE = 3e-7
 LAMINAR = 0.4 * COEFFICIENT * HOLE / np.sqrt(OUTLET)  # 40 % of the orifice's flow at OUTLET
 CASES = {
     "healthy": ((), {}),
-    "slipper": ((Leak("slipper", HOLE, 0.4, OUTLET),), {"slipper": 0.6 * HOLE, "gap": LAMINAR}),
-    "cylinder": (
-        (Leak("cylinder", HOLE, 0.4, OUTLET),),
-        {"cross": 0.6 * HOLE, "cross_gap": LAMINAR},
+    "leaks": (
+        (
+            Leak("slipper", HOLE, 0.4, OUTLET),
+            Leak("cylinder", HOLE, 0.4, OUTLET),
+            WornValvePlate(HOLE),
+        ),
+        {
+            "slipper": 0.6 * HOLE,
+            "gap": LAMINAR,
+            "cross": 0.6 * HOLE,
+            "cross_gap": LAMINAR,
+            "worn": HOLE,
+        },
     ),
-    "valve plate": ((WornValvePlate(HOLE),), {"worn": HOLE}),
     "blocked port": ((BlockedPort(0.1),), {"inlet": np.array([0.1, 1.0, 1.0])}),
     "cavitation": ((CavitatingSuction(-6e4),), {"suction": -6e4}),
 }
+"""What is wrong with the pump: for the rig, and for `by_radau`."""
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_chambers_are_those_of_radau(case):
-    """With air and grooves, healthy and with each fault: the flow ripple to 0.5 %, the mean flow to
-    1e-4, chamber pressures to 1 %."""
+    """With air and grooves, healthy, with all leaks, and with each fault of the suction: the flow
+    ripple to 0.5 %, the mean flow to 1e-4, chamber pressures to 1 %."""
     faults, arguments = CASES[case]
     sound = {"slipper": 0.0, "gap": 0.0, "cross": 0.0, "cross_gap": 0.0, "worn": 0.0,
              "inlet": 1.0, "suction": PUMP.suction_pressure}  # fmt: skip

@@ -6,6 +6,7 @@ import importlib.metadata
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 from markupsafe import Markup
 
@@ -267,6 +268,7 @@ def _diagnosis(entry: Mapping, results: Results) -> DiagnosisCard:
     )
 
 
+@cache
 def _versions() -> list[tuple[str, str]]:
     versions = [("rippletwin", __version__), ("Python", platform.python_version())]
     return versions + [(name, importlib.metadata.version(name)) for name in LIBRARIES]

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import base64
 import hashlib
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from rippletwin import store
@@ -17,8 +18,9 @@ from rippletwin.report.results import Results, read_results, refuse_foreign
 TEMPLATES = "templates"
 
 
-def render(page: Page) -> str:
-    """The page as HTML; everything that is not a drawing of ours is escaped."""
+@cache
+def page_template() -> Template:
+    """The page's template, compiled."""
     environment = Environment(
         loader=PackageLoader("rippletwin.report", TEMPLATES),
         autoescape=True,
@@ -26,12 +28,16 @@ def render(page: Page) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    return environment.get_template("page.html")
+
+
+def render(page: Page) -> str:
+    """The page as HTML; everything that is not a drawing of ours is escaped."""
     folder = files("rippletwin.report") / TEMPLATES
     script, style = ((folder / name).read_text() for name in ("page.js", "page.css"))
     # The browser runs this script and no other, wherever it may come from.
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    template = environment.get_template("page.html")
-    return template.render(
+    return page_template().render(
         page=page, script=Markup(script), style=Markup(style), script_hash=f"sha256-{digest}"
     )
 

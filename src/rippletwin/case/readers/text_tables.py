@@ -79,17 +79,17 @@ def find_format(path: Path, wanted: Sequence[str]) -> TextFormat:
     if not any(line.strip(" ,;\t|") for line in lines):
         remedy = f"Begin with the columns' names: {','.join(wanted)}" if wanted else "Export again"
         raise InputError(path, "line 1", "empty", remedy)
-    form = max((_tried(lines, *way, wanted) for way in WAYS), key=lambda tried: tried[0])[1]
+    rows = {sep: [split_fields(line, sep) for line in lines] for sep in {way[0] for way in WAYS}}
+    form = max((_tried(rows[way[0]], *way, wanted) for way in WAYS), key=lambda tried: tried[0])[1]
     _check_rows(path, lines, form)
     return form
 
 
 def _tried(
-    lines: list[str], separator: str, decimal: str, wanted: Sequence[str]
+    rows: list[list[str]], separator: str, decimal: str, wanted: Sequence[str]
 ) -> tuple[tuple, TextFormat]:
-    """The lines read in one way, after how well they read: the wanted names are there, rows are
-    whole, fields are many."""
-    rows = [split_fields(line, separator) for line in lines]
+    """Rows split at `separator`, read in one way, after how well they read: the wanted names are
+    there, rows are whole, fields are many."""
     named = next((k for k, row in enumerate(rows) if wanted and set(wanted) <= set(row)), None)
     if named is not None:
         header, first = named, _after_units(rows, named + 1, decimal)
@@ -219,6 +219,8 @@ def split_fields(line: str, separator: str) -> list[str]:
     """The fields of a line, quotes and spaces taken off."""
     if separator == " ":
         return line.split()
+    if '"' not in line:
+        return [field.strip() for field in line.split(separator)] if line else []
     row = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
     return [field.strip() for field in row]
 
@@ -229,4 +231,4 @@ def _is_numeric(row: list[str], decimal: str) -> bool:
 
 
 def _is_number(field: str, decimal: str) -> bool:
-    return field.casefold() in _NOT_FINITE or bool(_NUMBER[decimal].fullmatch(field))
+    return bool(_NUMBER[decimal].fullmatch(field)) or field.casefold() in _NOT_FINITE
