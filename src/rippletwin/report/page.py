@@ -19,7 +19,7 @@ TEMPLATES = "templates"
 
 
 @cache
-def page_template() -> Template:
+def _page_template() -> Template:
     """The page's template, compiled."""
     environment = Environment(
         loader=PackageLoader("rippletwin.report", TEMPLATES),
@@ -37,7 +37,7 @@ def render(page: Page) -> str:
     script, style = ((folder / name).read_text() for name in ("page.js", "page.css"))
     # The browser runs this script and no other, wherever it may come from.
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    return page_template().render(
+    return _page_template().render(
         page=page, script=Markup(script), style=Markup(style), script_hash=f"sha256-{digest}"
     )
 
