@@ -212,6 +212,7 @@ def test_a_spread_of_the_pistons_is_found_in_a_line_with_air():
     assert found.effects[0].value == pytest.approx(0.01 * np.sqrt(0.5 * 8), rel=0.05)
 
 
+@pytest.mark.long
 def test_the_modulation_is_estimated_again_with_the_explained_line():
     """A modulation of 0.006 rad leaves half of order 234. With the explained line it is right to
     1 %, and so is the fitted ripple. That line's impedance is 2 % wrong, which the free flow at the
