@@ -207,17 +207,26 @@ def _judge_explanation(
         judged = judge_effects(workers, search.base, search.best, halves)
     else:
         judged = judge_beside_piece(workers, search.base, piece, halves)
-    judged = replace(judged, best=add_profile_intervals(workers, judged.best))
     networks = fit_passive_networks(workers, judged.best, piece)
     search = replace(search, best=judged.best, passive_networks=networks)
     network = accepted_network(search)
-    if network is not None:
-        if set(judged.best.hypothesis) <= set(network.hypothesis):
-            network, judged = judge_beside_network(workers, search.base, network, judged)
-        network = add_profile_intervals(workers, network)
+    if network is not None and set(judged.best.hypothesis) <= set(network.hypothesis):
+        network, judged = judge_beside_network(workers, search.base, network, judged)
         others = [fit for fit in networks if set(fit.hypothesis) != set(network.hypothesis)]
         search = replace(search, best=judged.best, passive_networks=[network, *others])
+    search = _with_intervals(workers, search)
+    judged = replace(judged, best=search.best)
     search = replace(search, rivals=[*search.rivals, *fit_gas_rivals(workers, search.best)])
     explanation = accepted_network(search) or search.best
     wrong = find_swapped_sensors(workers.base, workers.observations, explanation)
     return search, judged, wrong
+
+
+def _with_intervals(workers: Workers, search: Search) -> Search:
+    """The search with intervals of the one fit whose effects are stated: that with the network that
+    is accepted, or the best without one."""
+    network = accepted_network(search)
+    if network is None:
+        return replace(search, best=add_profile_intervals(workers, search.best))
+    others = search.passive_networks[1:]
+    return replace(search, passive_networks=[add_profile_intervals(workers, network), *others])
