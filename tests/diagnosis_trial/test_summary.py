@@ -91,7 +91,7 @@ def test_page_and_pictures_are_written(tmp_path, monkeypatch):
     draws."""
     monkeypatch.setattr("diagnosis_trial.detection.RESAMPLED", 20)
     origin = {"commit": "0" * 40, "number": 1000, "not_committed": False}
-    for made in (rows(1)[:1], two_columns()):
+    for made in (rows(), rows(1)[:1], two_columns()):
         columns = len(columns_of(made))
         page = report_page(made, origin)
         assert page.count("\n## ") == 2 + columns + (columns > 1)

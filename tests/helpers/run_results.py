@@ -41,8 +41,10 @@ def finished_files(results: Path) -> list[Path]:
     ]
 
 
-def final_results(results: Path) -> dict[str, bytes]:
+def final_results(results: Path, scored: bool = True) -> dict[str, bytes]:
     """The bytes of every table, verdict, twin, diagnosis and store, by name.
+
+    scored : whether a recording of a known fault gives the networks accuracies.
 
     The page and the tables of costs tell how long the stages took, figures are made of the numbers.
     """
@@ -55,5 +57,6 @@ def final_results(results: Path) -> dict[str, bytes]:
         dataset = store.load(path).load()
         for name, variable in dataset.variables.items():
             found[f"{path.relative_to(results)}/{name}"] = np.asarray(variable.values).tobytes()
-    assert {"explain/verdict.json", "diagnosis/diagnosis.json"} <= set(found)
+    wanted = {"explain/verdict.json", "diagnosis/diagnosis.json"}
+    assert wanted | ({"accuracy.csv"} if scored else set()) <= set(found)
     return found

@@ -63,7 +63,7 @@ def make(folder: Path) -> None:
 
 
 def snakemake(folder: Path, *options: str) -> CompletedProcess:
-    """Run it there."""
+    """Run the workflow of `folder`."""
     return run_snakemake(folder, "--cores", "2", "--configfile", "overlay.yaml", *options)
 
 

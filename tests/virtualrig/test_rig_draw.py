@@ -37,8 +37,8 @@ def test_cases_follow_from_commit_and_number_and_from_nothing_else():
 
 @pytest.fixture(scope="module")
 def drawn():
-    """Sixty cases with the data sheet's pump: to find one that is wrong by the drawn error takes a
-    hundred times longer than all else, and follows last."""
+    """Sixty cases with the data sheet's pump. To find one that is wrong by the drawn error takes a
+    hundred times as long as all else. It is the last that is drawn, so nothing else differs."""
     right = {"relative": {"bulk_modulus": 0.0}, "timing_deg": 0.0}
     with mock.patch("virtualrig.draw.draw_wrong_pump", lambda *drawn: right):
         return [draw_case(60, "a", 1, k) for k in range(60)]

@@ -41,6 +41,7 @@ from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
+from rippletwin.calibration.fit import Fit
 from rippletwin.case.model import Case, Rig
 from rippletwin.errors import InputError
 from rippletwin.explanation.checks.alarms import fit_each_observation, read_alarms
@@ -212,8 +213,7 @@ def _judge_explanation(
     network = accepted_network(search)
     if network is not None and set(judged.best.hypothesis) <= set(network.hypothesis):
         network, judged = judge_beside_network(workers, search.base, network, judged)
-        others = [fit for fit in networks if set(fit.hypothesis) != set(network.hypothesis)]
-        search = replace(search, best=judged.best, passive_networks=[network, *others])
+        search = replace(search, best=judged.best, passive_networks=_led_by(network, networks))
     search = _with_intervals(workers, search)
     judged = replace(judged, best=search.best)
     search = replace(search, rivals=[*search.rivals, *fit_gas_rivals(workers, search.best)])
@@ -228,5 +228,10 @@ def _with_intervals(workers: Workers, search: Search) -> Search:
     network = accepted_network(search)
     if network is None:
         return replace(search, best=add_profile_intervals(workers, search.best))
-    others = search.passive_networks[1:]
-    return replace(search, passive_networks=[add_profile_intervals(workers, network), *others])
+    network = add_profile_intervals(workers, network)
+    return replace(search, passive_networks=_led_by(network, search.passive_networks))
+
+
+def _led_by(first: Fit, fits: Sequence[Fit]) -> list[Fit]:
+    """A fit, and those of `fits` that have another hypothesis."""
+    return [first, *(fit for fit in fits if set(fit.hypothesis) != set(first.hypothesis))]

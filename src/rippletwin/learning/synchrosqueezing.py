@@ -109,8 +109,8 @@ def _transform(signals: np.ndarray, bank: _FilterBank, inverse: _InverseFft) -> 
 
 
 def _inverse_fft(count: int) -> _InverseFft:
-    """Unnormalised, along the last axis, for `count` signals. At this length torch's (MKL) is up to
-    three times as fast as scipy's."""
+    """The inverse FFT, unnormalised, along the last axis, for the transforms of `count` signals. At
+    this length torch's (MKL) is up to three times as fast as scipy's."""
     if count < MANY_SIGNALS:
         return partial(scipy.fft.ifft, norm="forward")
     import torch
