@@ -1,4 +1,4 @@
-"""The benchmarks start, and call what there is to call; their results are not tested."""
+"""Benchmarks start, call what there is to call, and name a missing file; no result is tested."""
 
 import ast
 import importlib
@@ -9,6 +9,7 @@ from types import ModuleType
 
 import pytest
 
+from measured_case import copy_case
 from paths import ROOT
 
 FOLDER = ROOT / "benchmarks"
@@ -65,3 +66,11 @@ def test_a_benchmark_calls_functions_as_they_are_declared(script):
                 inspect.signature(function).bind(*call.args, **keywords)
             except TypeError as error:
                 pytest.fail(f"{script.name}:{call.lineno}: {ast.unparse(call.func)}: {error}")
+
+
+def test_a_missing_measurement_is_named(tmp_path):
+    """A file that is not there ends a benchmark with its path and where to get it; no case is
+    begun."""
+    with pytest.raises(SystemExit, match="closed_1.txt: no such file.*where to get the data"):
+        copy_case("hole_tube", {"run_1.txt": tmp_path / "closed_1.txt"}, tmp_path / "case")
+    assert not (tmp_path / "case").exists()
