@@ -71,6 +71,6 @@ def test_a_benchmark_calls_functions_as_they_are_declared(script):
 def test_a_missing_measurement_is_named(tmp_path):
     """A file that is not there ends a benchmark with its path and where to get it; no case is
     begun."""
-    with pytest.raises(SystemExit, match="closed_1.txt: no such file.*where to get the data"):
+    with pytest.raises(SystemExit, match=r"closed_1\.txt: no such file.*where to get the data"):
         copy_case("hole_tube", {"run_1.txt": tmp_path / "closed_1.txt"}, tmp_path / "case")
     assert not (tmp_path / "case").exists()
