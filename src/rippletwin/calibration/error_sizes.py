@@ -11,12 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-MIN_MODEL_ERROR = 0.004
-"""Least relative model error. However small the noise, no twin of a real line is better: the speed
-wanders while harmonics are averaged, the orifice's exponent is not exactly 1/2, a mesh is finite.
-"""
+MIN_MODEL_ERROR = 0.001
+"""Least relative model error. Below it are errors of the twin's own numerics: a nonlinear load is
+solved, and derivatives are taken, to no more."""
 
-MODEL_ERRORS = np.geomspace(MIN_MODEL_ERROR, 1.5, 9)
+MODEL_ERRORS = np.geomspace(MIN_MODEL_ERROR, 1.5, 11)
 SOURCE_SDS = np.array([0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0])
 """Values of sigma. The least is below what any pump model reaches: a sigma that is larger than the
 truth would make the likeliest prediction too small."""

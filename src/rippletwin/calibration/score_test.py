@@ -24,6 +24,8 @@ class ScoreTest:
 
     base, thetas   the twin without effects, and the starts (P,) of the newest effect
     starts         at most MAX_FOLLOWED of them, the most promising first
+    residual       (N,) whitened readings less the prediction without the effect, the line refitted
+    count_without  number of the parameters without the effect, which come first in a start
 
     From here on `posterior` freezes the nonlinear compliance as it is without the effect.
     """
@@ -43,27 +45,32 @@ class ScoreTest:
         r, jacobian = own.linearise(theta, prediction, ways)
         self._jacobian, ways = jacobian[:, : len(theta)], jacobian[:, len(theta) :]
         both = self._without_refit(np.column_stack([r, ways]))
-        self._residual, ways = both[:, 0], both[:, 1:]
+        self.residual, ways = both[:, 0], both[:, 1:]
         ways = ways / np.maximum(np.linalg.norm(ways, axis=0), 1e-300)
         kept: list[int] = []
-        for k in np.argsort(ways.T @ self._residual):
+        for k in np.argsort(ways.T @ self.residual):
             if len(kept) < MAX_FOLLOWED and np.all(
                 np.abs(ways[:, kept].T @ ways[:, k]) < MAX_CORRELATION
             ):
                 kept.append(k)
         self.starts = [thetas[k] for k in kept]
-        self._way = ways[:, kept[0]]
+        self._ways, self.count_without = ways[:, kept], len(theta)
         self._posterior, self._own, self._at = posterior, own, (theta, prediction)
 
     def gain(self) -> float:
         """What the objective loses at most, to first order, if the effect is added at the first
-        start: along the way there and, from there, along the effect's own parameters."""
-        (theta, prediction), start = self._at, self.starts[0]
+        start."""
+        directions = self.directions(0)
+        found = np.linalg.lstsq(directions, self.residual, rcond=1e-9)[0]
+        return 0.5 * float(np.sum((directions @ found) ** 2))
+
+    def directions(self, k: int) -> np.ndarray:
+        """Changes (N, D) of the whitened readings, the line refitted, that the effect makes on the
+        way to start k and, from there, along its own parameters."""
+        (theta, prediction), start = self._at, self.starts[k]
         slopes = self._posterior.slopes(start, self._posterior.predict(start))[len(theta) :]
         freed = self._own.linearise(theta, prediction, slopes)[1][:, len(theta) :]
-        freed = self._without_refit(np.column_stack([freed, self._way]))
-        found = np.linalg.lstsq(freed, self._residual, rcond=1e-9)[0]
-        return 0.5 * float(np.sum((freed @ found) ** 2))
+        return self._without_refit(np.column_stack([freed, self._ways[:, k]]))
 
     def _without_refit(self, columns: np.ndarray) -> np.ndarray:
         """What is left of columns (N, K) where the line without the effect is refitted."""

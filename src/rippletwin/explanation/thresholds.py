@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit
 from rippletwin.case.model import Rig
 from rippletwin.twin.effects.base import Effect, Place
@@ -27,7 +26,12 @@ data are 20 to 1 against it. Alone it needs as much as any."""
 
 FALSE_ALARM_RATE = 0.02  # of cases without an effect, for the threshold of a bootstrap
 
-GOOD_MODEL_ERROR = 1.25 * MIN_MODEL_ERROR
+LITTLE_MODEL_ERROR = 0.004
+"""Relative model error of a twin that lacks nothing which matters, where it is not estimated: the
+speed wanders while harmonics are averaged, the orifice's exponent is not exactly 1/2, a mesh is
+finite."""
+
+GOOD_MODEL_ERROR = 1.25 * LITTLE_MODEL_ERROR
 """Relative model error up to which no effect can improve a fit noticeably. It saves work: beside
 such a fit no network is tried. No name depends on it."""
 
@@ -81,3 +85,9 @@ def min_log_bayes_factor(rig: Rig, effect: Effect, place: Place) -> float:
 def min_log_bayes_factor_of_newest(fit: Fit) -> float:
     """The same of the newest effect of a fit."""
     return min_log_bayes_factor(fit.twin.rig, *fit.hypothesis[-1])
+
+
+def surplus_evidence(fit: Fit) -> float:
+    """Log evidence of a fit beyond what each of its effects must add."""
+    rig = fit.twin.rig
+    return fit.evidence - sum(min_log_bayes_factor(rig, *member) for member in fit.hypothesis)

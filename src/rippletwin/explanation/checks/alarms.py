@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
-from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit
 from rippletwin.explanation.fit_jobs import FitJob, FromTheta, Workers
 from rippletwin.explanation.localise.elements import NONE, elements_of
@@ -23,6 +22,7 @@ from rippletwin.explanation.localise.smooth_corrections import SmoothCorrections
 from rippletwin.explanation.thresholds import (
     DISAGREEMENT_ALARM,
     DRIFT_SIGNIFICANCE,
+    LITTLE_MODEL_ERROR,
     MIN_LOG_BAYES_FACTOR,
     PULL_ALARM,
 )
@@ -30,7 +30,7 @@ from rippletwin.spectra.frequency_selection import select_frequencies
 
 RESONANCE_PASSAGES = 100.0
 """Passages of the line that a wave makes in a sharp resonance; another speed changes its phase."""
-HALVES_MODEL_ERROR = 0.5 * MIN_MODEL_ERROR  # relative, between the two halves of a recording
+HALVES_MODEL_ERROR = 0.5 * LITTLE_MODEL_ERROR  # relative, between the two halves of a recording
 
 
 @dataclass(frozen=True)

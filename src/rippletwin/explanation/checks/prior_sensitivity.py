@@ -12,7 +12,6 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.misfit import score_fit
 from rippletwin.case.model import Rig, Uncertainty
@@ -26,6 +25,7 @@ from rippletwin.explanation.fit_jobs import (
 )
 from rippletwin.explanation.fit_starts import common_coordinates
 from rippletwin.explanation.thresholds import (
+    LITTLE_MODEL_ERROR,
     MIN_LOG_BAYES_FACTOR,
     PULL_ALARM,
     WIDE_PRIOR_MISFIT_RATIO,
@@ -128,7 +128,7 @@ def compare_without_each_effect(
                 # A misfit below the model error says nothing.
                 refutes=bool(
                     pull > PULL_ALARM
-                    and WIDE_PRIOR_MISFIT_RATIO * max(misfit, MIN_MODEL_ERROR) < accepted_misfit
+                    and WIDE_PRIOR_MISFIT_RATIO * max(misfit, LITTLE_MODEL_ERROR) < accepted_misfit
                 ),
             )
         )

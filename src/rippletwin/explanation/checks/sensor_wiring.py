@@ -8,13 +8,12 @@ from itertools import combinations
 
 import numpy as np
 
-from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.frequency_continuation import fit_hypothesis
-from rippletwin.explanation.thresholds import MIN_LOG_BAYES_FACTOR
+from rippletwin.explanation.thresholds import LITTLE_MODEL_ERROR, MIN_LOG_BAYES_FACTOR
 from rippletwin.twin.twin import Twin
 
-MAX_EXPLAINED_MODEL_ERROR = 10.0 * MIN_MODEL_ERROR
+MAX_EXPLAINED_MODEL_ERROR = 10.0 * LITTLE_MODEL_ERROR
 """Relative model error above which the explanation of correctly wired data is implausible."""
 
 

@@ -18,10 +18,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit, posterior_at_fit
 from rippletwin.explanation.localise.missing_immittance import whiten_columns
-from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR
+from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR, LITTLE_MODEL_ERROR
 from rippletwin.line.frequency_domain.line_network import Insert
 
 CORRECTION_SD = 0.3  # prior standard deviation, relative to the characteristic immittance
@@ -148,7 +147,7 @@ class _Scan:
     """
 
     def __init__(self, fit: Fit, observations: Sequence):
-        self.posterior = posterior_at_fit(fit, observations, MIN_MODEL_ERROR)
+        self.posterior = posterior_at_fit(fit, observations, LITTLE_MODEL_ERROR)
         theta = fit.twin.theta
         self.prediction = self.posterior.predict(theta)
         r, jacobian = self.posterior.linearise(theta, self.prediction)

@@ -12,9 +12,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit, posterior_at_fit
 from rippletwin.calibration.posterior import Posterior
+from rippletwin.explanation.thresholds import LITTLE_MODEL_ERROR
 
 EXCESS_SHARE = 0.9  # of the excess that the intervals hold together
 MAX_INTERVALS = 4
@@ -182,7 +182,7 @@ def interior_misfit(fit: Fit, observations: Sequence) -> list[np.ndarray]:
 
 
 def _posterior(fit: Fit, observations: Sequence) -> Posterior:
-    return posterior_at_fit(fit, observations, MIN_MODEL_ERROR)
+    return posterior_at_fit(fit, observations, LITTLE_MODEL_ERROR)
 
 
 def _whitened_residual(fit: Fit, observations: Sequence) -> tuple[Posterior, np.ndarray]:

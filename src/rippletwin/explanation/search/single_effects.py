@@ -31,7 +31,7 @@ from rippletwin.explanation.search.stepwise_moves import (
 from rippletwin.explanation.thresholds import (
     GOOD_MODEL_ERROR,
     MIN_LOG_BAYES_FACTOR,
-    min_log_bayes_factor,
+    surplus_evidence,
 )
 
 DRAWS_PER_MODE = 800  # random starts around each mode below a frequency limit
@@ -76,12 +76,7 @@ def _add_usual_effects(workers: Workers, base: Fit, fits: Sequence[Fit]) -> Fit:
             (newest,) = set(members) - set(near.hypothesis)
             jobs.append(FitJob((*near.hypothesis, newest), NearFit(near)))
         found |= {frozenset(f.hypothesis): f for f in workers.fit(jobs)}
-    rig = workers.base.rig
-
-    def surplus(fit: Fit) -> float:
-        return fit.evidence - sum(min_log_bayes_factor(rig, *c) for c in fit.hypothesis)
-
-    best = max(found.values(), key=surplus, default=base)
+    best = max(found.values(), key=surplus_evidence, default=base)
     return best if best.evidence >= base.evidence + MIN_LOG_BAYES_FACTOR else base
 
 

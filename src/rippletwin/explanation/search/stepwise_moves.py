@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit, Hypothesis
 from rippletwin.explanation.fit_jobs import (
     Continuation,
@@ -24,6 +23,7 @@ from rippletwin.explanation.fit_starts import common_coordinates, scan_starts
 from rippletwin.explanation.search.gas_rivals import fit_gas_rivals
 from rippletwin.explanation.thresholds import (
     GOOD_MODEL_ERROR,
+    LITTLE_MODEL_ERROR,
     MIN_LOG_BAYES_FACTOR,
     min_log_bayes_factor,
 )
@@ -34,7 +34,7 @@ MAX_EFFECTS = 4
 walls not. With more, effects that are not there are established in measured tubes."""
 MAX_OF_ONE_EFFECT = 4  # at free positions
 SUBSTITUTES_TRIED = 10  # best single effects tried in the place of another
-MAX_MODEL_ERROR_FOR_EXACT_MODE = 10.0 * MIN_MODEL_ERROR
+MAX_MODEL_ERROR_FOR_EXACT_MODE = 10.0 * LITTLE_MODEL_ERROR
 """Relative model error below which derivatives of the nonlinear compliance lead to the mode."""
 WRONG_MODE_MODEL_ERROR = 0.1
 """Relative model error above which a line is probably in a wrong local mode."""
@@ -56,7 +56,7 @@ def fit_extensions(workers: Workers, best: Fit, candidates: Sequence, progress) 
     those that are always present.
     """
     rig = workers.base.rig
-    jobs = [extension_job(best, c) for c in _additions(rig, best.hypothesis, candidates)]
+    jobs = [extension_job(best, c) for c in additions(rig, best.hypothesis, candidates)]
     usual = all(effect.usual(rig, place) for effect, place in best.hypothesis)
     few = len(jobs) <= PROMISING or usual
     certain = [job for job in jobs if _is_certain(rig, job)]
@@ -100,7 +100,7 @@ def _fit_promising(
     return fits
 
 
-def _additions(rig, hypothesis: Hypothesis, candidates: Sequence) -> list:
+def additions(rig, hypothesis: Hypothesis, candidates: Sequence) -> list:
     """The candidates that may still be added, each as the next of its kind.
 
     Usual effects are tried before the search begins and may always join. Those with parameters take

@@ -17,6 +17,7 @@ from rippletwin.explanation.fit_jobs import (
     progress_callback,
     rank_by_evidence,
 )
+from rippletwin.explanation.search.effect_pairs import fit_best_pairs
 from rippletwin.explanation.search.gas_rivals import GAS, has_one_pressure
 from rippletwin.explanation.search.position_search import move_to_best_position
 from rippletwin.explanation.search.single_effects import fit_single_effects
@@ -33,6 +34,7 @@ from rippletwin.explanation.thresholds import (
     GOOD_MODEL_ERROR,
     MIN_LOG_BAYES_FACTOR,
     min_log_bayes_factor_of_newest,
+    surplus_evidence,
 )
 from rippletwin.twin.effects import library
 from rippletwin.twin.effects.base import Effect, Place
@@ -40,7 +42,6 @@ from rippletwin.twin.effects.base import Effect, Place
 RIVAL_MARGIN = 4.0 * MIN_LOG_BAYES_FACTOR
 """Log evidence below the best within which a resumed search refits a rival."""
 LEADING_SINGLE_EFFECTS = 6
-PAIRS_BEGUN = 2  # extensions that are too weak alone and are extended by a second effect
 SHAFT_ORDER_EFFECTS = ("piston_spread", "speed_fluctuation")
 """Effects at shaft orders that are not fitted; `localise.shaft_orders` looks for them."""
 
@@ -149,7 +150,7 @@ def _search_stepwise(
             return replace(start, best=best, rivals=[*rivals, *extensions])
         if extended is None:
             moved, other_positions, substitutes = _move_without_extension(
-                workers, best, visited, single_effect_fits, extensions, candidates
+                workers, best, visited, single_effect_fits, candidates
             )
             rivals = [*rivals, *substitutes]
             if moved is None:
@@ -174,7 +175,6 @@ def _move_without_extension(
     best: Fit,
     visited: set[frozenset],
     single_effect_fits: Sequence[Fit],
-    extensions: Sequence[Fit],
     candidates: Sequence,
 ) -> tuple[Fit | None, list[Fit], list[Fit]]:
     """The fit with which the search goes on where no extension adds enough evidence, None where it
@@ -195,11 +195,9 @@ def _move_without_extension(
         return moved, other_positions, []
     # Only two effects at once lead on, or an effect that was not tried beside those that came
     # later.
-    pair = _accepted_pair(workers, best, extensions, candidates)
-    if pair is not None:
-        moved = _revise(workers, pair, candidates)
-        if frozenset(moved.hypothesis) not in visited:
-            return moved, other_positions, []
+    pair = _accepted_pair(workers, best, candidates)
+    if pair is not None and frozenset(pair.hypothesis) not in visited:
+        return pair, other_positions, []
     substitutes = fit_substitutes(workers, best, candidates)
     moved = _better_substitute(workers, best, substitutes, candidates)
     is_new = frozenset(moved.hypothesis) not in visited
@@ -216,22 +214,17 @@ def _better_substitute(
     return _revise(workers, moved, candidates)
 
 
-def _accepted_pair(
-    workers: Workers, best: Fit, extensions: Sequence[Fit], candidates: Sequence
-) -> Fit | None:
-    """The best extension by two effects that add as much together as both must; None without one.
-
-    Where two effects are missing, neither may add enough without the other. The first of the two is
-    one of the best `extensions`.
-    """
+def _accepted_pair(workers: Workers, best: Fit, candidates: Sequence) -> Fit | None:
+    """The best extension by two effects, revised, if it adds as much as its effects must; None
+    otherwise."""
     if best.model_error <= GOOD_MODEL_ERROR:
         return None
-    needed = best.evidence + 2.0 * MIN_LOG_BAYES_FACTOR
-    pairs: list[Fit] = []
-    for first in extensions[:PAIRS_BEGUN]:
-        pairs += fit_extensions(workers, first, candidates, None)[:1]
-    best_pair = max(pairs, key=lambda fit: fit.evidence, default=None)
-    return best_pair if best_pair is not None and best_pair.evidence >= needed else None
+    for pair in fit_best_pairs(workers, best, candidates)[:1]:
+        if pair.evidence >= best.evidence + MIN_LOG_BAYES_FACTOR:
+            revised = _revise(workers, pair, candidates)
+            if surplus_evidence(revised) >= surplus_evidence(best):
+                return revised
+    return None
 
 
 def _revise(workers: Workers, best: Fit, candidates: Sequence) -> Fit:

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.ripple_correction import with_corrected_ripple
 from rippletwin.case.model import Rig
@@ -30,12 +29,13 @@ from rippletwin.explanation.search.sheet_tolerance import (
 )
 from rippletwin.explanation.search.stepwise_search import Search, resume_search, search_effects
 from rippletwin.explanation.stages.preparation import HIGHEST_HZ, prepare_base
+from rippletwin.explanation.thresholds import LITTLE_MODEL_ERROR
 from rippletwin.spectra.observation import Observation
 from rippletwin.twin.forward_model import ForwardModel
 from rippletwin.twin.pump_line_coupling import couple_pump_to_line
 from rippletwin.twin.twin import Twin
 
-MAX_MODEL_ERROR_FOR_COUPLING = 10.0 * MIN_MODEL_ERROR
+MAX_MODEL_ERROR_FOR_COUPLING = 10.0 * LITTLE_MODEL_ERROR
 """Relative model error above which pressure and flow at the pump are too uncertain."""
 NOTICED_CHANGE = 0.25  # of the least model error: a change of the prediction that is fitted again
 MAX_RESUMED = 2  # times
@@ -158,7 +158,7 @@ def changes_prediction(fit: Fit, before: Sequence[Observation], after: Sequence)
         for data in (before, after)
     )
     change = np.mean(np.abs(new - old) ** 2, axis=0) / np.mean(np.abs(old) ** 2, axis=0)
-    return bool(np.sqrt(np.mean(change)) > NOTICED_CHANGE * MIN_MODEL_ERROR)
+    return bool(np.sqrt(np.mean(change)) > NOTICED_CHANGE * LITTLE_MODEL_ERROR)
 
 
 def _widen_tolerances(stage: Stage, search: Search, processes: int) -> tuple[Search, float]:

@@ -25,12 +25,15 @@ from functools import cached_property
 
 import numpy as np
 
-from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.reading_errors import FIRST_SOURCE_SD
 from rippletwin.case.model import Rig
 from rippletwin.explanation.search.stepwise_search import applicable_candidates
-from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR, MIN_LOG_BAYES_FACTOR
+from rippletwin.explanation.thresholds import (
+    EQUIVALENT_LOG_BAYES_FACTOR,
+    LITTLE_MODEL_ERROR,
+    MIN_LOG_BAYES_FACTOR,
+)
 from rippletwin.explanation.verdict.next_experiment import FLAT_VARIANCE
 from rippletwin.spectra.observation import Observation
 from rippletwin.twin.effects.base import Effect, Place
@@ -114,7 +117,7 @@ class _Rival:
         for effect, place in twin.effects:
             self.name, self.place = effect.name, str(place)
         self._posterior = Posterior(twin, observations)
-        self._posterior.model_error = MIN_MODEL_ERROR
+        self._posterior.model_error = LITTLE_MODEL_ERROR
         self._posterior.source_sd = FIRST_SOURCE_SD
         nominal = any(o.source == "nominal" for o in observations)
         self._posterior.smooth_sd = FIRST_SOURCE_SD if nominal else 0.0

@@ -19,11 +19,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.case.model import Rig
-from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR
+from rippletwin.explanation.thresholds import EQUIVALENT_LOG_BAYES_FACTOR, LITTLE_MODEL_ERROR
 from rippletwin.explanation.verdict.candidate_recordings import (
     further_sensors,
     list_candidate_recordings,
@@ -108,12 +107,12 @@ def expected_loss(accepted: Fit, rival: Fit, rig: Rig, observation: Observation)
     if observation.kind == "input_impedance":
         # `Posterior` compares reflection coefficients, which it makes of impedances itself.
         values = (1.0 + reading) / (1.0 - reading)
-        variance = (MIN_MODEL_ERROR * np.abs(values + 1.0) ** 2 / 2.0) ** 2
+        variance = (LITTLE_MODEL_ERROR * np.abs(values + 1.0) ** 2 / 2.0) ** 2
         covariance = np.einsum("sf,st->fst", variance, np.eye(1)).astype(complex)
         observation = replace(observation, normalised=True)
     twin = transfer_twin(rival, rig, observation)
     posterior = Posterior(twin, [replace(observation, values=values, covariance=covariance)])
-    posterior.model_error = max(accepted.model_error, MIN_MODEL_ERROR)
+    posterior.model_error = max(accepted.model_error, LITTLE_MODEL_ERROR)
     posterior.source_sd = rival.source_sd
     posterior.smooth_sd = rival.smooth_sd
     r, jacobian = posterior.linearise(twin.theta, posterior.predict(twin.theta))
