@@ -37,6 +37,7 @@ CONSTANTS = {
     ),
     "amplitude of a free correction": ("explanation.localise.smooth_corrections", "AMPLITUDES"),
     "least model error": ("calibration.error_sizes", "MIN_MODEL_ERROR"),
+    "little model error": ("explanation.thresholds", "LITTLE_MODEL_ERROR"),
     "error of the ripple's size": ("calibration.reading_errors", "SIZE_SD"),
     "error of products of harmonics": ("calibration.posterior", "PRODUCT_ERROR"),
     "smoothness of the ripple's error": ("calibration.smooth_source", "CORRELATION_HZ"),

@@ -27,14 +27,13 @@ def test_constants_derived_from_a_scaled_one_follow():
     code = (
         f"import sys; sys.path.insert(0, {str(BENCHMARKS)!r})\n"
         "from scaled_constants import scale_constant\n"
-        "scale_constant('rippletwin.calibration.error_sizes', 'MIN_MODEL_ERROR', 0.5)\n"
-        "from rippletwin.calibration.error_sizes import MODEL_ERRORS\n"
+        "scale_constant('rippletwin.explanation.thresholds', 'LITTLE_MODEL_ERROR', 0.5)\n"
         "from rippletwin.explanation.thresholds import GOOD_MODEL_ERROR\n"
         "from rippletwin.explanation.checks import alarms\n"
-        "print(MODEL_ERRORS[0], GOOD_MODEL_ERROR, alarms.MIN_MODEL_ERROR)"
+        "print(GOOD_MODEL_ERROR, alarms.LITTLE_MODEL_ERROR, alarms.HALVES_MODEL_ERROR)"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert [float(word) for word in run.stdout.split()] == pytest.approx([0.002, 0.0025, 0.002])
+    assert [float(word) for word in run.stdout.split()] == pytest.approx([0.0025, 0.002, 0.001])
 
 
 def test_a_module_that_is_imported_already_is_refused():

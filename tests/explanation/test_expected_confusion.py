@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rippletwin.calibration.error_sizes import MIN_MODEL_ERROR
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.reading_errors import FIRST_SOURCE_SD
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Uncertainty
 from rippletwin.case.recording_advice import BAND_HZ
 from rippletwin.explanation.search.stepwise_search import applicable_candidates
 from rippletwin.explanation.stages.preparation import HIGHEST_HZ
+from rippletwin.explanation.thresholds import LITTLE_MODEL_ERROR
 from rippletwin.explanation.verdict.expected_confusion import (
     CHANGE,
     _Rival,
@@ -81,7 +81,7 @@ def test_a_loss_is_that_of_a_posterior_of_its_own(nominal):
     seen = [replace(o, values=v) for o, v in zip(observations, truth.predict(observations))]
     twin = Twin(rig, observations, effects=[applicable["unsteady_friction"]])
     posterior = Posterior(twin, seen)
-    posterior.model_error = MIN_MODEL_ERROR
+    posterior.model_error = LITTLE_MODEL_ERROR
     posterior.source_sd = posterior.smooth_sd = FIRST_SOURCE_SD
     r, jacobian = posterior.linearise(twin.theta, posterior.predict(twin.theta))
     count = 2 * posterior.values.size

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
 
 from rippletwin.calibration.frequency_continuation import refine
 from rippletwin.explanation.checks.robustness import compare_beside_corrections
@@ -20,7 +19,6 @@ from rippletwin.explanation.localise.elements import (
 from rippletwin.explanation.localise.remainder import _interval, find_remainder
 from rippletwin.explanation.localise.smooth_corrections import (
     CORRELATION_HZ,
-    _log_likelihoods,
     smooth_basis,
 )
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
@@ -29,18 +27,6 @@ from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.twin import Twin
 from synthetic_effects import LEAK, TRUTH, VOLUME
 from synthetic_observations import POINTS, make, rig
-
-
-def test_likelihood_is_that_of_the_dense_covariance():
-    """Woodbury's identity against scipy's multivariate normal density, for two scales at once."""
-    rng = np.random.default_rng(0)
-    columns, r = rng.normal(size=(5, 30)), rng.normal(size=30)
-    scales = np.array([[1.0, 1.0, 0.3, 0.3, 2.0], [1.0, 0.5, 0.1, 3.0, 2.0]])
-    values = _log_likelihoods(r, columns @ columns.T, columns @ r, scales)
-    for scale, value in zip(scales, values):
-        scaled = columns * scale[:, None]
-        dense = multivariate_normal(np.zeros(30), np.eye(30) + scaled.T @ scaled).logpdf(r)
-        assert value - 15.0 * np.log(2.0 * np.pi) == pytest.approx(dense)
 
 
 def test_basis_has_the_kernel_of_unit_complex_variance():

@@ -118,21 +118,25 @@ def test_the_search_ends_where_what_is_added_is_dropped_again(monkeypatch):
 
 
 def test_two_effects_that_help_only_together_are_accepted(monkeypatch):
-    """Neither adds what a name needs; the two together add what both need, or are left out. A line
-    that fits well is not searched for pairs."""
+    """Neither adds what a name needs; the two together add what both need, or are left out. Where
+    revising drops an effect of before, one more effect needs what one does. A line that fits well
+    is not searched for pairs."""
     module = "rippletwin.explanation.search.stepwise_search"
     best = made_fit(100.0, VOLUME, model_error=0.08)
-    weak = made_fit(105.0, VOLUME, HOSE, model_error=0.08)
 
-    def search(evidence, fit=best):
+    def search(evidence, revised=(VOLUME, HOSE, GAIN), fit=best):
         pair = made_fit(evidence, VOLUME, HOSE, GAIN)
-        monkeypatch.setattr(f"{module}.fit_extensions", lambda *_: [pair])
-        return _accepted_pair(None, fit, [weak], []) is pair
+        after = made_fit(evidence, *revised)
+        monkeypatch.setattr(f"{module}.fit_best_pairs", lambda *_: [pair])
+        monkeypatch.setattr(f"{module}._revise", lambda *_: after)
+        return _accepted_pair(None, fit, []) is after
 
     enough = 100.0 + 2.0 * MIN_LOG_BAYES_FACTOR
     assert search(enough + 1.0)
     assert not search(enough - 1.0)
-    assert not search(enough + 1.0, made_fit(100.0, VOLUME))
+    assert search(101.0 + MIN_LOG_BAYES_FACTOR, (HOSE, GAIN))
+    assert not search(99.0 + MIN_LOG_BAYES_FACTOR, (HOSE, GAIN))
+    assert not search(enough + 1.0, fit=made_fit(100.0, VOLUME))
 
 
 def test_an_always_present_effect_needs_less_beside_another_effect_only():

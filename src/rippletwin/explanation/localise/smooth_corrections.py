@@ -31,6 +31,7 @@ from scipy.special import logsumexp
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.explanation.localise.elements import NONE, correct_line, position_spacing
+from rippletwin.explanation.localise.linear_model import Correction, LinearModel
 from rippletwin.explanation.localise.missing_immittance import observable_of
 
 PROBE_SHARE = 1e-3  # of a correction, for finite differences
@@ -69,22 +70,20 @@ class SmoothCorrections:
         slopes = self._posterior.slopes(self.theta, self._prediction)
         at = int(np.searchsorted(MODEL_ERRORS, self._posterior.model_error))
         self._errors = MODEL_ERRORS[max(at - ERRORS_BELOW, 0) : at + ERRORS_ABOVE + 1]
-        self._expanded, self._at_mode = zip(*(self._expand(e, slopes) for e in self._errors))
+        expanded = (self._expand(e, slopes) for e in self._errors)
+        self._models, self._log_determinants, self._at_mode = zip(*expanded)
 
-    def _expand(self, model_error: float, slopes: np.ndarray) -> tuple[tuple, float]:
-        """Residual at theta = 0, scaled Jacobian (P, N) and log determinant at a model error; and
-        half the square sum at the mode."""
+    def _expand(self, model_error: float, slopes: np.ndarray) -> tuple[LinearModel, float, float]:
+        """The linear model about theta = 0 and the log determinant at a model error; and half the
+        square sum at the mode."""
         prior = self._posterior.prior
         self._posterior.model_error = float(model_error)
         r, jacobian = self._posterior.whiten_slopes(self._prediction, slopes)
         start = np.where(prior, self.theta, 0.0)
         scale = np.where(prior, 1.0, FLAT_SD)[:, None]
-        expanded = (
-            r - start @ jacobian,
-            jacobian * scale,
-            self._posterior.whitened(self._prediction)[1],
-        )
-        return expanded, 0.5 * float(r @ r + start @ start)
+        linear = LinearModel(r - start @ jacobian, jacobian * scale)
+        log_determinant = self._posterior.whitened(self._prediction)[1]
+        return linear, log_determinant, 0.5 * float(r @ r + start @ start)
 
     def log_evidence(self, element: tuple = (NONE, None)) -> float:
         """Log evidence if an element, as in `elements`, may have a smooth correction.
@@ -105,48 +104,34 @@ class SmoothCorrections:
         """Average over model errors and amplitudes of a correction, and the most likely of them."""
         change = self.change(element)
         amplitudes = np.zeros(1) if change is None else AMPLITUDES
-        values = np.empty((len(self._errors), len(amplitudes)))
-        linear = []
-        free = self._free_changes(change)
-        for k, (_, _, log_determinant) in enumerate(self._expanded):
-            linear.append(self._columns(k, free))
-            scales = np.array([self._scale(a, len(linear[k][1])) for a in amplitudes])
-            values[k] = _log_likelihoods(*linear[k], scales) - log_determinant
+        free = None if change is None else self._free_changes(change)
+        corrected = [self._correct(k, free) for k in range(len(self._errors))]
+        values = np.array([each.log_likelihoods(amplitudes) for each in corrected])
+        values -= np.array(self._log_determinants)[:, None]
         solved: list[tuple] = []
         for m in np.argsort(-np.max(values, axis=0)):
             k = int(np.argmax(values[:, m]))
             if solved and values[k, m] < max(each[0] for each in solved) - NEGLIGIBLE:
                 continue
-            gain, correction = self._delinearise(element, k, amplitudes[m], *linear[k])
+            gain, correction = self._delinearise(element, k, amplitudes[m], corrected[k])
             values[:, m] += gain
             solved.append((values[k, m], float(self._errors[k]), correction))
         evidence = logsumexp(values) - np.log(len(amplitudes) * len(MODEL_ERRORS))
         _, model_error, correction = max(solved, key=lambda each: each[0])
         return _Solved(float(evidence), model_error, correction, change)
 
-    def _scale(self, amplitude: float, count: int) -> np.ndarray:
-        """Prior standard deviations of the parameters and of the correction's amplitudes."""
-        scale = np.ones(count)
-        scale[len(self.theta) :] = amplitude
-        return scale
-
     def _delinearise(
-        self, element: tuple, error: int, amplitude: float, r, gram, along
+        self, element: tuple, error: int, amplitude: float, corrected: Correction
     ) -> tuple[float, np.ndarray]:
         """Log likelihood at the most likely parameters and correction without linearising less
         that with it, and the correction (F,); `error` is the index of a model error."""
-        scale = self._scale(amplitude, len(gram))
-        precision = scale[:, None] * gram * scale + np.eye(len(scale))
-        # The columns are derivatives of the residual: measured less predicted.
-        unit = -np.linalg.solve(precision, scale * along)
-        linear = 0.5 * float(r @ r + (scale * along) @ unit)
-        count = len(self.theta)
-        theta = np.where(self._posterior.prior, unit[:count], self.theta + FLAT_SD * unit[:count])
-        amplitudes = scale[count:] * unit[count:]
+        unit, amplitudes, linear = corrected.most_likely(amplitude)
+        theta = np.where(self._posterior.prior, unit, self.theta + FLAT_SD * unit)
         half = len(amplitudes) // 2
         correction = (amplitudes[:half] + 1j * amplitudes[half:]) @ self._basis[:half]
+        size = float(np.sum((amplitudes / amplitude) ** 2)) if amplitude else 0.0
         self._posterior.model_error = float(self._errors[error])
-        on_the_way = self._least_objective(element, theta, correction, unit, linear)
+        on_the_way = self._least_objective(element, theta, correction, unit, size, linear)
         return linear - min(self._at_mode[error], on_the_way), correction
 
     def _least_objective(
@@ -155,15 +140,17 @@ class SmoothCorrections:
         theta: np.ndarray,
         correction: np.ndarray,
         unit: np.ndarray,
+        size: float,
         promised: float,
     ) -> float:
         """Least half square sum on the way to a most likely theta (P,) and `correction` (F,) of an
         element, without linearising.
 
-        unit       parameters and amplitudes there, in standard deviations
+        unit       (P,) parameters there, in standard deviations
+        size       square of the correction there, in its own
         promised   the half square sum there, linearised: where it is kept, no other step has less
         """
-        posterior, count = self._posterior, len(theta)
+        posterior = self._posterior
         start = np.where(posterior.prior, self.theta, 0.0)
         least = np.inf
         for share in STEP_SHARES:
@@ -173,8 +160,8 @@ class SmoothCorrections:
             if not posterior.is_valid(prediction):
                 continue
             square = np.sum(np.abs(posterior.whitened(prediction)[0]) ** 2)
-            square += 0.5 * np.sum((start + share * (unit[:count] - start)) ** 2)
-            square += 0.5 * np.sum((share * unit[count:]) ** 2)
+            square += 0.5 * np.sum((start + share * (unit - start)) ** 2)
+            square += 0.5 * share**2 * size
             least = min(least, float(square))
             if least < promised + KEPT_PROMISE:
                 break
@@ -211,27 +198,20 @@ class SmoothCorrections:
         """Log likelihood with the correction of an element at the fit's own model error and the
         most likely amplitude, to first order."""
         at = int(np.argmin(np.abs(np.log(self._errors / self.fit.model_error))))
-        linear = self._columns(at, self._free_changes(self.change(element)))
-        scales = np.array([self._scale(a, len(linear[1])) for a in AMPLITUDES])
-        return float(np.max(_log_likelihoods(*linear, scales)) - self._expanded[at][2])
+        corrected = self._correct(at, self._free_changes(self.change(element)))
+        return float(np.max(corrected.log_likelihoods(AMPLITUDES)) - self._log_determinants[at])
 
-    def _free_changes(self, change: np.ndarray | None) -> np.ndarray | None:
+    def _free_changes(self, change: np.ndarray) -> np.ndarray:
         """Changes (2 K, S, F) that the amplitudes of a correction make, given that of a unit."""
-        if change is None:
-            return None
         return np.concatenate([self._basis, 1j * self._basis])[:, None] * change
 
-    def _columns(
-        self, error: int, free: np.ndarray | None
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Residual, Gram matrix of the columns and columns times residual at a model error (its
-        index): those of the parameters, and of changes `free`."""
-        r, columns, _ = self._expanded[error]
-        if free is not None:
-            self._posterior.model_error = float(self._errors[error])
-            whitened = self._posterior.whiten_slopes(self._prediction, free)[1]
-            columns = np.concatenate([columns, whitened])
-        return r, columns @ columns.T, columns @ r
+    def _correct(self, error: int, free: np.ndarray | None) -> Correction:
+        """The linear model at a model error (its index) with changes `free`, or without any."""
+        model = self._models[error]
+        if free is None:
+            return model.with_correction(np.empty((0, len(model.residual))))
+        self._posterior.model_error = float(self._errors[error])
+        return model.with_correction(self._posterior.whiten_slopes(self._prediction, free)[1])
 
     def by_element(self, elements: Sequence[tuple]) -> dict[tuple, float]:
         """Log evidence with the correction of each of `elements`; these are the keys."""
@@ -276,17 +256,3 @@ def smooth_basis(frequency_hz: np.ndarray) -> np.ndarray:
     values, vectors = np.linalg.eigh(np.exp(-0.5 * np.subtract.outer(f, f) ** 2))
     kept = values > MIN_EIGENVALUE * np.max(values)
     return np.sqrt(0.5 * values[kept])[:, None] * vectors[:, kept].T
-
-
-def _log_likelihoods(
-    r: np.ndarray, gram: np.ndarray, along: np.ndarray, scales: np.ndarray
-) -> np.ndarray:
-    """-1/2 r^T C^-1 r - 1/2 log det C with C = I + A^T diag(scale^2) A, (M,) for `scales` (M, P).
-
-    gram = A A^T, along = A r.
-    """
-    precision = scales[:, :, None] * gram * scales[:, None, :] + np.eye(len(gram))
-    factor = np.linalg.cholesky(precision)
-    shift = np.linalg.solve(factor, (scales * along)[:, :, None])[:, :, 0]
-    square = float(r @ r) - np.sum(shift**2, axis=1)
-    return -0.5 * square - np.sum(np.log(np.diagonal(factor, axis1=1, axis2=2)), axis=1)

@@ -33,6 +33,8 @@ from rippletwin.twin.twin import Twin
 RANDOM_ERROR = 0.01  # relative, of cross spectra under random excitation: 100 averages or more
 FLAT_VARIANCE = 1e4  # prior variance of the coordinate of a new shaft angle
 FIXED_VARIANCE = 1e-9  # variance of a coordinate that is fixed
+COMPARED_WITH_PUMP = 3
+"""Recordings that are compared with the pump's numbers free: the best with its numbers held."""
 
 
 @dataclass(frozen=True)
@@ -61,12 +63,20 @@ def propose_recording(
     rivals = [fit for fit in rivals if fit is not accepted]
     if not rivals:
         return None
-    best = None
-    for recording, rig, observation in list_candidate_recordings(accepted.twin, observations):
-        loss = float(min(expected_loss(accepted, fit, rig, observation) for fit in rivals))
-        if best is None or loss > best.loss:
-            best = Proposal(recording, loss)
-    return best
+
+    def loss(candidate, uncertain_pump: bool) -> float:
+        _, rig, observation = candidate
+        return float(
+            min(expected_loss(accepted, f, rig, observation, uncertain_pump) for f in rivals)
+        )
+
+    candidates = list_candidate_recordings(accepted.twin, observations)
+    if accepted.twin.uncertain_pump:
+        # How its numbers change the ripple at a new operating point takes many runs of the pump.
+        candidates.sort(key=lambda each: -loss(each, uncertain_pump=False))
+        candidates = candidates[:COMPARED_WITH_PUMP]
+    proposals = [Proposal(each[0], loss(each, uncertain_pump=True)) for each in candidates]
+    return max(proposals, key=lambda proposal: proposal.loss)
 
 
 def propose_sensor_position(
@@ -96,9 +106,16 @@ def propose_sensor_position(
     return max(options, key=lambda proposal: proposal.loss, default=None)
 
 
-def expected_loss(accepted: Fit, rival: Fit, rig: Rig, observation: Observation) -> float:
-    """Log evidence that `rival` is expected to lose by an observation if `accepted` is true."""
-    (reading,) = transfer_twin(accepted, rig, observation).predict([observation])
+def expected_loss(
+    accepted: Fit, rival: Fit, rig: Rig, observation: Observation, uncertain_pump: bool = True
+) -> float:
+    """Log evidence that `rival` is expected to lose by an observation if `accepted` is true.
+
+    uncertain_pump   whether the pump's numbers are those of the fits, where these have any; if not,
+                     both have those of the data sheet
+    """
+    true = transfer_twin(accepted, rig, observation, uncertain_pump)
+    (reading,) = true.predict([observation])
     covariance = observation.covariance
     if observation.kind == "random":
         variance = RANDOM_ERROR**2 * np.abs(reading) ** 2
@@ -110,7 +127,7 @@ def expected_loss(accepted: Fit, rival: Fit, rig: Rig, observation: Observation)
         variance = (LITTLE_MODEL_ERROR * np.abs(values + 1.0) ** 2 / 2.0) ** 2
         covariance = np.einsum("sf,st->fst", variance, np.eye(1)).astype(complex)
         observation = replace(observation, normalised=True)
-    twin = transfer_twin(rival, rig, observation)
+    twin = transfer_twin(rival, rig, observation, uncertain_pump)
     posterior = Posterior(twin, [replace(observation, values=values, covariance=covariance)])
     posterior.model_error = max(accepted.model_error, LITTLE_MODEL_ERROR)
     posterior.source_sd = rival.source_sd
@@ -125,8 +142,11 @@ def expected_loss(accepted: Fit, rival: Fit, rig: Rig, observation: Observation)
     return 0.5 * float(r @ r - projection @ absorbed)
 
 
-def transfer_twin(fit: Fit, rig: Rig, observation: Observation) -> Twin:
-    """The fitted twin on another rig and for one new recording; new parameters are nominal."""
+def transfer_twin(
+    fit: Fit, rig: Rig, observation: Observation, uncertain_pump: bool = True
+) -> Twin:
+    """The fitted twin on another rig and for one new recording; new parameters are nominal, and
+    those of the pump are left out unless `uncertain_pump`."""
     old = fit.twin
     twin = Twin(
         rig,
@@ -135,7 +155,7 @@ def transfer_twin(fit: Fit, rig: Rig, observation: Observation) -> Twin:
         effects=old.effects,
         source_sd=old.source_sd,
         guessed_load=old.guessed_load and rig.load.kind == "orifice",
-        uncertain_pump=old.uncertain_pump,
+        uncertain_pump=old.uncertain_pump and uncertain_pump,
         changing_state=old.changing_state,
     )
     theta = [old.theta[old.index[p.name]] if p.name in old.index else 0.0 for p in twin.parameters]
