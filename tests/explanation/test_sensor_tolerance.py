@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from rippletwin.calibration.frequency_continuation import refine
+from rippletwin.calibration.laplace import gradient_and_hessian
+from rippletwin.calibration.posterior import Posterior
 from rippletwin.explanation.checks.sensor_tolerance import (
     GAIN_SD,
     LAG_SD,
     add_sensor_tolerance,
     sensor_changes,
 )
+from rippletwin.explanation.thresholds import LITTLE_MODEL_ERROR
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.twin import Twin
@@ -19,6 +22,7 @@ from synthetic_observations import make
 
 DELAY = ((EFFECTS["sensor_delay"], Place("sensor p2", 1)),)
 VALUES = {"sensor_delay@sensor p2.delay": 4e-5}
+MODULE = "rippletwin.explanation.checks.sensor_tolerance"
 NAME = "sensor_delay@sensor p2.delay"
 
 
@@ -73,6 +77,27 @@ def test_interval_ends_grow_on_either_side(fitted):
     for old, new in zip(ends, wide.interval_ends[k]):
         assert abs(new - theta[k]) == pytest.approx(np.hypot(old - theta[k], added), rel=0.01)
         assert (new > theta[k]) == (old > theta[k])
+
+
+def test_a_good_fit_is_known_as_with_a_little_model_error(fitted, monkeypatch):
+    """Proves the allowance against the Hessian at that model error: a fit that leaves less has its
+    standard deviations, and one that leaves more keeps its own."""
+    fit, observations = fitted
+    assert fit.model_error < 0.5 * LITTLE_MODEL_ERROR
+    monkeypatch.setattr(f"{MODULE}.GAIN_SD", 0.0)
+    monkeypatch.setattr(f"{MODULE}.LAG_SD", 0.0)
+    posterior, theta = Posterior(fit.twin, observations), fit.twin.theta
+    prediction = posterior.predict(theta)
+    posterior.estimate_errors(prediction, theta)
+    posterior.model_error = LITTLE_MODEL_ERROR
+    hessian = gradient_and_hessian(posterior, theta, prediction)[1]
+    expected = np.sqrt(np.diag(np.linalg.inv(hessian)))
+    wide = add_sensor_tolerance(fit, observations)
+    np.testing.assert_allclose(wide.sd, expected, rtol=0.02)
+    assert np.max(wide.sd / fit.sd) > 1.5
+    monkeypatch.setattr(f"{MODULE}.LITTLE_MODEL_ERROR", 0.5 * fit.model_error)
+    same = add_sensor_tolerance(fit, observations)
+    np.testing.assert_allclose(same.sd, fit.sd, rtol=1e-3)
 
 
 def test_a_source_free_fit_stays(fitted):
