@@ -34,9 +34,6 @@ from rippletwin.explanation.thresholds import (
 )
 from rippletwin.twin.effects import library
 
-BIASED_MODEL_ERROR = 0.02
-"""Relative model error above which named effects may have biased the parameters of the line. It
-saves work only."""
 WRONG_MODE_FITS = 3  # of the best fits: those in wrong local modes are fitted again
 MAX_NETWORKS = 3  # in one line
 
@@ -62,7 +59,8 @@ def fit_passive_networks(workers: Workers, best: Fit, known: Fit | None = None) 
         theta = transfer_theta(known, hypothesis, workers.base)
         jobs.append(FitJob(hypothesis, FromTheta(theta)))
     fits = workers.fit(jobs)
-    if not best.hypothesis or min(f.model_error for f in fits) > BIASED_MODEL_ERROR:
+    if not best.hypothesis or min(f.model_error for f in fits) > GOOD_MODEL_ERROR:
+        # Named effects may have biased the parameters of the line.
         usual = tuple(
             member for member in best.hypothesis if member[0].usual(best.twin.rig, member[1])
         )
