@@ -12,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rippletwin.calibration.smooth_source import SmoothSourceError, SourceExpansion
+from rippletwin.calibration.source_expansion_kernel import find_amplitudes
 from rippletwin.calibration.whitening import Whitening
 
-STEP_SHARES = (1.0, 0.5, 0.25, 0.1)
+STEP_SHARES = np.array([1.0, 0.5, 0.25, 0.1])
 SETTLED = 0.1  # gain of a step in log posterior, below which it is the last
 
 
@@ -39,25 +40,21 @@ def find_most_likely_expansion(
     data: SourceData, start: SourceExpansion, steps: int
 ) -> SourceExpansion:
     """The expansion about the most likely smooth error after at most `steps` steps."""
-    here = start
-    for _ in range(steps):
-        h = data.prediction * here.factor
-        whitening = whiten_with_source(data, here)
-        r = data.values - data.prediction * here.mean
-        step = data.smooth.most_likely(whitening.pull(h, r), data.tau) - here.amplitudes
-        alone = Whitening(h, data.sd, data.independent)
-        cost = _cost(data, alone, here)
-        for share in STEP_SHARES:
-            there = data.smooth.expand(here.amplitudes + share * step)
-            gain = cost - _cost(data, alone, there)
-            if gain > 0.0:
-                break
-        else:
-            return here
-        here = there
-        if gain < SETTLED:
-            return here
-    return here
+    smooth = data.smooth
+    amplitudes = find_amplitudes(
+        data.values,
+        data.prediction,
+        data.sd,
+        data.independent,
+        smooth.frequencies,
+        smooth.basis,
+        smooth.sds(data.tau),
+        start.amplitudes,
+        STEP_SHARES,
+        SETTLED,
+        steps,
+    )
+    return smooth.expand(amplitudes)
 
 
 def whiten_with_source(data: SourceData, expansion: SourceExpansion) -> Whitening:
@@ -69,14 +66,3 @@ def whiten_with_source(data: SourceData, expansion: SourceExpansion) -> Whitenin
         data.smooth.frequencies,
         data.smooth.sds(data.tau)[:, None] * data.smooth.basis,
     )
-
-
-def _cost(data: SourceData, alone: Whitening, expansion: SourceExpansion) -> float:
-    """Minus the log posterior of a smooth error but for a constant, the covariance of all else
-    being that of `alone`; infinite where it is not finite."""
-    error = data.smooth.error(expansion.amplitudes)
-    source = expansion.mean + expansion.factor * error
-    r = alone.apply(data.values - data.prediction * source)
-    prior = expansion.amplitudes / data.smooth.sds(data.tau)
-    cost = float(np.sum(np.abs(r) ** 2) + np.sum(np.abs(prior) ** 2))
-    return cost if np.isfinite(cost) else np.inf

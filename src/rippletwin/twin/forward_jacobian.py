@@ -269,8 +269,9 @@ class DifferentiableForward(ForwardModel):
         each of the N parameters moved."""
         flow = np.array(np.broadcast_to(base.source_flow, shape))
         admittance = np.array(np.broadcast_to(self.source.at(theta)[1], shape))
+        turned = STEP * self.source.turn(theta)
         for k, (slope, curvature), own in self.source.changes:
             row = 1 + self._together.index(k)
-            flow[row] += STEP * self.source.turn(theta) * (slope + 2.0 * theta[k] * curvature)
+            flow[row] += turned * (slope + 2.0 * theta[k] * curvature)
             admittance[row] += STEP * own
         return flow, admittance
