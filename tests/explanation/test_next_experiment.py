@@ -79,6 +79,34 @@ def test_another_operating_point_discriminates_air_from_a_slower_wave():
     assert propose_recording(air, [air], observations) is None
 
 
+def test_no_recording_is_proposed_where_none_is_possible(hose):
+    """An input impedance of a line whose effect is at its end: the end cannot be another one, and
+    there is no sensor. Proves that the verdict then goes without a proposal."""
+    base, observations, fit = hose
+    twin = base.with_(effects=((EFFECTS["load_volume"], Place("load")),))
+    accepted = replace(fit, twin=twin, hypothesis=twin.effects)
+    impedance = replace(observations[0], kind="input_impedance")
+    assert list_candidate_recordings(twin, [impedance]) == []
+    assert propose_recording(accepted, [fit], [impedance]) is None
+
+
+def test_only_the_best_recordings_are_compared_with_the_pump(uncertain_pump, monkeypatch):
+    """Every recording is compared with the pump's numbers held, and as many as stated with its
+    numbers free, those of the largest losses; the loss that is told is one with them free."""
+    fit, observations = uncertain_pump
+    losses: dict[bool, list[float]] = {True: [], False: []}
+
+    def loss(accepted, rival, rig, observation, free):
+        losses[free].append(observation.frequency_hz[0] + len(rig.sensors))
+        return losses[free][-1]
+
+    monkeypatch.setattr(next_experiment, "expected_loss", loss)
+    proposal = propose_recording(fit, [replace(fit, evidence=-1.0)], observations)
+    assert len(losses[False]) == len(list_candidate_recordings(fit.twin, observations))
+    assert losses[True] == sorted(losses[False], reverse=True)[: next_experiment.COMPARED_WITH_PUMP]
+    assert proposal.loss == max(losses[True])
+
+
 def test_all_common_parameters_are_carried_to_the_new_recording(uncertain_pump):
     """The twin of a periodic candidate has every parameter of the fit but the old shaft angle, with
     the fitted coordinates, those of the pump included."""

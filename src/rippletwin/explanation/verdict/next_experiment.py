@@ -56,7 +56,8 @@ class Proposal:
 def propose_recording(
     accepted: Fit, rivals: Sequence[Fit], observations: Sequence
 ) -> Proposal | None:
-    """The recording that best discriminates `accepted` from each of `rivals`; None without rivals.
+    """The recording that best discriminates `accepted` from each of `rivals`; None without rivals,
+    and where no further recording is possible.
 
     The new recording has the noise and the source of the fitted `observations`.
     """
@@ -71,12 +72,12 @@ def propose_recording(
         )
 
     candidates = list_candidate_recordings(accepted.twin, observations)
-    if accepted.twin.uncertain_pump:
+    if any(parameter.place == "pump" for parameter in accepted.twin.parameters):
         # How its numbers change the ripple at a new operating point takes many runs of the pump.
         candidates.sort(key=lambda each: -loss(each, uncertain_pump=False))
         candidates = candidates[:COMPARED_WITH_PUMP]
     proposals = [Proposal(each[0], loss(each, uncertain_pump=True)) for each in candidates]
-    return max(proposals, key=lambda proposal: proposal.loss)
+    return max(proposals, key=lambda proposal: proposal.loss, default=None)
 
 
 def propose_sensor_position(
