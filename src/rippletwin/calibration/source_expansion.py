@@ -15,9 +15,6 @@ from rippletwin.calibration.smooth_source import SmoothSourceError, SourceExpans
 from rippletwin.calibration.source_expansion_kernel import find_amplitudes
 from rippletwin.calibration.whitening import Whitening
 
-STEP_SHARES = np.array([1.0, 0.5, 0.25, 0.1])
-SETTLED = 0.1  # gain of a step in log posterior, below which it is the last
-
 
 class SourceData(NamedTuple):
     """Readings and what they are compared with, in a basis in which the noise is diagonal.
@@ -50,8 +47,6 @@ def find_most_likely_expansion(
         smooth.basis,
         smooth.sds(data.tau),
         start.amplitudes,
-        STEP_SHARES,
-        SETTLED,
         steps,
     )
     return smooth.expand(amplitudes)

@@ -7,34 +7,20 @@ from numba import njit
 
 from rippletwin.calibration.whitening_kernel import prepare, remove_along
 
+STEP_SHARES = (1.0, 0.5, 0.25, 0.1)  # of a step, tried one after the other until one gains
+SETTLED = 0.1  # gain of a step in log posterior, below which it is the last
+
 
 @njit(cache=True, error_model="numpy")
-def find_amplitudes(
-    values,
-    prediction,
-    sd,
-    independent,
-    nominal,
-    basis,
-    sds,
-    start,
-    shares,
-    settled,
-    steps,
-):
+def find_amplitudes(values, prediction, sd, independent, nominal, basis, sds, start, steps):
     """Most likely amplitudes (J,) of the smooth error, by at most `steps` Gauss-Newton steps.
 
     values, prediction, sd   (S, F), independent (F,): those of `SourceData`
     nominal, basis, sds      (N,), (J, N) and (J,): its smooth error's frequencies, basis, and the
                              standard deviations of its amplitudes
     start                    (J,) amplitudes
-    shares                   of a step, tried one after the other until one gains
-    settled                  gain below which a step is the last
     """
-    count = values.shape[1]
-    scaled = np.empty_like(basis)
-    for j in range(len(basis)):
-        scaled[j] = sds[j] * basis[j]
+    count, scaled = values.shape[1], sds.reshape(-1, 1) * basis
     here = start.astype(np.complex128)
     for _ in range(steps):
         error = _error(here, nominal, basis, count)
@@ -56,7 +42,7 @@ def find_amplitudes(
             step[j] += sds[j] ** 2 * total
         cost = _cost(values, prediction, sd, u, diagonal, nominal, basis, sds, here)
         gain, there = 0.0, here
-        for share in shares:
+        for share in STEP_SHARES:
             there = here + share * step
             gain = cost - _cost(values, prediction, sd, u, diagonal, nominal, basis, sds, there)
             if gain > 0.0:
@@ -64,7 +50,7 @@ def find_amplitudes(
         if not gain > 0.0:
             break
         here = there
-        if gain < settled:
+        if gain < SETTLED:
             break
     return here
 

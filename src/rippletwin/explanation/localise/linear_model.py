@@ -2,9 +2,9 @@
 
     r + A^T x + B^T w,    x ~ N(0, I),    w ~ N(0, a^2 I),
 
-has unit variance. A is common to many corrections B, so x is integrated out once. What is left of B
-is diagonalised, and each amplitude a then costs next to nothing (Rasmussen and Williams 2006,
-Gaussian Processes for Machine Learning, eq. 2.30).
+is white noise of unit variance. A is common to many corrections B, so x is integrated out once.
+What remains of B beside A is diagonalised, so that each amplitude a takes a sum over K numbers
+(Rasmussen and Williams 2006, Gaussian Processes for Machine Learning, eq. 2.30).
 """
 
 from __future__ import annotations
@@ -48,7 +48,14 @@ class LinearModel:
 
 
 class Correction(NamedTuple):
-    """A correction (`LinearModel.with_correction`) in the axes in which it is diagonal."""
+    """A correction of a model, made by `LinearModel.with_correction`.
+
+    changes   (K, N) B
+    cross     (P, K) A B^T, multiplied by the inverse root of I + A A^T
+    sizes     (K,) eigenvalues of what remains of B B^T beside A
+    axes      (K, K) its eigenvectors, in columns
+    along     (K,) what remains of B r beside A, along these
+    """
 
     model: LinearModel
     changes: np.ndarray

@@ -219,12 +219,11 @@ def _accepted_pair(workers: Workers, best: Fit, candidates: Sequence) -> Fit | N
     otherwise."""
     if best.model_error <= GOOD_MODEL_ERROR:
         return None
-    for pair in fit_best_pairs(workers, best, candidates)[:1]:
-        if pair.evidence >= best.evidence + MIN_LOG_BAYES_FACTOR:
-            revised = _revise(workers, pair, candidates)
-            if surplus_evidence(revised) >= surplus_evidence(best):
-                return revised
-    return None
+    pair = next(iter(fit_best_pairs(workers, best, candidates)), None)
+    if pair is None or pair.evidence < best.evidence + MIN_LOG_BAYES_FACTOR:
+        return None
+    revised = _revise(workers, pair, candidates)
+    return revised if surplus_evidence(revised) >= surplus_evidence(best) else None
 
 
 def _revise(workers: Workers, best: Fit, candidates: Sequence) -> Fit:

@@ -37,7 +37,7 @@ from rippletwin.twin.twin import Twin
 
 MAX_MODEL_ERROR_FOR_COUPLING = 10.0 * LITTLE_MODEL_ERROR
 """Relative model error above which pressure and flow at the pump are too uncertain."""
-NOTICED_CHANGE = 0.25  # of the least model error: a change of the prediction that is fitted again
+NOTICED_CHANGE = 0.25  # of LITTLE_MODEL_ERROR: a change of the prediction that is fitted again
 MAX_RESUMED = 2  # times
 MAX_SETTLED = 4  # fits of one hypothesis, each with the ripple that the last one found
 
@@ -152,7 +152,7 @@ def _settle_ripple(base: Twin, data: list[Observation], best: Fit) -> tuple[list
 
 def changes_prediction(fit: Fit, before: Sequence[Observation], after: Sequence) -> bool:
     """Whether a fit predicts other readings for the observations `after` than for those `before`,
-    by more than a part of the least model error."""
+    by more than a part of LITTLE_MODEL_ERROR."""
     old, new = (
         np.concatenate(ForwardModel(fit.twin, data)(fit.twin.theta), axis=1)
         for data in (before, after)
