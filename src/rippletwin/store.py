@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -15,8 +14,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-LAST_WRITES_S = (0.0, 0.1, 0.5, 2.0)  # pauses before a folder is removed again
-
 
 def save(dataset: xr.Dataset, path: str | Path, compressed: bool = True) -> None:
     """Write `dataset` to the zarr store `path`, replacing what is there.
@@ -25,15 +22,18 @@ def save(dataset: xr.Dataset, path: str | Path, compressed: bool = True) -> None
     nothing half-written that looks whole. `compressed=False` makes random reads of large images
     several times faster.
     """
+    from rippletwin.stoppable_store import StoppableStore
+
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     scratch = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
+    new = StoppableStore(scratch / "new")
     encoding = {} if compressed else {name: {"compressors": None} for name in dataset.variables}
     try:
         # a dataset read from another store remembers that store's encoding; format 3 of zarr has no
         # text arrays yet
         dataset.drop_encoding().to_zarr(
-            scratch / "new", mode="w", encoding=encoding, zarr_format=2, consolidated=False
+            new, mode="w", encoding=encoding, zarr_format=2, consolidated=False
         )
         if path.exists():
             os.replace(path, scratch / "old")
@@ -42,19 +42,10 @@ def save(dataset: xr.Dataset, path: str | Path, compressed: bool = True) -> None
         _name(error, path, scratch)
         raise
     finally:
+        new.stop()
         if (scratch / "old").exists() and not path.exists():
             os.replace(scratch / "old", path)
-        _remove(scratch)
-
-
-def _remove(folder: Path) -> None:
-    """Remove a folder that threads of zarr may still write into: those of other chunks go on after
-    one has failed."""
-    for pause in LAST_WRITES_S:
-        time.sleep(pause)
-        shutil.rmtree(folder, ignore_errors=True)
-        if not folder.exists():
-            break
+        shutil.rmtree(scratch, ignore_errors=True)
 
 
 def load(path: str | Path) -> xr.Dataset:
