@@ -120,6 +120,10 @@ class Posterior:
         reflection coefficients."""
         return np.concatenate(self.forward(theta), axis=1)
 
+    def predict_held(self, theta: np.ndarray) -> np.ndarray:
+        """`predict` with everything nonlinear as it was solved last."""
+        return np.concatenate(self.forward.predict_held(theta), axis=1)
+
     def by_observation(self, prediction: np.ndarray) -> list[ObservedRipple]:
         """Measurement and prediction (S, F), one observation at a time."""
         return [

@@ -36,11 +36,12 @@ class ScoreTest:
         theta = np.array([thetas[0][twin.index[p.name]] for p in without.parameters])
         own = Posterior(without, posterior.observations, None, posterior.source_free)
         own.predict(theta)
-        posterior.forward.hold_as(own.forward)
         own.forward.freeze_compliance = True
         prediction = own.predict(theta)
+        posterior.forward.hold_as(own.forward)
         own.estimate_errors(prediction, theta)
-        ways = np.array([posterior.predict(start) for start in thetas]) - prediction
+        held = own.predict_held(theta)
+        ways = np.array([posterior.predict_held(start) for start in thetas]) - held
         ways = np.where(np.isfinite(ways), ways, 0.0)  # an infinite prediction is no start
         r, jacobian = own.linearise(theta, prediction, ways)
         self._jacobian, ways = jacobian[:, : len(theta)], jacobian[:, len(theta) :]

@@ -59,8 +59,17 @@ class DifferentiableForward(ForwardModel):
         self.jacobian_correction: np.ndarray | None = None
 
     def hold_as(self, other: DifferentiableForward) -> None:
-        """Freeze the outflows at those of `other`, a model of the same recordings."""
+        """Freeze what is nonlinear as in `other`, a model of the same recordings: the outflows in
+        predictions, the orifice's remainder also in `predict_held`."""
         self.freeze_compliance, self._outflows = True, other._outflows
+        self._remainder = other._remainder
+
+    def predict_held(self, theta: np.ndarray) -> list[np.ndarray]:
+        """The prediction at theta (P,) with everything nonlinear as it was solved last."""
+        self._freeze = True
+        prediction = self._read(self.network(theta), theta)
+        self._freeze = False
+        return prediction
 
     def omit_compliance(self) -> None:
         """Freeze the outflows at zero, as if the compliance were linear."""

@@ -74,6 +74,8 @@ class ForwardModel:
         self.amplitude = self._known_amplitude()
         self.solved = True
         self._last_linear: tuple[bytes, FrequencyDomainLine] | None = None
+        # The line before its last effect: many predictions differ in the last effect alone.
+        self._before_last: tuple[bytes, FrequencyDomainLine, LineState] | None = None
         periodic = [self.slices[r] for r in self._periodic]
         self.compliance_solver = NonlinearComplianceSolver(periodic, self.order)
 
@@ -143,8 +145,26 @@ class ForwardModel:
         return copy(self._last_linear[1])
 
     def _make_linear(self, theta: np.ndarray) -> FrequencyDomainLine:
-        twin, rig = self.twin, self.twin.rig
-        v = self.arrays(theta)
+        if not self.twin.effects:
+            return self._make_bare(theta, self.arrays(theta))
+        without = np.array(theta, float)
+        without[self.twin.last_parameters] = 0.0
+        key = without.tobytes()
+        if self._before_last is None or self._before_last[0] != key:
+            v = self.arrays(theta)
+            network, line = self._make_bare(theta, v), self.line_state(v)
+            for effect, place, values in self.twin.applied_effects(theta)[:-1]:
+                effect.apply(network, line, values, place)
+            self._before_last = key, network, line
+        _, network, line = self._before_last
+        network = network.separate()
+        effect, place, values = self.twin.last_applied(theta)
+        effect.apply(network, line, values, place)
+        return network
+
+    def _make_bare(self, theta: np.ndarray, v: Arrays) -> FrequencyDomainLine:
+        """The line for a small ripple without effects, with `v` of `arrays`."""
+        rig = self.twin.rig
         series = np.array(
             [self._series(k, d, v.viscosity) for k, d in enumerate(v.diameters)], dtype=complex
         )
@@ -155,7 +175,7 @@ class ForwardModel:
             diameter=v.diameters[:, None],
         )
         source, source_admittance = self.source.at(theta)
-        network = FrequencyDomainLine(
+        return FrequencyDomainLine(
             s=self.s,
             lengths=v.lengths,
             series=series,
@@ -166,11 +186,6 @@ class ForwardModel:
             sensor_positions=v.positions,
             sensor_factor=v.gains,
         )
-        if twin.effects:
-            line = self.line_state(v)
-            for effect, place, values in twin.applied_effects(theta):
-                effect.apply(network, line, values, place)
-        return network
 
     def _states(self, theta: np.ndarray) -> np.ndarray:
         """Factor (..., R) on the wave speeds while each of R recordings was made; `theta` may be

@@ -27,6 +27,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -143,6 +144,10 @@ class Twin:
             *effect_parameters(self.effects, self._effect_parameters),
         )
         self.index = {p.name: k for k, p in enumerate(self.parameters)}
+        counts = [len(own) for own in self._effect_parameters]
+        ends = len(self.parameters) - sum(counts) + np.cumsum([0, *counts])
+        self._own = [slice(int(a), int(b)) for a, b in pairwise(ends)]
+        self._applied = sorted(range(len(self.effects)), key=lambda k: self.effects[k][0].rank)
         self._line_priors = Priors([p.prior for p in line_parameters(rig)])
         self._reflection = [
             k for k, p in enumerate(self.parameters) if p.name.startswith("reflection[")
@@ -199,16 +204,26 @@ class Twin:
 
     def effect_values(self, theta: np.ndarray) -> list[tuple]:
         """(effect, place, values by name in SI units) of each effect at `theta` (P,)."""
-        out, k = [], len(self.parameters) - sum(len(e) for e in self._effect_parameters)
-        for (effect, place), own in zip(self.effects, self._effect_parameters):
-            values = {p.name: p.prior.value(u) for p, u in zip(own, theta[k:])}
-            out.append((effect, place, values))
-            k += len(own)
-        return out
+        return [self._values_of(k, theta) for k in range(len(self.effects))]
 
     def applied_effects(self, theta: np.ndarray) -> list[tuple]:
         """`effect_values` in the order in which a line takes them (`Effect.rank`)."""
-        return sorted(self.effect_values(theta), key=lambda each: each[0].rank)
+        return [self._values_of(k, theta) for k in self._applied]
+
+    def last_applied(self, theta: np.ndarray) -> tuple:
+        """The last of `applied_effects`."""
+        return self._values_of(self._applied[-1], theta)
+
+    @property
+    def last_parameters(self) -> slice:
+        """Where theta has the parameters of the effect that a line takes last; empty without any
+        effect."""
+        return self._own[self._applied[-1]] if self.effects else slice(0, 0)
+
+    def _values_of(self, k: int, theta: np.ndarray) -> tuple:
+        """(effect, place, values by name in SI units) of effect k at `theta` (P,)."""
+        own = zip(self._effect_parameters[k], theta[self._own[k]])
+        return (*self.effects[k], {p.name: p.prior.value(u) for p, u in own})
 
     @property
     def friction_law(self) -> str:

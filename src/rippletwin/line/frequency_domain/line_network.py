@@ -87,6 +87,19 @@ class FrequencyDomainLine:
         """Length of the whole line, m."""
         return float(np.sum(self.lengths))
 
+    def separate(self) -> FrequencyDomainLine:
+        """The same line with arrays and lists of its own, which effects may change."""
+        return replace(
+            self,
+            series=np.array(self.series),
+            shunt=np.array(self.shunt),
+            source_flow=np.array(self.source_flow),
+            source_admittance=np.array(self.source_admittance),
+            inserts=list(self.inserts),
+            sensor_factor=np.array(self.sensor_factor),
+            nonlinear_compliances=list(self.nonlinear_compliances),
+        )
+
     def at_frequencies(self, which: np.ndarray) -> FrequencyDomainLine:
         """The same line, without nonlinear compliances, at some of its frequencies (their indices,
         (G,))."""
