@@ -6,6 +6,7 @@ of the sweep are common to all copies; parameters that change these steps have e
     moving a sensor        dp/dx = -Z' q
     turning the shaft      dp/dangle = j k p at shaft order k, nonlinear load or not
     longer segment         Z' and Y' of it in proportion, then everything behind moved back
+    numbers of the pump    dp/dq of the ideal source is Z, dp/dY of its admittance -Z p at the pump
 
 Positions of inserts are moved one by one. Two nonlinear parts are frozen meanwhile: the orifice's
 remainder, two orders below its linear part, and the outflows of nonlinear compliance. The latter
@@ -51,7 +52,8 @@ class DifferentiableForward(ForwardModel):
             i: part for i, part in zip(self.source.angles, self.slices) if i is not None
         }
         self._positions = [k for k, name in enumerate(names) if name.endswith(".position")]
-        apart = {*self._sensors, *self._angles, *self._positions}
+        pump = {k for k, *_ in self.source.changes}
+        apart = {*self._sensors, *self._angles, *self._positions, *pump}
         self._together = [k for k in range(len(names)) if k not in apart]
         self._remainder = self._outflows = self._frozen_at = None
         self._freeze = False
@@ -107,11 +109,17 @@ class DifferentiableForward(ForwardModel):
         self._solve_at(theta)
         self._freeze = True
         base = self.network(theta)
-        pressure, flow = base.respond(base.sensor_positions)
+        pressure, flow = base.respond((*base.sensor_positions, 0.0))
+        at_pump, pressure, flow = pressure[-1], pressure[:-1], flow[:-1]
         factor = np.broadcast_to(base.sensor_factor, pressure.shape)
         readings = pressure * factor
         out = np.zeros((len(theta), *pressure.shape), complex)
 
+        if self.source.changes:
+            transfer = base.transfer_impedance(base.sensor_positions) * factor
+            turn = self.source.turn(theta)
+            for k, (slope, curvature), own in self.source.changes:
+                out[k] = transfer * (turn * (slope + 2.0 * theta[k] * curvature) - own * at_pump)
         v = self.twin.arrays(theta)
         ends = np.cumsum(v.lengths)
         starts = ends - v.lengths
@@ -222,7 +230,7 @@ class DifferentiableForward(ForwardModel):
             gains=twin.gains(coordinates),
         )
         v = self._as_recorded(coordinates, v)
-        source, admittance = self._sources(theta, base, shape)
+        admittance = np.array(np.broadcast_to(self.source.at(theta)[1], shape))
         network = FrequencyDomainLine(
             s=self.s,
             lengths=base.lengths,
@@ -258,7 +266,7 @@ class DifferentiableForward(ForwardModel):
             lengths=base.lengths,
             series=network.series.reshape(n, -1),
             shunt=network.shunt.reshape(n, -1),
-            source_flow=flat(source),
+            source_flow=flat(base.source_flow),
             source_admittance=flat(network.source_admittance),
             inserts=[(x, kind, flat(y)) for x, kind, y in network.inserts],
             sensor_positions=v.positions,
@@ -272,15 +280,3 @@ class DifferentiableForward(ForwardModel):
             side_by_side.load_outflow = flat(v.load * self._remainder)
         readings = side_by_side.readings().reshape(-1, *shape)
         return readings * np.broadcast_to(network.sensor_factor, readings.shape)
-
-    def _sources(self, theta: np.ndarray, base: FrequencyDomainLine, shape: tuple) -> tuple:
-        """Flow and admittance of the source without effects, both (1 + N, F), at theta and with
-        each of the N parameters moved."""
-        flow = np.array(np.broadcast_to(base.source_flow, shape))
-        admittance = np.array(np.broadcast_to(self.source.at(theta)[1], shape))
-        turned = STEP * self.source.turn(theta)
-        for k, (slope, curvature), own in self.source.changes:
-            row = 1 + self._together.index(k)
-            flow[row] += turned * (slope + 2.0 * theta[k] * curvature)
-            admittance[row] += STEP * own
-        return flow, admittance

@@ -212,6 +212,12 @@ class FrequencyDomainLine:
         scale = (self.source_flow * decay - sum(forced)) / own
         return tuple((x[:, 0] * scale + np.sum(x[:, 1:], axis=1)) / decay for x in (pressure, flow))
 
+    def transfer_impedance(self, positions: np.ndarray | Sequence[float]) -> np.ndarray:
+        """Pressure (S, F) at `positions`, m, for each unit that is added to the flow of the ideal
+        source, Pa s/m3; what leaves the line whatever the pressure stays."""
+        pressure, _, entry, _ = self.sweep([self.load_state()], positions)
+        return pressure[:, 0] / (entry[0, 1] + self.source_admittance * entry[0, 0])
+
     def sweep(
         self, states: list, positions: np.ndarray | Sequence[float] = ()
     ) -> tuple[np.ndarray, ...]:
