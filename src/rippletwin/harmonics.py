@@ -10,7 +10,6 @@ from scipy.special import jv
 
 from rippletwin.case.model import FlowRipple
 
-
 ROUNDING = 1e-13  # of the largest amplitude: below it are errors of rounding
 
 

@@ -17,7 +17,7 @@ from rippletwin.explanation.localise.shaft_orders import (
     probability_of_share,
 )
 from rippletwin.explanation.verdict.remainder_text import shaft_order_sentences
-from rippletwin.harmonics import flow_harmonics, modulate_ripple
+from rippletwin.harmonics import flow_harmonics, modulate_ripple, phase_modulate
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.forward_model import ForwardModel
@@ -45,6 +45,20 @@ def test_modulation_spreads_an_order_like_bessel_functions():
     assert flow_harmonics(modulate_ripple(even, b), np.zeros(1))[0].real == pytest.approx(
         1e-4, rel=1e-6
     )
+
+
+@pytest.mark.parametrize("b", [0.0, 1e-3 * np.exp(0.7j), 0.05j, -0.3])
+def test_a_modulated_flow_is_the_flow_at_the_angle_of_the_shaft(b):
+    """Definition, summed order by order: the flow at an instant is that of the shaft's angle then,
+    times its speed; also where the modulation is so large that a sideband is 200 orders away."""
+    rng = np.random.default_rng(2)
+    spectrum = np.zeros(700, complex)
+    spectrum[::7] = (rng.normal(size=(100, 2)) @ [1.0, 1j]) / (1.0 + np.arange(100))
+    instant = 2.0 * np.pi * np.arange(2800) / 2800
+    angle = instant + (b * np.exp(1j * instant)).real
+    speed = 1.0 - (b * np.exp(1j * instant)).imag
+    flow = (np.exp(1j * np.outer(angle, np.arange(700))) @ spectrum).real * speed
+    np.testing.assert_allclose(phase_modulate(spectrum, b, 2800), flow, atol=1e-11)
 
 
 def test_a_fit_of_the_modulation_that_is_cut_short_is_told(monkeypatch):
