@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from threading import Lock
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -22,12 +23,10 @@ def save(dataset: xr.Dataset, path: str | Path, compressed: bool = True) -> None
     nothing half-written that looks whole. `compressed=False` makes random reads of large images
     several times faster.
     """
-    from rippletwin.stoppable_store import StoppableStore
-
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     scratch = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
-    new = StoppableStore(scratch / "new")
+    new = _open_stoppable(scratch / "new")
     encoding = {} if compressed else {name: {"compressors": None} for name in dataset.variables}
     try:
         # a dataset read from another store remembers that store's encoding; format 3 of zarr has no
@@ -46,6 +45,30 @@ def save(dataset: xr.Dataset, path: str | Path, compressed: bool = True) -> None
         if (scratch / "old").exists() and not path.exists():
             os.replace(scratch / "old", path)
         shutil.rmtree(scratch, ignore_errors=True)
+
+
+def _open_stoppable(folder: Path):
+    """A zarr store in `folder` with a method `stop`, after which nothing is written.
+
+    Where one chunk of an array fails, zarr raises the error and goes on with the others in threads
+    of its own, which make the folder anew after it was removed. Here chunks are written one after
+    another; a write that has begun ends before `stop` does, and later ones are left out.
+    """
+    from zarr.storage import LocalStore
+
+    class StoppableStore(LocalStore):
+        writing, stopped = Lock(), False
+
+        def stop(self) -> None:
+            with self.writing:
+                self.stopped = True
+
+        async def set(self, key, value) -> None:
+            with self.writing:
+                if not self.stopped:
+                    self.set_sync(key, value)
+
+    return StoppableStore(folder)
 
 
 def load(path: str | Path) -> xr.Dataset:
