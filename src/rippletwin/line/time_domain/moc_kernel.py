@@ -363,27 +363,48 @@ def advance(source, nodes, pipes, junctions, state):
     `pipes`, `junctions` and `state` are the tuples of `kernel_arrays`. Returns pressure and flow
     (len(nodes), M) at `nodes`.
     """
-    count, main, steps = len(pipes.thetas), pipes.main, len(source)
-    law, coefficient, outside, constant, conductance = junctions.load
-    seen_p, seen_q = np.empty((len(nodes), steps)), np.empty((len(nodes), steps))
+    count, size = len(pipes.thetas), len(state.pressure)
+    seen = np.empty((2, len(nodes), len(source)))
     # (u/2)(sum z_k - G q): friction of the past at the new point. Rows of one array would not do:
     # the compiler does not know that a row is contiguous, and vectorises no loop over it.
-    known = np.zeros(len(state.pressure))
-    lag, give = np.zeros(len(state.pressure)), np.zeros(len(state.pressure))
-    for k in range(count):
-        give[pipes.offsets[k] : pipes.offsets[k + 1]] = pipes.parameters[k, 3]
+    known, lag, give = np.zeros(size), np.zeros(size), np.zeros(size)
     ends = np.zeros((2, count, 2))  # supply and slope that a pipe brings to the joint at each end
-    joint = np.empty((count, 2))
-    waves = state.forward, state.backward
-    leaving = np.empty_like(state.forward), np.empty_like(state.backward)
-    supply, slope, kept = np.empty(2), np.empty(2), np.empty((len(junctions.kinds), 2))
     carried = np.zeros(count)  # c of the waves p +- (c q - known) in rigid pipes
     for k in range(count):
+        give[pipes.offsets[k] : pipes.offsets[k + 1]] = pipes.parameters[k, 3]
         if _is_rigid(k, pipes):
             zc, half_r, half_u, _ = pipes.parameters[k]
             carried[k] = zc - half_r - half_u * pipes.gains[k].sum()
     homes = np.searchsorted(pipes.offsets, nodes, side="right") - 1  # the pipes of `nodes`
-    for n in range(steps):
+    leaving = np.empty_like(state.forward), np.empty_like(state.backward)
+    _take_steps(
+        source, nodes, homes, pipes, junctions, state, leaving, known, lag, give, ends, carried,
+        np.empty((count, 2)), np.empty((2, 2)), np.empty((len(junctions.kinds), 2)), seen,
+    )  # fmt: skip
+    if len(source) % 2:  # the waves that left last are not in the state's arrays
+        state.forward[:], state.backward[:] = leaving
+    for k in range(count):
+        if carried[k] > 0.0:
+            here = slice(pipes.offsets[k], pipes.offsets[k + 1])
+            state.pressure[here] = 0.5 * (state.forward[here] + state.backward[here])
+            state.flow[here] = 0.5 * (state.forward[here] - state.backward[here]) + known[here]
+            state.flow[here] /= carried[k]
+    return seen[0], seen[1]
+
+
+# Without references: this function makes no array, and counting those of its views would take
+# longer than the steps of a short line.
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _take_steps(
+    source, nodes, homes, pipes, junctions, state, leaving, known, lag, give, ends, carried,
+    joint, meeting, kept, seen,
+):  # fmt: skip
+    """The steps of `advance`, which has the arrays that they work in. An odd number of steps ends
+    with the last waves in `leaving`."""
+    count, main = len(pipes.thetas), pipes.main
+    law, coefficient, outside, constant, conductance = junctions.load
+    waves, supply, slope = (state.forward, state.backward), meeting[0], meeting[1]
+    for n in range(len(source)):
         for k in range(count):
             _solve_inside(k, pipes, state, waves, leaving, known, lag, give, ends)
         for j in range(main + 1):
@@ -412,16 +433,7 @@ def advance(source, nodes, pipes, junctions, state):
         waves, leaving = leaving, waves
         for j in range(len(nodes)):
             i, k = nodes[j], homes[j]
-            seen_p[j, n], seen_q[j, n] = state.pressure[i], state.flow[i]
+            seen[0, j, n], seen[1, j, n] = state.pressure[i], state.flow[i]
             if carried[k] > 0.0:
-                seen_p[j, n] = 0.5 * (waves[0][i] + waves[1][i])
-                seen_q[j, n] = (0.5 * (waves[0][i] - waves[1][i]) + known[i]) / carried[k]
-    if steps % 2:  # the waves that left last are not in the state's arrays
-        state.forward[:], state.backward[:] = waves
-    for k in range(count):
-        if carried[k] > 0.0:
-            here = slice(pipes.offsets[k], pipes.offsets[k + 1])
-            state.pressure[here] = 0.5 * (state.forward[here] + state.backward[here])
-            state.flow[here] = 0.5 * (state.forward[here] - state.backward[here]) + known[here]
-            state.flow[here] /= carried[k]
-    return seen_p, seen_q
+                seen[0, j, n] = 0.5 * (waves[0][i] + waves[1][i])
+                seen[1, j, n] = (0.5 * (waves[0][i] - waves[1][i]) + known[i]) / carried[k]
