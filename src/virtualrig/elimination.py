@@ -1,9 +1,9 @@
 """Linear systems of the pump's chambers, solved in place."""
 
-from numba import njit
+from virtualrig.compilation import step_function
 
 
-@njit(cache=True)
+@step_function
 def eliminate(matrix):
     """Solve in place, right-hand side in the last column; diagonally dominant, so without
     pivots.
@@ -23,7 +23,7 @@ def eliminate(matrix):
         matrix[k, n] = total / matrix[k, k]
 
 
-@njit(cache=True)
+@step_function
 def eliminate_arrow(matrix):
     """The same where only the diagonal, the last row and the last unknown's column are not zero.
 

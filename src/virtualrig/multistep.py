@@ -6,6 +6,8 @@ Explicit terms are extrapolated, implicit ones follow the backward differentiati
 
 from numba import njit
 
+from virtualrig.compilation import step_function
+
 DEPTH = 4
 LEAD = 25 / 12
 """First coefficient of BDF4: LEAD x - (older values) = dt dx/dt."""
@@ -24,7 +26,7 @@ def past_part(x0, x1, x2, x3):
     return 4 * (x0 + _THIRD * x2) - 3 * x1 - 0.25 * x3
 
 
-@njit(cache=True)
+@step_function
 def extrapolate(rates, ring):
     """Replace the oldest of four rates by their extrapolation to the next step."""
     r0, r1, r2, r3 = rates[ring[0]], rates[ring[1]], rates[ring[2]], rates[ring[3]]
@@ -32,7 +34,7 @@ def extrapolate(rates, ring):
         r3[i] = ahead(r0[i], r1[i], r2[i], r3[i])
 
 
-@njit(cache=True)
+@step_function
 def combine_past(past, ring):
     """Replace the oldest of four values by the past's part (`past_part`)."""
     x0, x1, x2, x3 = past[ring[0]], past[ring[1]], past[ring[2]], past[ring[3]]

@@ -4,8 +4,7 @@ Each is implicit in time. The outgoing waves of the pipes and the elements deter
 a node together, so no volume is lost.
 """
 
-from numba import njit
-
+from virtualrig.compilation import step_function
 from virtualrig.pump import ATMOSPHERE, orifice_flow
 
 # columns of the node table; flows leave the node, pressures in Pa
@@ -30,7 +29,7 @@ from virtualrig.pump import ATMOSPHERE, orifice_flow
 STORED, ARM_FLOW, ARM_VOLUME, VALVE, VALVE_SPEED, NODE_STATES = range(6)
 
 
-@njit(cache=True)
+@step_function
 def settle_node(table, history, state, lead, wave_in, wave_lead, guess):
     """Pressure of one node, Pa, at which the flow of the waves passes through its elements.
 

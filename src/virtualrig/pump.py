@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numba import njit
 
+from virtualrig.compilation import step_function
 from virtualrig.elimination import eliminate, eliminate_arrow
 
 # columns of the chamber table
@@ -179,7 +180,7 @@ def compression(pressure, ports):
     return absolute - ATMOSPHERE + ports[AIR] - gas + slope * below, slope
 
 
-@njit(cache=True)
+@step_function
 def chamber_kinematics(angle, speed, chambers, ports, stations):
     """Write what depends on the crank angle alone into `stations` (pistons, 4).
 
@@ -201,7 +202,7 @@ def chamber_kinematics(angle, speed, chambers, ports, stations):
             stations[i, 3] += worn
 
 
-@njit(cache=True)
+@step_function
 def compress_all(pressures, ports, squeezed):
     """Write the chambers' compression at their `pressures`, and its slope: (pistons, 2)."""
     for i in range(len(squeezed)):
@@ -225,7 +226,7 @@ def step_chambers(stations, history, lead, chambers, ports, outlet_lead, outlet_
     )
 
 
-@njit(cache=True)
+@step_function
 def solve_chambers(
     stations, history, lead, chambers, ports, outlet_lead, outlet_rest, x, matrix, squeezed
 ):

@@ -8,6 +8,7 @@ here: delete src/virtualrig/__pycache__ after one.
 import numpy as np
 from numba import njit
 
+from virtualrig.compilation import step_function
 from virtualrig.multistep import DEPTH, LEAD, combine_past
 from virtualrig.node_elements import NODE_STATES, STORED, VOLUME, settle_node
 from virtualrig.pump import AIR, chamber_kinematics, compress_all, solve_chambers
@@ -59,28 +60,40 @@ def run(line, nodes, chambers, ports, source, crank, state, stations, steps, eve
     Returns sensor pressures (count, records), flow into the line at x = 0 (records,), pressures
     of the nodes (nodes, records), and the greatest number of Newton steps that the chambers took.
     """
+    count, n_nodes, pistons = sensors[1].shape[0], nodes.shape[0], chambers.shape[0]
+    elements, records = state.flow.shape[1], steps // every
+    recorded, outlet = np.zeros((count, records)), np.zeros(records)
+    nodal = np.zeros((n_nodes, records))
+    x = np.zeros(pistons + 1)
+    squeezed = np.zeros((pistons, 2))
+    compress_all(state.chamber_pressure, ports, squeezed)
+    newton = _march(
+        line, lay_in_rows(line, state, dt), nodes, chambers, ports, source, crank, state, stations,
+        steps, every, dt, sensors, node_admittances(line, n_nodes),
+        np.zeros((2, elements)), np.zeros((2, elements)), np.zeros(n_nodes),
+        np.zeros((NODE_STATES, n_nodes)), np.zeros(pistons), x,
+        np.zeros((pistons + 1, pistons + 2)), squeezed, np.zeros((pistons, 4)),
+        recorded, outlet, nodal,
+    )  # fmt: skip
+    return recorded, outlet, nodal, newton
+
+
+@step_function
+def _march(
+    line, flat, nodes, chambers, ports, source, crank, state, stations, steps, every, dt, sensors,
+    wave_lead, flux_p, flux_q, wave_in, history, chamber_history, x, matrix, squeezed, station,
+    recorded, outlet, nodal,
+):  # fmt: skip
+    """The steps of `run`, which has the arrays that they work in; the greatest number of Newton
+    steps."""
     speed, ripple, wander = crank
     element, rows = sensors
     count, n = rows.shape
-    elements = state.flow.shape[1]
     n_nodes, pistons = nodes.shape[0], chambers.shape[0]
     lead = LEAD / dt
-    recorded = np.zeros((count, steps // every))
-    outlet = np.zeros(steps // every)
-    nodal = np.zeros((n_nodes, steps // every))
-    flux_p, flux_q = np.zeros((2, elements)), np.zeros((2, elements))
-    flat = lay_in_rows(line, state, dt)
-    wave_in, wave_lead = np.zeros(n_nodes), node_admittances(line, n_nodes)
     stored = state.node.reshape((DEPTH, NODE_STATES * n_nodes))
-    history = np.zeros((NODE_STATES, n_nodes))
     past = history.reshape(NODE_STATES * n_nodes)
-    chamber_history = np.zeros(pistons)
-    x = np.zeros(pistons + 1)
-    matrix = np.zeros((pistons + 1, pistons + 2))
-    squeezed = np.zeros((pistons, 2))
-    compress_all(state.chamber_pressure, ports, squeezed)
     computed = len(stations) == 0
-    station = np.zeros((pistons, 4))
     newton = 0
     for step in range(1, steps + 1):
         ring = ((step - 1) % DEPTH, (step - 2) % DEPTH, (step - 3) % DEPTH, step % DEPTH)
@@ -109,7 +122,8 @@ def run(line, nodes, chambers, ports, source, crank, state, stations, steps, eve
                     x[i] = 2 * state.chamber[last, i] - state.chamber[before, i]
                 compress_all(x, ports, squeezed)
             else:
-                x[:pistons] = state.chamber_pressure
+                for i in range(pistons):
+                    x[i] = state.chamber_pressure[i]
             combine_past(state.chamber, ring)
             for i in range(pistons):
                 chamber_history[i] = state.chamber[now, i] / dt
@@ -152,5 +166,6 @@ def run(line, nodes, chambers, ports, source, crank, state, stations, steps, eve
                         rows[s, i] * state.pressure[now, i, element[s]]
                     )
             outlet[step // every - 1] = flux_q[0, 0]
-            nodal[:, step // every - 1] = state.node_pressure
-    return recorded, outlet, nodal, newton
+            for node in range(n_nodes):
+                nodal[node, step // every - 1] = state.node_pressure[node]
+    return newton

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from virtualrig.compilation import step_function
 from virtualrig.multistep import LEAD, ahead, extrapolate, past_part
 from virtualrig.node_elements import ATMOSPHERE
 
@@ -101,14 +102,14 @@ def lay_in_rows(line, state, dt):
     )
 
 
-@njit(cache=True)
+@step_function
 def wave_rates(line, rows, state, now, flux_p, flux_q):
     """Right-hand sides of the waves at step `now`; flux_* (2, E) are the settled end values."""
     n = state.flow.shape[0]
     p, q = state.pressure[now], state.flow
     dp, dq = state.pressure_rate[now], state.flow_drive[now]
-    np.dot(line.derivative, q, dp)
-    np.dot(line.derivative, p, dq)
+    _differentiate(line.derivative, q, dp)
+    _differentiate(line.derivative, p, dq)
     _lift(dp[0], flux_q[0], q[0], -line.lift)
     _lift(dq[0], flux_p[0], p[0], -line.lift)
     _lift(dp[n - 1], flux_q[1], q[n - 1], line.lift)
@@ -124,19 +125,32 @@ def wave_rates(line, rows, state, now, flux_p, flux_q):
         _uneven_rates(line, p, q, dp, dq)
 
 
-@njit(cache=True)
+@step_function
+def _differentiate(derivative, values, rates):
+    """rates (n, E) = derivative (n, n) times values (n, E)."""
+    n = len(values)
+    for i in range(n):
+        rate = rates[i]
+        rate[:] = 0.0
+        for j in range(n):
+            factor, value = derivative[i, j], values[j]
+            for e in range(len(rate)):
+                rate[e] += factor * value[e]
+
+
+@step_function
 def _lift(rate, settled, inside, lift):
     for e in range(len(rate)):
         rate[e] += lift * (settled[e] - inside[e])
 
 
-@njit(cache=True)
+@step_function
 def _scale(rate, factor):
     for i in range(len(rate)):
         rate[i] *= factor[i]
 
 
-@njit(cache=True)
+@step_function
 def _uneven_rates(line, p, q, dp, dq):
     """Contributions of gas, stiffening liquid and turbulent drag."""
     for e in line.uneven:
@@ -152,8 +166,7 @@ def _uneven_rates(line, p, q, dp, dq):
             dq[i, e] -= drag * q[i, e] * abs(q[i, e])
 
 
-# Without Python's check of each divisor, which the compiler does not vectorise.
-@njit(cache=True, error_model="numpy")
+@step_function
 def advance_waves(line, rows, ring, dt):
     """Write the fields of the next step over the oldest ones (index ring[3])."""
     last, before, older, now = ring
@@ -193,7 +206,7 @@ def node_admittances(line, count):
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@step_function
 def settle_faces(line, state, now, flux_p, flux_q):
     """Solve the faces between elements.
 
@@ -208,11 +221,12 @@ def settle_faces(line, state, now, flux_p, flux_q):
         mid_p[e] = 0.5 * (p_left[e] + p_right[e] + z[e] * (q_left[e] - q_right[e]))
     for e in range(elements - 1):
         mid_q[e] = 0.5 * (q_left[e] + q_right[e] + (p_left[e] - p_right[e]) / z[e])
-    flux_p[0, 1:] = mid_p[:-1]
-    flux_q[0, 1:] = mid_q[:-1]
+    next_p, next_q = flux_p[0, 1:], flux_q[0, 1:]
+    for e in range(elements - 1):
+        next_p[e], next_q[e] = mid_p[e], mid_q[e]
 
 
-@njit(cache=True)
+@step_function
 def gather_at_nodes(line, state, now, wave_in):
     """Make `wave_in` (nodes,) the sum of p/Z + q over the pipes at each node, q towards it."""
     n = state.flow.shape[0]
@@ -224,7 +238,7 @@ def gather_at_nodes(line, state, now, wave_in):
         wave_in[line.end[k]] += p[n - 1, b] / line.impedance[b] + q[n - 1, b]
 
 
-@njit(cache=True)
+@step_function
 def close_pipes(line, state, now, flux_p, flux_q):
     """Set the values at the ends of the pipes by the pressures of the nodes."""
     n = state.flow.shape[0]

@@ -394,7 +394,7 @@ def advance(source, nodes, pipes, junctions, state):
 
 # Without references: this function makes no array, and counting those of its views would take
 # longer than the steps of a short line.
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy", _nrt=False)  # type: ignore[call-overload]
 def _take_steps(
     source, nodes, homes, pipes, junctions, state, leaving, known, lag, give, ends, carried,
     joint, meeting, kept, seen,
