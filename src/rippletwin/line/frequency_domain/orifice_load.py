@@ -140,7 +140,11 @@ def _substitute(
     return p, n, solved and np.all(np.isfinite(p))
 
 
-@njit(cache=True, error_model="numpy")
+# A transform makes no array. Counting the references of its views takes longer than short ones do.
+UNCOUNTED = njit(cache=True, error_model="numpy", _nrt=False)  # type: ignore[call-overload]
+
+
+@UNCOUNTED
 def _transform(re, im, more_re, more_im, cos, sin):
     """Discrete Fourier transform sum_i x_i exp(-j k phi_i) of re + j im, in place.
 
@@ -164,11 +168,11 @@ def _transform(re, im, more_re, more_im, cos, sin):
             high_re[k], high_im[k] = re[k] - x, im[k] - y
             re[k], im[k] = re[k] + x, im[k] + y
     if swapped:  # the result is in the room
-        more_re[:] = re
-        more_im[:] = im
+        for k in range(count):
+            more_re[k], more_im[k] = re[k], im[k]
 
 
-@njit(cache=True, error_model="numpy")
+@UNCOUNTED
 def _fold_by_four(re, im, out_re, out_im, cos, sin, stride):
     """One stage: four-point transforms across the quarters, times exp(-j m phi), interleaved.
 
