@@ -48,7 +48,7 @@ def test_starts_are_all_pairs_of_scalings_and_random_wave_speeds(monkeypatch):
     """A line of three segments without effects starts from 49 pairs of scalings, the longest
     segment's and the others', and from 400 draws of all wave speeds with their standard deviation;
     everything else is that of the data sheet. With an effect there are no draws."""
-    monkeypatch.setattr(multistart, "align_shaft_angles", lambda model, theta: (0.0, theta))
+    monkeypatch.setattr(multistart, "align_shaft_angles", lambda model, theta, **_: (0.0, theta))
     bench, observations, _ = make(np.random.default_rng(1))
     base = Twin(bench, observations)
     thetas = np.array([t for _, t in choose_starts(Posterior(base, observations), ({},), 1000)])

@@ -1,10 +1,14 @@
 """The derivatives of the forward model against difference quotients."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from rippletwin.case.model import Load
 from rippletwin.twin.forward_jacobian import DifferentiableForward
 from rippletwin.twin.forward_model import ForwardModel
+from rippletwin.twin.twin import Twin
 from synthetic_effects import AIR, GAIN, HOSE, MUCH_AIR, TRUTH, VOLUME
 from synthetic_observations import make
 
@@ -45,3 +49,21 @@ def test_full_jacobian_includes_the_nonlinear_compliance():
         assert np.linalg.norm(column - quotient) < 0.005 * size
         if p.name.startswith("wave_speed"):
             assert np.linalg.norm(approximate - quotient) > 0.01 * size
+
+
+@pytest.mark.parametrize("load, tolerance", [(Load("closed"), 1e-9), (None, 0.03)])
+def test_lines_side_by_side_read_what_each_reads_alone(load, tolerance):
+    """Twenty lines of other wave speeds, solved at once, against one at a time: the same with a
+    linear load; with an orifice to 3 %, for its remainder is that of the first line."""
+    rng = np.random.default_rng(3)
+    _, observations, truth = make(rng, VOLUME, TRUTH)
+    if load is not None:
+        truth = Twin(replace(truth.rig, load=load), observations, effects=truth.effects)
+    thetas = np.tile(0.1 * rng.normal(size=len(truth.theta)), (20, 1))
+    speeds = [k for k, p in enumerate(truth.parameters) if p.name.startswith("wave_speed")]
+    thetas[:, speeds] = rng.normal(size=(20, len(speeds)))
+    forward = DifferentiableForward(truth, observations)
+    together = forward.predict_side_by_side(thetas)
+    for n, theta in enumerate(thetas):
+        for alone, found in zip(ForwardModel(truth, observations)(theta), together):
+            assert np.linalg.norm(found[n] - alone) < tolerance * np.linalg.norm(alone)

@@ -8,6 +8,7 @@ frequency, the alignment of shaft angles and the starts know nothing but this in
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
@@ -57,6 +58,10 @@ class ErrorModel(Protocol):
 
     def predict(self, theta: np.ndarray) -> Prediction:
         """Predictions of all observations at theta (P,)."""
+
+    def predict_speeds(self, thetas: np.ndarray) -> Sequence[Prediction]:
+        """`predict` at `thetas` (N, P), which differ in wave speeds alone; what is nonlinear is as
+        solved at the first."""
 
     def by_observation(self, prediction: Prediction) -> list[ObservedRipple]:
         """Measurement and prediction, one observation at a time."""

@@ -104,6 +104,13 @@ class Likelihood:
         predicted = self.forward(theta)
         return [np.concatenate([predicted[k] for k in m], axis=1) for m in self._members]
 
+    def predict_speeds(self, thetas: np.ndarray) -> list[list[np.ndarray]]:
+        """`predict` at `thetas` (N, P), which differ in wave speeds alone; what is nonlinear is as
+        solved at the first."""
+        if not self._pressures:
+            return [self.predict(theta) for theta in thetas]
+        return [[h] for h in np.concatenate(self.forward.predict_side_by_side(thetas), axis=2)]
+
     def by_observation(self, prediction: Sequence[np.ndarray]) -> list[ObservedRipple]:
         """Measurement and prediction (S, F), one observation at a time."""
         parts: list[ObservedRipple | None] = [None] * len(self.observations)

@@ -59,7 +59,11 @@ def choose_starts(
                 size=(len(speeds), RANDOM_STARTS)
             )
             thetas = np.concatenate([thetas, anywhere], axis=1)
-        aligned = [align_shaft_angles(model, theta) for theta in thetas.T]
+        predictions = model.predict_speeds(thetas.T)
+        aligned = [
+            align_shaft_angles(model, theta, prediction=prediction)
+            for theta, prediction in zip(thetas.T, predictions)
+        ]
         groups.append(sorted(aligned, key=lambda g: g[0]))
     first = [group[0] for group in groups]
     rest = sorted((g for group in groups for g in group[1:]), key=lambda g: g[0])

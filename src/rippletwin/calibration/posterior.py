@@ -120,6 +120,13 @@ class Posterior:
         reflection coefficients."""
         return np.concatenate(self.forward(theta), axis=1)
 
+    def predict_speeds(self, thetas: np.ndarray) -> list[np.ndarray]:
+        """`predict` at `thetas` (N, P), which differ in wave speeds alone; what is nonlinear is as
+        solved at the first."""
+        if not self._pressures:
+            return [self.predict(theta) for theta in thetas]
+        return list(np.concatenate(self.forward.predict_side_by_side(thetas), axis=2))
+
     def predict_held(self, theta: np.ndarray) -> np.ndarray:
         """`predict` with everything nonlinear as it was solved last."""
         return np.concatenate(self.forward.predict_held(theta), axis=1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rippletwin.calibration.error_model import ErrorModel
+from rippletwin.calibration.error_model import ErrorModel, Prediction
 from rippletwin.calibration.levenberg_marquardt import descend
 
 ANGLES_PER_TURN = 16  # points of the grid in a turn of the highest order
@@ -12,18 +12,22 @@ REFINING_STEPS, REFINED = 6, 1e-9  # most steps after the grid, and gain of the 
 
 
 def align_shaft_angles(
-    model: ErrorModel, theta: np.ndarray, between: bool = False
+    model: ErrorModel,
+    theta: np.ndarray,
+    between: bool = False,
+    prediction: Prediction | None = None,
 ) -> tuple[float, np.ndarray]:
     """Relative misfit, and theta (P,) with each recording's shaft angle aligned on a grid.
 
-    between   whether the angle is then moved between the points of the grid
+    between      whether the angle is then moved between the points of the grid
+    prediction   at theta, if it is known
 
     An angle turns order k by k times itself. The grid covers one turn of the orders' greatest
     common divisor. Each frequency weighs as the relative model error has it. The misfit is the
     mean square of the residuals over that weight, infinite where the prediction is.
     """
     theta, twin = np.array(theta), model.twin
-    parts = model.by_observation(model.predict(theta))
+    parts = model.by_observation(model.predict(theta) if prediction is None else prediction)
     if not all(np.all(np.isfinite(part.predicted)) for part in parts):
         return np.inf, theta
     misfit, count = 0.0, 0

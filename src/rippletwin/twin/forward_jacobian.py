@@ -93,6 +93,17 @@ class DifferentiableForward(ForwardModel):
             correction[k] = slope - frozen[k]
         self.jacobian_correction, solver.tolerance = correction, usual
 
+    def predict_side_by_side(self, thetas: np.ndarray) -> list[np.ndarray]:
+        """Pressures, one observation at a time (N, S, F), at `thetas` (N, P), which differ in wave
+        speeds alone; what is nonlinear is as solved at the first."""
+        self._solve_at(thetas[0])
+        self._freeze = True
+        readings = self._side_by_side(thetas.T, self.network(thetas[0]))
+        self._freeze = False
+        return [
+            np.moveaxis(readings[rows, :, part], 1, 0) for part, rows in zip(self.slices, self.rows)
+        ]
+
     def linear_load(self, theta: np.ndarray) -> np.ndarray | None:
         """Readings (S, F), Pa, with a linear orifice and the outflows of theta (P,); None without
         an orifice, where they are those of the prediction."""
@@ -136,7 +147,9 @@ class DifferentiableForward(ForwardModel):
             moved[k] += step
             out[k] = (self.network(moved).readings() - readings) / step
 
-        copies = self._copies(theta, base)
+        coordinates = np.repeat(theta[:, None], len(self._together) + 1, axis=1)
+        coordinates[self._together, np.arange(1, len(self._together) + 1)] += STEP
+        copies = self._side_by_side(coordinates, base)
         out[self._together] = (
             np.moveaxis(copies[:, 1:], 1, 0) - copies[:, :1].swapaxes(0, 1)
         ) / STEP
@@ -208,12 +221,11 @@ class DifferentiableForward(ForwardModel):
         h, p = 1e-4, self.twin.parameters[k]
         return float(p.value(theta[k] + h) - p.value(theta[k] - h)) / (2 * h)
 
-    def _copies(self, theta: np.ndarray, base: FrequencyDomainLine) -> np.ndarray:
-        """Readings (S, 1 + N, F) at theta and with each of the N parameters moved that are solved
-        side by side."""
-        twin, rig, count = self.twin, self.twin.rig, len(self._together) + 1
-        coordinates = np.repeat(theta[:, None], count, axis=1)
-        coordinates[self._together, np.arange(1, count)] += STEP
+    def _side_by_side(self, coordinates: np.ndarray, base: FrequencyDomainLine) -> np.ndarray:
+        """Readings (S, N, F) at the columns of `coordinates` (P, N). They differ in parameters that
+        change neither the steps of the sweep nor the ideal source; `base` is the network of the
+        first."""
+        twin, rig, count = self.twin, self.twin.rig, coordinates.shape[1]
 
         def value(k):
             return twin.parameters[k].value(coordinates[k])[:, None]
@@ -230,7 +242,7 @@ class DifferentiableForward(ForwardModel):
             gains=twin.gains(coordinates),
         )
         v = self._as_recorded(coordinates, v)
-        admittance = np.array(np.broadcast_to(self.source.at(theta)[1], shape))
+        admittance = np.array(np.broadcast_to(self.source.at(coordinates[:, 0])[1], shape))
         network = FrequencyDomainLine(
             s=self.s,
             lengths=base.lengths,
