@@ -157,7 +157,7 @@ def run(quick: bool = False) -> Result:
             "time of characteristics over that of the frequency domain",
             median_ratio(times["time"], times["frequency"]),
             100.0,
-            note="the characteristics are this tool's own, the first row of the section above",
+            note="both methods are this tool's",
         ),
         Claim("difference of the readings below 5 kHz", 100 * agreement, 0.5, "%", False),
     ]

@@ -186,7 +186,7 @@ def run(quick: bool = False) -> Result:
                 "unsteady friction (ten terms) over steady friction",
                 median_ratio(rates["unsteady"], rates["steady"]),
                 0.4,
-                note=f"what the caches move bounds it to {limits['unsteady'] / steady:.2g} times",
+                note=f"bounded by memory bandwidth to {limits['unsteady'] / steady:.2g} times",
             ),
             Claim(
                 "largest difference of the answers, of the Joukowsky rise",

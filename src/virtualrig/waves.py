@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from virtualrig.compilation import step_function
+from virtualrig.compilation import step_function, vectorised_step_function
 from virtualrig.multistep import LEAD, ahead, extrapolate, past_part
 from virtualrig.node_elements import ATMOSPHERE
 
@@ -166,7 +166,7 @@ def _uneven_rates(line, p, q, dp, dq):
             dq[i, e] -= drag * q[i, e] * abs(q[i, e])
 
 
-@step_function
+@vectorised_step_function
 def advance_waves(line, rows, ring, dt):
     """Write the fields of the next step over the oldest ones (index ring[3])."""
     last, before, older, now = ring
@@ -206,7 +206,7 @@ def node_admittances(line, count):
     return total
 
 
-@step_function
+@vectorised_step_function
 def settle_faces(line, state, now, flux_p, flux_q):
     """Solve the faces between elements.
 

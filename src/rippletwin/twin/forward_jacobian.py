@@ -20,7 +20,8 @@ time. Otherwise each solution starts from the last one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import cached_property
 
 import numpy as np
@@ -68,10 +69,17 @@ class DifferentiableForward(ForwardModel):
 
     def predict_held(self, theta: np.ndarray) -> list[np.ndarray]:
         """The prediction at theta (P,) with everything nonlinear as it was solved last."""
+        with self._held():
+            return self._read(self.network(theta), theta)
+
+    @contextmanager
+    def _held(self) -> Iterator[None]:
+        """A context in which networks take everything nonlinear as it was solved last."""
         self._freeze = True
-        prediction = self._read(self.network(theta), theta)
-        self._freeze = False
-        return prediction
+        try:
+            yield
+        finally:
+            self._freeze = False
 
     def omit_compliance(self) -> None:
         """Freeze the outflows at zero, as if the compliance were linear."""
@@ -97,9 +105,8 @@ class DifferentiableForward(ForwardModel):
         """Pressures, one observation at a time (N, S, F), at `thetas` (N, P), which differ in wave
         speeds alone; what is nonlinear is as solved at the first."""
         self._solve_at(thetas[0])
-        self._freeze = True
-        readings = self._side_by_side(thetas.T, self.network(thetas[0]))
-        self._freeze = False
+        with self._held():
+            readings = self._side_by_side(thetas.T, self.network(thetas[0]))
         return [
             np.moveaxis(readings[rows, :, part], 1, 0) for part, rows in zip(self.slices, self.rows)
         ]
@@ -118,19 +125,27 @@ class DifferentiableForward(ForwardModel):
         """d readings/d theta, (P, S, F), Pa per unit of a coordinate; rows S are the rig's sensors,
         F all frequencies."""
         self._solve_at(theta)
-        self._freeze = True
+        with self._held():
+            columns = self._derivatives_held(theta)
+        if self.jacobian_correction is None or self.freeze_compliance:
+            return columns
+        return columns + self.jacobian_correction
+
+    def _derivatives_held(self, theta: np.ndarray) -> np.ndarray:
+        """`derivatives` with everything nonlinear as it was solved last."""
         base = self.network(theta)
-        pressure, flow = base.respond((*base.sensor_positions, 0.0))
-        at_pump, pressure, flow = pressure[-1], pressure[:-1], flow[:-1]
+        at = (*base.sensor_positions, 0.0)
+        pressure, flow, transfer = base.respond_with_transfer(at)
+        at_pump = pressure[-1]
+        pressure, flow, transfer = pressure[:-1], flow[:-1], transfer[:-1]
         factor = np.broadcast_to(base.sensor_factor, pressure.shape)
         readings = pressure * factor
         out = np.zeros((len(theta), *pressure.shape), complex)
 
-        if self.source.changes:
-            transfer = base.transfer_impedance(base.sensor_positions) * factor
-            turn = self.source.turn(theta)
-            for k, (slope, curvature), own in self.source.changes:
-                out[k] = transfer * (turn * (slope + 2.0 * theta[k] * curvature) - own * at_pump)
+        turn = self.source.turn(theta)
+        for k, (linear, square), own in self.source.changes:
+            added = turn * (linear + 2.0 * theta[k] * square) - own * at_pump
+            out[k] = factor * transfer * added
         v = self.twin.arrays(theta)
         ends = np.cumsum(v.lengths)
         starts = ends - v.lengths
@@ -139,8 +154,7 @@ class DifferentiableForward(ForwardModel):
         for row, k in enumerate(self._sensors):
             out[k, row] = slope[row] * self._rate(k, theta)
         for k, part in self._angles.items():
-            turn = 1j * self.order[part] * self._rate(k, theta)
-            out[k][:, part] = turn * readings[:, part]
+            out[k][:, part] = 1j * self.order[part] * self._rate(k, theta) * readings[:, part]
         for k in self._positions:
             moved = theta.copy()
             step = -STEP if theta[k] > 0 else STEP  # inwards
@@ -163,12 +177,7 @@ class DifferentiableForward(ForwardModel):
                 per_metre = self._rate(n, theta)
                 if share > 0.0 and per_metre > 1e-9:
                     out[k] -= rate * share / per_metre * out[n]
-        self._freeze = False
-        return (
-            out
-            if self.jacobian_correction is None or self.freeze_compliance
-            else out + self.jacobian_correction
-        )
+        return out
 
     def _solve_at(self, theta):
         """Solve the nonlinear parts at theta, unless that is where they were solved last."""

@@ -220,9 +220,8 @@ class Twin:
 
     @property
     def last_parameters(self) -> slice:
-        """Where theta has the parameters of the effect that a line takes last; empty without any
-        effect."""
-        return self._own[self._applied[-1]] if self.effects else slice(0, 0)
+        """Where theta has the parameters of the effect that a line takes last."""
+        return self._own[self._applied[-1]]
 
     def _values_of(self, k: int, theta: np.ndarray) -> tuple:
         """(effect, place, values by name in SI units) of effect k at `theta` (P,)."""

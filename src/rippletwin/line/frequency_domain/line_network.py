@@ -201,22 +201,27 @@ class FrequencyDomainLine:
     def respond(self, positions: np.ndarray | Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
         """Pressure, Pa, and flow, m3/s, (S, F) at `positions`, m, with the network's own source and
         load."""
+        return self.respond_with_transfer(positions)[:2]
+
+    def respond_with_transfer(
+        self, positions: np.ndarray | Sequence[float]
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """`respond`, and the pressure (S, F) at `positions` for each unit that is added to the flow
+        of the ideal source, Pa s/m3; what leaves the line whatever the pressure stays."""
         states = [self.load_state()]
         if self.load_outflow is not None:
             states.append((0.0, self.load_outflow))
         pressure, flow, entry, decay = self.sweep(states, positions)
         own, *forced = entry[:, 1] + self.source_admittance * entry[:, 0]
+        transfer = pressure[:, 0] / own
         if not forced:
             scale = self.source_flow / own
-            return pressure[:, 0] * scale, flow[:, 0] * scale
+            return pressure[:, 0] * scale, flow[:, 0] * scale, transfer
         scale = (self.source_flow * decay - sum(forced)) / own
-        return tuple((x[:, 0] * scale + np.sum(x[:, 1:], axis=1)) / decay for x in (pressure, flow))
-
-    def transfer_impedance(self, positions: np.ndarray | Sequence[float]) -> np.ndarray:
-        """Pressure (S, F) at `positions`, m, for each unit that is added to the flow of the ideal
-        source, Pa s/m3; what leaves the line whatever the pressure stays."""
-        pressure, _, entry, _ = self.sweep([self.load_state()], positions)
-        return pressure[:, 0] / (entry[0, 1] + self.source_admittance * entry[0, 0])
+        pressure, flow = (
+            (x[:, 0] * scale + np.sum(x[:, 1:], axis=1)) / decay for x in (pressure, flow)
+        )
+        return pressure, flow, transfer
 
     def sweep(
         self, states: list, positions: np.ndarray | Sequence[float] = ()

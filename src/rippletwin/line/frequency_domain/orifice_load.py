@@ -24,6 +24,8 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
+from rippletwin.line.compilation import uncounted
+
 MAX_PASSES = 50
 MAX_SHORT_PASSES, SHORT_PASS = 200, 0.3  # after those, and the share of the way that each goes
 PRESSURE_TOLERANCE = 1e-10  # change in a pass over a recording's largest harmonic
@@ -140,11 +142,7 @@ def _substitute(
     return p, n, solved and np.all(np.isfinite(p))
 
 
-# A transform makes no array. Counting the references of its views takes longer than short ones do.
-UNCOUNTED = njit(cache=True, error_model="numpy", _nrt=False)  # type: ignore[call-overload]
-
-
-@UNCOUNTED
+@uncounted
 def _transform(re, im, more_re, more_im, cos, sin):
     """Discrete Fourier transform sum_i x_i exp(-j k phi_i) of re + j im, in place.
 
@@ -172,7 +170,7 @@ def _transform(re, im, more_re, more_im, cos, sin):
             more_re[k], more_im[k] = re[k], im[k]
 
 
-@UNCOUNTED
+@uncounted
 def _fold_by_four(re, im, out_re, out_im, cos, sin, stride):
     """One stage: four-point transforms across the quarters, times exp(-j m phi), interleaved.
 

@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from rippletwin.line.compilation import uncounted
+
 SHUNT, SERIES, BRANCH, STORAGE = range(4)  # kinds of a rung
 VALVE = -1  # row of the load's valve among the filters
 VALVE_PASSES = 3  # of its opening, which hardly changes within a step
@@ -392,9 +394,7 @@ def advance(source, nodes, pipes, junctions, state):
     return seen[0], seen[1]
 
 
-# Without references: this function makes no array, and counting those of its views would take
-# longer than the steps of a short line.
-@njit(cache=True, error_model="numpy", _nrt=False)  # type: ignore[call-overload]
+@uncounted
 def _take_steps(
     source, nodes, homes, pipes, junctions, state, leaving, known, lag, give, ends, carried,
     joint, meeting, kept, seen,
