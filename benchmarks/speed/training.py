@@ -75,8 +75,9 @@ class Loop:
 
 def compare(name: str, shape: tuple[int, ...], rate: float, quick: bool) -> tuple[float, list[str]]:
     """Ratio of the times of an epoch, and a row of the table."""
+    # so many that drawing the first weights, which both loops do, takes little of an epoch
     large = math.prod(shape) > 2**14
-    count, rounds = (20, 1) if quick else (40 if large or "resnet" in name else 160, 3)
+    count, rounds = (20, 1) if quick else (40 if large else 320, 3)
     loops = {loop: Loop(loop, name, shape, count) for loop in ("plain", "tool")}
     for loop in loops.values():
         loop.epoch()  # what is allocated once

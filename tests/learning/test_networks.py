@@ -37,10 +37,10 @@ def test_cnn1d_341_100_has_the_shapes_of_the_paper():
     before its ReLU."""
     network = build("cnn1d_341_100", channels=2)
     assert shapes(network, torch.zeros(1, 2, 3072)) == [
-        ("CyclicConvolution", (64, 1, 59)),
+        ("RowConvolution", (64, 1, 59)),
         ("MaxPool2d", (64, 1, 30)),
         ("ReLU", (64, 1, 30)),
-        ("Conv2d", (64, 1, 30)),
+        ("RowConvolution", (64, 1, 30)),
         ("MaxPool2d", (64, 1, 30)),
         ("ReLU", (64, 1, 30)),
         ("AdaptiveAvgPool2d", (64, 1, 1)),

@@ -16,6 +16,7 @@ from torch import nn
 
 from rippletwin import store
 from rippletwin.learning.architectures import ARCHITECTURES, CLASSES, Architecture
+from rippletwin.learning.row_convolution import RowConvolution
 
 MAPS = 64  # feature maps of every plain layer and of the first residual stage
 BATCH = 64  # inputs that a trained network answers at once
@@ -78,9 +79,11 @@ class Classifier(nn.Module):
     def feature_maps(self, x: torch.Tensor) -> torch.Tensor:
         """x (n, channels, M) or (n, channels, size, size) in the data's own unit -> the last maps
         (n, width, rows, columns), one row for time windows."""
-        return self.features(self._standardised(x))
+        return self.features(self.standardise(x))
 
-    def _standardised(self, x: torch.Tensor) -> torch.Tensor:
+    def standardise(self, x: torch.Tensor) -> torch.Tensor:
+        """x as ``feature_maps`` takes it -> (n, channels, rows, columns) in channels-last order,
+        on the network's device, silence subtracted and divided by ``scale``."""
         if self.architecture.domain == "time":
             x = x.unsqueeze(-2)
         x = (x.to(self.scale.device) - self.architecture.silence) / self.scale
@@ -90,7 +93,7 @@ class Classifier(nn.Module):
         """x as ``feature_maps`` takes it -> mean and standard deviation (n, 2 maps) of every map
         behind every activation of ``features``"""
         statistics = []
-        x = self._standardised(x)
+        x = self.standardise(x)
         for layer in self.features:
             x = layer(x)
             if isinstance(layer, nn.ReLU | BasicBlock):
@@ -99,7 +102,11 @@ class Classifier(nn.Module):
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         """x as ``feature_maps`` takes it -> logits (n, classes)"""
-        return self.head(self.pool(self.feature_maps(x)).flatten(1))
+        return self.answer(self.standardise(x))
+
+    def answer(self, standardised: torch.Tensor) -> torch.Tensor:
+        """What ``standardise`` gives -> logits (n, classes)"""
+        return self.head(self.pool(self.features(standardised)).flatten(1))
 
 
 def _plain(a: Architecture, channels: int) -> tuple[nn.Sequential, int]:
@@ -149,9 +156,9 @@ class BasicBlock(nn.Module):
         )
         self.shortcut: nn.Module = nn.Identity()
         if stride != 1 or width_in != width:
-            strides = (1, stride) if domain == "time" else stride
+            convolution = RowConvolution if domain == "time" else nn.Conv2d
             self.shortcut = nn.Sequential(
-                nn.Conv2d(width_in, width, 1, strides, bias=False), nn.BatchNorm2d(width)
+                convolution(width_in, width, 1, stride, bias=False), nn.BatchNorm2d(width)
             )
         self.activation = nn.ReLU(inplace=True)
 
@@ -159,29 +166,14 @@ class BasicBlock(nn.Module):
         return self.activation(self.residual(x) + self.shortcut(x))
 
 
-class CyclicConvolution(nn.Conv2d):
-    """A convolution of one-row images whose ends are joined.
-
-    torch's own cyclic padding gives the same, but leaves channels-last order, and the copy back
-    takes half as long as the convolution.
-    """
-
-    def forward(self, x: torch.Tensor) -> torch.Tensor:
-        """x (n, channels, 1, M) -> maps (n, width, 1, columns)"""
-        if ends := int(self.padding[1]):
-            x = torch.cat([x[..., -ends:], x, x[..., :ends]], -1)
-        return nn.functional.conv2d(x, self.weight, self.bias, self.stride)
-
-
 def _first(a: Architecture, channels: int, bias: bool = True) -> nn.Conv2d:
     if a.domain == "time":
-        kernel, stride, padding = (1, a.kernel), (1, a.stride), (0, a.padding)
-        return CyclicConvolution(channels, MAPS, kernel, stride, padding, bias=bias)
+        return RowConvolution(channels, MAPS, a.kernel, a.stride, a.padding, bias, cyclic=True)
     return nn.Conv2d(channels, MAPS, a.kernel, a.stride, a.padding, bias=bias)
 
 
 def _same(domain: str, width_in: int, width: int, stride: int = 1, bias: bool = True) -> nn.Conv2d:
     """Three taps (3 x 3 in an image), padded so that stride 1 keeps the shape."""
     if domain == "time":
-        return nn.Conv2d(width_in, width, (1, 3), (1, stride), (0, 1), bias=bias)
+        return RowConvolution(width_in, width, 3, stride, 1, bias)
     return nn.Conv2d(width_in, width, 3, stride, 1, bias=bias)

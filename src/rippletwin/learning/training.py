@@ -125,6 +125,7 @@ def train_stepwise(
     steps = TrainingSteps(
         network, images, labels, settings.learning_rate, settings.batch_size, arithmetic
     )
+    del images
     fall = torch.optim.lr_scheduler.CosineAnnealingLR(steps.optimiser, settings.max_epochs)
     history, best = History(arithmetic=str(arithmetic)), None
 
@@ -139,7 +140,7 @@ def train_stepwise(
         if settings.falling_rate:
             fall.step()
         history.training_loss.append(steps.pop_loss() / len(fit))
-        loss, accuracy = _validate(network, images[validation], labels[validation], arithmetic)
+        loss, accuracy = _validate(steps, validation)
         history.validation_loss.append(loss)
         history.validation_accuracy.append(accuracy)
         if best is None or loss < history.best_loss:
@@ -193,11 +194,13 @@ def initialise(network: nn.Module, seed: int) -> None:
                 reset()
 
 
+@torch.no_grad()
 def predict(
     network: Classifier, x: np.ndarray, batch_size: int = BATCH
 ) -> tuple[np.ndarray, np.ndarray]:
     """Class indices (n,) and probabilities (n, classes) of x, in its own unit."""
-    logits = _logits(network, torch.as_tensor(x, dtype=torch.float32), batch_size).cpu()
+    network.eval()
+    logits = _in_batches(network, torch.as_tensor(x, dtype=torch.float32), batch_size).cpu()
     return logits.argmax(1).numpy(), logits.softmax(1).numpy()
 
 
@@ -205,21 +208,21 @@ def predict(
 def activation_statistics(network: Classifier, x: np.ndarray) -> np.ndarray:
     """``Classifier.activation_statistics`` (n, D) of x."""
     network.eval()
-    batches = torch.as_tensor(x, dtype=torch.float32).split(BATCH)
-    return torch.cat([network.activation_statistics(batch) for batch in batches]).cpu().numpy()
+    inputs = torch.as_tensor(x, dtype=torch.float32)
+    return _in_batches(network.activation_statistics, inputs).cpu().numpy()
 
 
-def _validate(
-    network: Classifier, x: torch.Tensor, labels: torch.Tensor, arithmetic: Arithmetic
-) -> tuple[float, float]:
-    """Mean loss, nats a sample, and accuracy, 0 to 1, of held-out samples."""
-    with arithmetic.mixed():
-        logits = _logits(network, x).float()
+@torch.no_grad()
+def _validate(steps: TrainingSteps, held_out: np.ndarray) -> tuple[float, float]:
+    """Mean loss, nats a sample, and accuracy, 0 to 1, of the samples of these indices (n,)."""
+    network, labels = steps.network.eval(), steps.labels[held_out]
+    with steps.arithmetic.mixed():
+        logits = _in_batches(network.answer, steps.images[held_out]).float()
     accuracy = (logits.argmax(1) == labels).double().mean()
     return float(nn.functional.cross_entropy(logits, labels)), float(accuracy)
 
 
-@torch.no_grad()
-def _logits(network: Classifier, x: torch.Tensor, batch_size: int = BATCH) -> torch.Tensor:
-    network.eval()
-    return torch.cat([network(batch) for batch in x.split(batch_size)])
+def _in_batches(
+    answer: Callable[[torch.Tensor], torch.Tensor], x: torch.Tensor, batch_size: int = BATCH
+) -> torch.Tensor:
+    return torch.cat([answer(batch) for batch in x.split(batch_size)])

@@ -12,7 +12,7 @@ import torch
 from torch import nn
 
 from rippletwin.learning.arithmetic import Arithmetic
-from rippletwin.learning.networks import Classifier
+from rippletwin.learning.networks import BATCH, Classifier
 
 WARM_UP = 3  # steps before a recording, in which libraries choose kernels and take memory
 
@@ -20,7 +20,8 @@ WARM_UP = 3  # steps before a recording, in which libraries choose kernels and t
 class TrainingSteps:
     """Takes steps of one network on batches of its samples, and adds up their losses.
 
-    images, labels  all samples, on the device of the network
+    images, labels  all samples, on the device of the network; the attribute ``images`` has them
+                    standardised, in the precision of the products
     optimiser       Adam; a scheduler may change its learning rate
     """
 
@@ -33,8 +34,8 @@ class TrainingSteps:
         batch_size: int,
         arithmetic: Arithmetic,
     ):
-        self.network, self.images, self.labels = network, images, labels
-        self.arithmetic = arithmetic
+        self.network, self.arithmetic, self.labels = network, arithmetic, labels
+        self.images = _prepare(network, images, arithmetic.precision)
         recorded = arithmetic.device.type == "cuda"
         # a graph reads the rate where it lies; a number would be recorded as it is now
         rate = torch.tensor(learning_rate, device=arithmetic.device) if recorded else learning_rate
@@ -61,7 +62,7 @@ class TrainingSteps:
 
     def _step(self, batch: torch.Tensor) -> None:
         with self.arithmetic.mixed():
-            logits = self.network(self.images[batch])
+            logits = self.network.answer(self.images[batch])
         loss = nn.functional.cross_entropy(logits.float(), self.labels[batch])
         self.optimiser.zero_grad()
         loss.backward()
@@ -88,3 +89,17 @@ class TrainingSteps:
                 moment.zero_()
         self.loss.zero_()
         return graph
+
+
+def _prepare(network: Classifier, images: torch.Tensor, precision: torch.dtype) -> torch.Tensor:
+    """Standardised samples, once for all epochs. Products would round them to ``precision`` too."""
+    one = network.standardise(images[:1])
+    prepared = torch.empty(
+        (len(images), *one.shape[1:]),
+        dtype=precision,
+        device=one.device,
+        memory_format=torch.channels_last,
+    )
+    for batch, place in zip(images.split(BATCH), prepared.split(BATCH)):
+        place.copy_(network.standardise(batch))
+    return prepared
