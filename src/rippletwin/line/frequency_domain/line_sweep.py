@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from rippletwin.line.compilation import uncounted
+
 ENTER, WALK, RECORD, SHUNT, SERIES, OUTFLOW = range(6)
 
 
@@ -62,19 +64,43 @@ def sweep_line(series, shunt, plan, values, load, outflow, stops):
     flow = np.empty((stops, states, count), np.complex128)
     entry = np.empty((states, 2, count), np.complex128)
     total = np.empty(count, np.complex128)
-    p, q = np.empty(states, np.complex128), np.empty(states, np.complex128)
-    f, b = np.empty(states, np.complex128), np.empty(states, np.complex128)
+    at_step = np.empty((4, states), np.complex128)  # p, q and the waves f and b of each state
     factors = np.empty(len(plan), np.complex128)
-    for i in range(count):
-        p[:], q[:] = load[:, 0, i], load[:, 1, i]
+    _sweep_frequencies(
+        series, shunt, plan, values, load, outflow, at_step[0], at_step[1], at_step[2], at_step[3],
+        factors, pressure, flow, entry, total,
+    )  # fmt: skip
+    return pressure, flow, entry, total
+
+
+@uncounted
+def _take_root(z):
+    """Square root of a complex number, its real part not negative. Quicker than NumPy's, which
+    provides for squares that overflow."""
+    size = np.sqrt(z.real**2 + z.imag**2)
+    larger = np.sqrt(0.5 * (size + abs(z.real)))
+    lesser = 0.5 * abs(z.imag) / larger
+    re, im = (larger, lesser) if z.real >= 0.0 else (lesser, larger)
+    return complex(re, im if z.imag >= 0.0 else -im)
+
+
+@uncounted
+def _sweep_frequencies(
+    series, shunt, plan, values, load, outflow, p, q, f, b, factors, pressure, flow, entry, total
+):
+    """The sweep of `sweep_line`, which makes the arrays that are filled or worked in."""
+    states = len(p)
+    for i in range(len(total)):
+        for m in range(states):
+            p[m], q[m] = load[m, 0, i], load[m, 1, i]
         gamma = zc = yc = 0j
         behind = 1.0 + 0j  # the factors taken out so far
         for n in range(len(plan)):
             what, index = int(plan[n, 0]), int(plan[n, 1])
             if what == ENTER:
-                gamma = np.sqrt(series[index, i] * shunt[index, i])
-                zc = gamma / shunt[index, i]  # on gamma's branch of the root
-                yc = 1.0 / zc
+                gamma = _take_root(series[index, i] * shunt[index, i])
+                over = gamma.conjugate() / (gamma.real**2 + gamma.imag**2)
+                zc, yc = series[index, i] * over, shunt[index, i] * over  # on gamma's branch
                 for m in range(states):
                     zq = zc * q[m]
                     f[m], b[m] = 0.5 * (p[m] + zq), 0.5 * (p[m] - zq)
@@ -90,9 +116,10 @@ def sweep_line(series, shunt, plan, values, load, outflow, stops):
                     p[m], q[m] = f[m] + b[m], (f[m] - b[m]) * yc
             elif what == OUTFLOW:
                 flow_out = outflow[index, i] * behind
-                q[-1] += flow_out
-                f[-1] += 0.5 * zc * flow_out
-                b[-1] -= 0.5 * zc * flow_out
+                m = states - 1
+                q[m] += flow_out
+                f[m] += 0.5 * zc * flow_out
+                b[m] -= 0.5 * zc * flow_out
             elif what == SHUNT:
                 for m in range(states):
                     flow_out = values[index, i] * p[m]
@@ -106,8 +133,10 @@ def sweep_line(series, shunt, plan, values, load, outflow, stops):
                     f[m] += drop
                     b[m] += drop
             else:
-                pressure[index, :, i], flow[index, :, i] = p, q
-        entry[:, 0, i], entry[:, 1, i] = p, q
+                for m in range(states):
+                    pressure[index, m, i], flow[index, m, i] = p[m], q[m]
+        for m in range(states):
+            entry[m, 0, i], entry[m, 1, i] = p[m], q[m]
         # Back down from the pump, each place gets the decay between it and the pump.
         decay = 1.0 + 0j
         for n in range(len(plan) - 1, -1, -1):
@@ -119,4 +148,3 @@ def sweep_line(series, shunt, plan, values, load, outflow, stops):
                     pressure[index, m, i] *= decay
                     flow[index, m, i] *= decay
         total[i] = decay
-    return pressure, flow, entry, total

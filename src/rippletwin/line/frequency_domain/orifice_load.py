@@ -20,6 +20,7 @@ such state.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 from numba import njit
@@ -55,9 +56,8 @@ class OrificeLoad:
         for part in slices:
             own = np.asarray(orders[part]).astype(np.int64)
             self._harmonic[part] = own // np.gcd.reduce(own)
-        samples = 1 << int(np.ceil(np.log2(4 * self._harmonic.max() + 4)))
-        phase = 2 * np.pi * np.arange(samples) / samples
-        self._cos, self._sin = np.cos(phase), np.sin(phase)
+        # The even samples of a period; the odd ones lie half-way between.
+        self._roots = _roots(1 << int(np.ceil(np.log2(2 * self._harmonic.max() + 2))))
         self._drop, self._coefficient = drop, coefficient
         self._passes_flow, self.solved = passes_flow, True
 
@@ -83,54 +83,48 @@ class OrificeLoad:
             opening = np.zeros(0, complex)
         p, n, self.solved = _substitute(
             b / total, c / total, np.asarray(opening, complex), self._edges, self._harmonic,
-            self._cos, self._sin, self._drop, coefficient, self._passes_flow, tolerance,
+            self._roots, self._drop, coefficient, self._passes_flow, tolerance,
         )  # fmt: skip
         return p, admittance * p + n
 
 
+@cache
+def _roots(count: int) -> np.ndarray:
+    """cos and sin of the phases i/count, and of half of them, i = 0 to count - 1: (4, count)."""
+    phase = 2 * np.pi * np.arange(count) / count
+    return np.array([np.cos(phase), np.sin(phase), np.cos(phase / 2), np.sin(phase / 2)])
+
+
 @njit(cache=True, error_model="numpy")
-def _substitute(
-    b, c, opening, edges, harmonic, cos, sin, drop, coefficient, passes_flow, tolerance
-):
-    """p = c - b n(p) by repeated substitution, and n, both (F,); whether it converged."""
+def _substitute(b, c, opening, edges, harmonic, roots, drop, coefficient, passes_flow, tolerance):
+    """p = c - b n(p) by repeated substitution, and n, both (F,); whether it converged.
+
+    Of a signal over a period the even samples are one array and the odd ones another: two real
+    signals, which one complex transform of half the length takes together.
+    """
     p, n, solved = c.copy(), np.zeros_like(c), True
-    samples = len(cos)
-    # real and imaginary part of a transform, and room for its work
-    re, im, more_re, more_im = np.empty((4, samples))
+    samples = 2 * roots.shape[1]
+    even, odd, more_even, more_odd, opened_even, opened_odd = np.zeros((6, roots.shape[1]))
     for r in range(len(edges)):
-        start, stop = edges[r]
+        here = slice(edges[r, 0], edges[r, 1])
         root = np.sqrt(drop[r])
         slope = coefficient[r] / (2.0 * root)
         for done in range(MAX_PASSES + MAX_SHORT_PASSES):
             share = 1.0 if done < MAX_PASSES else SHORT_PASS
-            # two real signals as one complex, both in Pa lest one's rounding drown the other: the
-            # pressure, and 2 P times what the valve opens
-            re[:] = 0.0
-            im[:] = 0.0
-            for k in range(start, stop):
-                m, y = harmonic[k], 0j
-                if len(opening) > 0:
-                    y = opening[k] * p[k]
-                below, above = 0.5 * (p[k].conjugate() + 1j * y.conjugate()), 0.5 * (p[k] + 1j * y)
-                re[m] += below.real
-                im[m] += below.imag
-                re[samples - m] += above.real
-                im[samples - m] += above.imag
-            _transform(re, im, more_re, more_im, cos, sin)
-            passed, flow = 0.0, more_re
-            for i in range(samples):
-                root_drop = np.sqrt(max(drop[r] + re[i], MIN_RELATIVE_DROP * drop[r]))
-                flow[i] = (1.0 + 0.5 / drop[r] * im[i]) * root_drop
-            for i in range(samples):
-                passed += flow[i]
+            _sum_waves(p[here], harmonic[here], even, odd, more_even, more_odd, roots)
+            if len(opening) > 0:  # 2 P times what the valve opens
+                _sum_waves(
+                    opening[here] * p[here], harmonic[here], opened_even, opened_odd,
+                    more_even, more_odd, roots,
+                )  # fmt: skip
+            passed = _pass_flow(drop[r], even, opened_even, more_even)
+            passed += _pass_flow(drop[r], odd, opened_odd, more_odd)
             scale = coefficient[r] * (root / (passed / samples) if passes_flow else 1.0)
-            for i in range(samples):
-                re[i] = scale * flow[i] - slope * (re[i] + im[i])
-                im[i] = 0.0
-            _transform(re, im, more_re, more_im, cos, sin)
+            _take_linear_part(scale, slope, more_even, opened_even, even)
+            _take_linear_part(scale, slope, more_odd, opened_odd, odd)
+            _find_harmonics(even, odd, harmonic[here], n[here], more_even, more_odd, roots)
             change = largest = 0.0
-            for k in range(start, stop):
-                n[k] = 2.0 / samples * (re[harmonic[k]] + 1j * im[harmonic[k]])
+            for k in range(here.start, here.stop):
                 new = c[k] - b[k] * n[k]
                 change = max(change, abs(new - p[k]))
                 largest = max(largest, abs(new))
@@ -140,6 +134,53 @@ def _substitute(
         else:
             solved = False
     return p, n, solved and np.all(np.isfinite(p))
+
+
+@uncounted
+def _sum_waves(amplitude, harmonic, even, odd, more_even, more_odd, roots):
+    """Even and odd samples (N,) of the sum of waves of peak `amplitude` (H,) at `harmonic` (H,)."""
+    even[:] = 0.0
+    odd[:] = 0.0
+    for k in range(len(harmonic)):
+        m, a = harmonic[k], 0.5 * amplitude[k]
+        later = a * complex(roots[2, m], roots[3, m])  # half-way between two even samples
+        below, above = a.conjugate() + 1j * later.conjugate(), a + 1j * later
+        even[m] += below.real
+        odd[m] += below.imag
+        even[len(even) - m] += above.real
+        odd[len(even) - m] += above.imag
+    _transform(even, odd, more_even, more_odd, roots[0], roots[1])
+
+
+@uncounted
+def _find_harmonics(even, odd, harmonic, amplitude, more_even, more_odd, roots):
+    """The peak `amplitude` (H,) at `harmonic` (H,) of a signal, whose samples are overwritten."""
+    count = len(even)
+    _transform(even, odd, more_even, more_odd, roots[0], roots[1])
+    for k in range(len(harmonic)):
+        m = harmonic[k]
+        here, mirror = complex(even[m], odd[m]), complex(even[count - m], -odd[count - m])
+        of_odd = -1j * (here - mirror) * complex(roots[2, m], -roots[3, m])
+        amplitude[k] = 0.5 / count * (here + mirror + of_odd)
+
+
+@uncounted
+def _pass_flow(drop, pressure, opened, flow):
+    """The flow (N,) through the orifice over its coefficient; its sum over the samples."""
+    for i in range(len(flow)):
+        root_drop = np.sqrt(max(drop + pressure[i], MIN_RELATIVE_DROP * drop))
+        flow[i] = (1.0 + 0.5 / drop * opened[i]) * root_drop
+    passed = 0.0
+    for i in range(len(flow)):
+        passed += flow[i]
+    return passed
+
+
+@uncounted
+def _take_linear_part(scale, slope, flow, opened, pressure):
+    """What the orifice passes beyond its linear law, in place of the `pressure` (N,)."""
+    for i in range(len(flow)):
+        pressure[i] = scale * flow[i] - slope * (pressure[i] + opened[i])
 
 
 @uncounted
