@@ -22,6 +22,7 @@ import numpy as np
 from numba import njit
 
 from rippletwin.case.model import ATMOSPHERE
+from rippletwin.line.compilation import uncounted
 
 SMOOTHING = 1e3  # Pa, the drop below which an orifice is linear
 GAMMA = 1.0 - np.sqrt(0.5)  # share of a step at its first stage
@@ -30,7 +31,7 @@ TANGENT_STEPS = 10  # Newton steps with the true slopes; then steeper ones, see 
 MAX_NEWTON = 80
 
 
-@njit(cache=True)
+@uncounted
 def compression(p, bulk_modulus, air):
     """c(p), and dc/dp in 1/Pa, of liquid with the volume fraction `air` of free air; `p` in Pa
     absolute, `bulk_modulus` in Pa."""
@@ -38,7 +39,7 @@ def compression(p, bulk_modulus, air):
     return p / bulk_modulus - gas, 1.0 / bulk_modulus + gas / p
 
 
-@njit(cache=True)
+@uncounted
 def orifice_flow(conductance, drop, tangency):
     """Flow through a smoothed orifice, m3/s, and a slope, m3/(Pa s), at a pressure `drop`, Pa;
     `conductance` = Cd A sqrt(2/rho), m3/s/sqrt(Pa).
@@ -53,7 +54,7 @@ def orifice_flow(conductance, drop, tangency):
     )
 
 
-@njit(cache=True)
+@uncounted
 def _eliminate(matrix, rhs):
     """Solve in place. Rows are diagonally dominant by construction, so there is no pivoting."""
     n = len(rhs)
@@ -70,8 +71,10 @@ def _eliminate(matrix, rhs):
         rhs[i] /= matrix[i, i]
 
 
-@njit(cache=True)
-def solve_stage(p, rate, target, step, tables, pump, case_leak, cross_leak, c_plus, impedance):
+@uncounted
+def solve_stage(
+    p, rate, target, step, tables, pump, case_leak, cross_leak, c_plus, impedance, matrix, rhs
+):
     """Pressures that satisfy c(p) = target + step * dc/dt at one instant.
 
     p          (n + 1,) first guess, overwritten: n chambers, then the outlet, Pa
@@ -82,12 +85,11 @@ def solve_stage(p, rate, target, step, tables, pump, case_leak, cross_leak, c_pl
     pump       (bulk modulus, air fraction, laminar leakage m3/s/Pa, suction pressure)
     case_leak  (n,) conductance from each chamber to the case
     cross_leak (n,) conductance from each chamber to the next
+    matrix, rhs   (n + 1, n + 1), (n + 1,) room for Newton's linear system
     Returns the outlet flow, m3/s; nan where Newton's method does not converge.
     """
     n = len(target)
     bulk_modulus, air, laminar, suction_pressure = pump
-    matrix = np.empty((n + 1, n + 1))
-    rhs = np.empty(n + 1)
     for iteration in range(MAX_NEWTON):
         tangency = 1.0 if iteration < TANGENT_STEPS else 2.0 / 3.0
         matrix[:] = 0.0
@@ -129,19 +131,20 @@ def solve_stage(p, rate, target, step, tables, pump, case_leak, cross_leak, c_pl
         matrix[n, n] = 1.0 + impedance * slopes
         rhs[n] = c_plus + impedance * delivered - p[n]
         _eliminate(matrix, rhs)
-        largest = 0.0
+        largest = highest = 0.0
         for k in range(n + 1):
             new = p[k] + rhs[k]
             if air > 0.0 and new < 0.2 * p[k]:
                 new = 0.2 * p[k]  # c(p) is defined for positive p only
             largest = max(largest, abs(new - p[k]))
             p[k] = new
-        if largest <= NEWTON_TOLERANCE * np.max(np.abs(p)):
+            highest = max(highest, abs(new))
+        if largest <= NEWTON_TOLERANCE * highest:
             return delivered
     return np.nan
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def simulate_revolution(
     p,
     tables,
@@ -171,18 +174,31 @@ def simulate_revolution(
     end.
     """
     steps, _, n = tables.shape
-    zc, half, k_v, behind = line
     flow = np.empty(steps)
     pressures = np.empty((steps, n + 1))
     readings = np.empty((steps, len(sensors)))
-    rate, second = np.empty(n), np.empty(n)
-    content, target = np.empty(n), np.empty(n)
+    work = np.empty((4, n))
+    _take_steps(
+        p, tables, stage_tables, step, pump, case_leak, cross_leak, line, line_p, line_q, sensors,
+        outlet, flow, pressures, readings, work[0], work[1], work[2], work[3],
+        np.empty((n + 1, n + 1)), np.empty(n + 1), np.empty_like(line_p), np.empty_like(line_q),
+    )  # fmt: skip
+    return flow, pressures, readings
+
+
+@uncounted
+def _take_steps(
+    p, tables, stage_tables, step, pump, case_leak, cross_leak, line, line_p, line_q, sensors,
+    outlet, flow, pressures, readings, rate, second, content, target, matrix, rhs, new_p, new_q,
+):  # fmt: skip
+    """The steps of `simulate_revolution`, which makes the arrays that are filled or worked in."""
+    n = len(rate)
+    zc, half, k_v, behind = line
     cells = len(line_p) - 1
     piped = cells > 0
-    new_p, new_q = np.empty_like(line_p), np.empty_like(line_q)
     impedance = zc + half if piped else 0.0
-    c_old = line_p[0] - impedance * line_q[0] if piped else outlet[steps - 1]
-    for i in range(steps):
+    c_old = line_p[0] - impedance * line_q[0] if piped else outlet[len(flow) - 1]
+    for i in range(len(flow)):
         # C- characteristic arriving at the pump (Wylie & Streeter 1993, ch. 3)
         c_new = line_p[1] - (zc - half) * line_q[1] if piped else outlet[i]
         for k in range(n):
@@ -190,18 +206,19 @@ def simulate_revolution(
         c_stage = c_old + GAMMA * (c_new - c_old)
         first = solve_stage(
             p, rate, content, GAMMA * step, stage_tables[i], pump, case_leak, cross_leak,
-            c_stage, impedance,
+            c_stage, impedance, matrix, rhs,
         )  # fmt: skip
         for k in range(n):
             target[k] = content[k] + (1.0 - GAMMA) * step * rate[k]
         flow[i] = solve_stage(
             p, second, target, GAMMA * step, tables[i], pump, case_leak, cross_leak,
-            c_new, impedance,
+            c_new, impedance, matrix, rhs,
         )  # fmt: skip
         if np.isnan(first):
             flow[i] = np.nan
         c_old = c_new
-        pressures[i] = p
+        for k in range(n + 1):
+            pressures[i, k] = p[k]
         if piped:
             new_p[0], new_q[0] = p[n], flow[i]
             for j in range(1, cells):
@@ -215,10 +232,10 @@ def simulate_revolution(
             b = (zc + half) * k_v
             root = 0.5 * (np.sqrt(b * b + 4.0 * max(forward - behind, 0.0)) - b)
             new_p[cells], new_q[cells] = behind + root * root, k_v * root
-            line_p[:], line_q[:] = new_p, new_q
+            for j in range(cells + 1):
+                line_p[j], line_q[j] = new_p[j], new_q[j]
         for j in range(len(sensors)):
             first_node = int(sensors[j, 0])
             readings[i, j] = 0.0
             for m in range(4):
                 readings[i, j] += sensors[j, 1 + m] * line_p[first_node + m]
-    return flow, pressures, readings
