@@ -5,6 +5,7 @@ import pytest
 
 from default_pump import LOAD, OIL, PIPE, POSITIONS, SPEED, relative_rms
 from kinematic_flow import kinematic_flow
+from rippletwin.pump.faults import Cylinder, Slipper
 from rippletwin.pump.geometry import Geometry
 from rippletwin.pump.outlets import ConstantPressure, Pipe, PressureWave
 from rippletwin.pump.simulation import simulate
@@ -48,16 +49,25 @@ def test_pressures_are_above_the_atmosphere(suction, load):
     assert ripple.pressure_mean == pytest.approx(load)
 
 
-@pytest.mark.parametrize("pump", [{}, {"pistons": 7, "air_fraction": 0.02}])
-def test_one_chamber_stands_for_all_at_a_constant_pressure(pump):
+LEAKS = {
+    "sound": None,
+    "slipper": Slipper(6e-7, 3),
+    "cylinder, last and first": Cylinder(6e-7, 6),
+    "several": (Slipper(2e-7, 0), Cylinder(6e-7, 4), Cylinder(3e-7, 5), Slipper(1e-6, 2)),
+}
+
+
+@pytest.mark.parametrize("pump", [{}, {"pistons": 7, "air_fraction": 0.02}], ids=["9", "7"])
+@pytest.mark.parametrize("leaks", LEAKS.values(), ids=LEAKS)
+def test_one_sound_chamber_stands_for_all_at_a_constant_pressure(pump, leaks):
     """All chambers solved together, into the same pressure given angle by angle, have the flow and
-    the pressures that the first one's say."""
-    one = simulate(pump, OIL, SPEED, ConstantPressure(LOAD))
-    each = simulate(pump, OIL, SPEED, PressureWave(np.full(64, LOAD)))
-    assert np.max(np.abs(one.flow - each.flow)) < 1e-7 * np.max(each.flow)  # the solver's tolerance
-    assert np.max(np.abs(one.chamber_pressure - each.chamber_pressure)) < 1e-6 * LOAD
-    assert np.all(one.outlet_pressure == pytest.approx(LOAD))
-    assert one.converged and one.pressure_mean == pytest.approx(each.pressure_mean, rel=1e-12)
+    the pressures that one sound chamber's and those of the leaking ones say."""
+    few = simulate(pump, OIL, SPEED, ConstantPressure(LOAD), leaks)
+    all_ = simulate(pump, OIL, SPEED, PressureWave(np.full(64, LOAD)), leaks)
+    assert np.max(np.abs(few.flow - all_.flow)) < 1e-7 * np.max(all_.flow)  # the solver's tolerance
+    assert np.max(np.abs(few.chamber_pressure - all_.chamber_pressure)) < 1e-6 * LOAD
+    assert np.all(few.outlet_pressure == pytest.approx(LOAD))
+    assert few.converged and few.pressure_mean == pytest.approx(all_.pressure_mean, rel=1e-12)
 
 
 def test_pump_between_open_tanks_delivers_what_it_displaces():

@@ -101,18 +101,6 @@ def simulate(
     steps, cells = choose_steps(
         geometry.pistons, period, outlet, max(min_steps, samples_per_revolution)
     )
-    case_leak, cross_leak = leak_conductances(geometry, fluid, fault)
-    # Sound chambers at a constant pressure do the same one after another: one is enough.
-    alike = isinstance(outlet, ConstantPressure) and not (case_leak.any() or cross_leak.any())
-    simulated = 1 if alike else geometry.pistons
-    end_of_step, first_stage = _tables(geometry, fluid, period, steps, simulated)
-    constants = (
-        geometry.bulk_modulus,
-        geometry.air_fraction,
-        geometry.case_leakage,
-        absolute(geometry.suction_pressure),
-    )
-
     mean_flow = geometry.displacement / period
     (zc, half, k_v), line_p, line_q, sensors = pipe_state(
         fluid, outlet, period / steps, cells, mean_flow
@@ -123,19 +111,13 @@ def simulate(
     else:
         given = absolute(pressure_at_steps(outlet.pressure, steps))
     load_pressure = line_p[0] if cells else given.mean()
-    delivering = np.arange(simulated) * 2 > geometry.pistons
-    state = np.append(
-        np.where(delivering, load_pressure, absolute(geometry.suction_pressure)), load_pressure
-    )
+    chamber_groups = _ChamberGroups(geometry, fluid, fault, outlet, period, steps, load_pressure)
 
     previous, change = None, np.inf
     for revolutions in range(1, MAX_REVOLUTIONS + 1):  # noqa: B007 (reported)
-        flow, pressures, readings = chambers.simulate_revolution(
-            state, end_of_step, first_stage, period / steps, constants, case_leak[:simulated],
-            cross_leak[:simulated], (zc, half, k_v, behind), line_p, line_q, sensors, given,
-        )  # fmt: skip
-        if alike:
-            flow, pressures = _all_chambers(flow, pressures, geometry.pistons)
+        flow, pressures, readings = chamber_groups.turn(
+            (zc, half, k_v, behind), line_p, line_q, sensors, given
+        )
         if not np.isfinite(flow).all():
             raise ArithmeticError(f"the chamber equations did not converge at {speed_rpm} r/min")
         if previous is not None:
@@ -148,14 +130,14 @@ def simulate(
     pressures, readings = pressures - ATMOSPHERE, readings - ATMOSPHERE
 
     def sample(values):  # values at the end of each step -> at the output's angles
-        return resample_period(np.roll(values, 1, axis=0).T, samples_per_revolution)
+        return resample_period(np.roll(values, 1, axis=-1), samples_per_revolution)
 
     return PumpRipple(
         angle_deg=np.arange(samples_per_revolution) * 360.0 / samples_per_revolution,
         flow=sample(flow),
-        pressure_mean=float(pressures[:, -1].mean()),
-        outlet_pressure=sample(pressures[:, -1]),
-        chamber_pressure=sample(pressures[:, :-1]),
+        pressure_mean=float(pressures[-1].mean()),
+        outlet_pressure=sample(pressures[-1]),
+        chamber_pressure=sample(pressures[:-1]),
         sensor_pressure=sample(readings),
         converged=bool(change < PERIODIC_CHANGE),
         change=float(change),
@@ -166,19 +148,65 @@ def simulate(
     )
 
 
-def _all_chambers(flow, pressures, pistons):
-    """Flow (K,) and pressures (K, n + 1) of n chambers that do the same one after another, from
-    those of the first: (K,) and (K, 2)."""
-    lag = len(flow) // pistons
-    chambers = [np.roll(pressures[:, 0], k * lag) for k in range(pistons)]
-    total = np.tile(flow.reshape(pistons, lag).sum(axis=0), pistons)
-    return total, np.stack([*chambers, pressures[:, -1]], axis=1)
+class _ChamberGroups:
+    """The chambers over a revolution of K steps, those that affect each other in one group.
+
+    At a constant pressure chambers affect each other through cross leaks alone, and those that do
+    not leak do the same one after another: one of them, `group[0] in alike`, stands for all.
+    """
+
+    def __init__(self, geometry, fluid, fault, outlet, period, steps, load_pressure):
+        self._pistons, self._step = geometry.pistons, period / steps
+        self._case_leak, self._cross_leak = leak_conductances(geometry, fluid, fault)
+        suction = absolute(geometry.suction_pressure)
+        self._constants = (
+            geometry.bulk_modulus, geometry.air_fraction, geometry.case_leakage, suction
+        )  # fmt: skip
+        everyone = np.arange(geometry.pistons)
+        joined = (self._cross_leak > 0.0) | (np.roll(self._cross_leak, 1) > 0.0)
+        leaking = joined | (self._case_leak > 0.0)
+        self._alike = everyone[~leaking]
+        if isinstance(outlet, ConstantPressure) and len(self._alike):
+            ring = np.roll(everyone, -self._alike[0])  # those that are joined stay neighbours
+            groups = [group for group in (self._alike[:1], ring[leaking[ring]]) if len(group)]
+        else:
+            groups, self._alike = [everyone], everyone[:0]
+        self._groups = []  # of each: its chambers, their state and tables
+        for group in groups:
+            start = np.where(group * 2 > geometry.pistons, load_pressure, suction)
+            state = np.append(start, load_pressure)
+            self._groups.append((group, state, _tables(geometry, fluid, period, steps, group)))
+
+    def turn(self, line, line_p, line_q, sensors, outlet):
+        """One revolution; arguments as of `chambers.simulate_revolution`.
+
+        Returns flow (K,), pressures (n + 1, K) of the n chambers and the outlet, and sensor
+        pressures (S, K), each at a step's end.
+        """
+        flow, pressures = 0.0, [None] * (self._pistons + 1)
+        for group, state, (end_of_step, first_stage) in self._groups:
+            delivered, own, readings = chambers.simulate_revolution(
+                state, end_of_step, first_stage, self._step, self._constants,
+                self._case_leak[group], self._cross_leak[group], line, line_p, line_q, sensors,
+                outlet,
+            )  # fmt: skip
+            *own, pressures[-1] = np.ascontiguousarray(own.T)
+            if group[0] in self._alike:
+                for k in self._alike:
+                    lag = (k - group[0]) * len(delivered) // self._pistons
+                    flow = flow + np.roll(delivered, lag)
+                    pressures[k] = np.roll(own[0], lag)
+            else:
+                flow = flow + delivered
+                for k, pressure in zip(group, own):
+                    pressures[k] = pressure
+        return flow, np.array(pressures), readings.T
 
 
-def _tables(geometry, fluid, period, steps, count):
-    """Volumes, their rates and port conductances (K, 4, n) of the first n = `count` chambers at the
+def _tables(geometry, fluid, period, steps, group):
+    """Volumes, their rates and port conductances (K, 4, n) of the n chambers of `group` at the
     steps' ends and first stages."""
-    lag = 2 * np.pi * np.arange(count) / geometry.pistons
+    lag = 2 * np.pi * group / geometry.pistons
     tables = []
     for fraction in (1.0, chambers.GAMMA):
         phi = 2 * np.pi * (np.arange(steps) + fraction)[:, None] / steps - lag
