@@ -115,7 +115,7 @@ def simulate(
 
     previous, change = None, np.inf
     for revolutions in range(1, MAX_REVOLUTIONS + 1):  # noqa: B007 (reported)
-        flow, pressures, readings = chamber_groups.turn(
+        flow, readings = chamber_groups.turn(
             (zc, half, k_v, behind), line_p, line_q, sensors, given
         )
         if not np.isfinite(flow).all():
@@ -127,7 +127,7 @@ def simulate(
         previous = flow
         if isinstance(outlet, Pipe) and outlet.orifice is None:
             k_v = orifice_coefficient(outlet, flow.mean())
-    pressures, readings = pressures - ATMOSPHERE, readings - ATMOSPHERE
+    pressures, readings = chamber_groups.pressures() - ATMOSPHERE, readings - ATMOSPHERE
 
     def sample(values):  # values at the end of each step -> at the output's angles
         return resample_period(np.roll(values, 1, axis=-1), samples_per_revolution)
@@ -180,27 +180,39 @@ class _ChamberGroups:
     def turn(self, line, line_p, line_q, sensors, outlet):
         """One revolution; arguments as of `chambers.simulate_revolution`.
 
-        Returns flow (K,), pressures (n + 1, K) of the n chambers and the outlet, and sensor
-        pressures (S, K), each at a step's end.
+        Returns flow (K,) and sensor pressures (S, K), each at a step's end.
         """
-        flow, pressures = 0.0, [None] * (self._pistons + 1)
+        flow, self._last = 0.0, []
         for group, state, (end_of_step, first_stage) in self._groups:
-            delivered, own, readings = chambers.simulate_revolution(
+            delivered, pressures, readings = chambers.simulate_revolution(
                 state, end_of_step, first_stage, self._step, self._constants,
                 self._case_leak[group], self._cross_leak[group], line, line_p, line_q, sensors,
                 outlet,
             )  # fmt: skip
-            *own, pressures[-1] = np.ascontiguousarray(own.T)
+            self._last.append(np.ascontiguousarray(pressures.T))
             if group[0] in self._alike:
-                for k in self._alike:
-                    lag = (k - group[0]) * len(delivered) // self._pistons
-                    flow = flow + np.roll(delivered, lag)
-                    pressures[k] = np.roll(own[0], lag)
+                flow = flow + sum(delayed for _, delayed in self._one_after_another(delivered))
             else:
                 flow = flow + delivered
-                for k, pressure in zip(group, own):
-                    pressures[k] = pressure
-        return flow, np.array(pressures), readings.T
+        return flow, readings.T
+
+    def pressures(self) -> np.ndarray:
+        """Pressures (n + 1, K), Pa, of the n chambers and the outlet in the last revolution."""
+        found = np.empty((self._pistons + 1, self._last[0].shape[1]))
+        for (group, _, _), (*own, found[-1]) in zip(self._groups, self._last):
+            if group[0] in self._alike:
+                for k, delayed in self._one_after_another(own[0]):
+                    found[k] = delayed
+            else:
+                found[group] = own
+        return found
+
+    def _one_after_another(self, values):
+        """Each of the chambers that are alike, and the first one's `values` (K,) as late as it is."""
+        count, twice = len(values), np.concatenate([values, values])
+        for k in self._alike:
+            lag = (k - self._alike[0]) * count // self._pistons
+            yield k, twice[count - lag : 2 * count - lag]
 
 
 def _tables(geometry, fluid, period, steps, group):
