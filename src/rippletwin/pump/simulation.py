@@ -208,7 +208,7 @@ class _ChamberGroups:
         return found
 
     def _one_after_another(self, values):
-        """Each of the chambers that are alike, and the first one's `values` (K,) as late as it is."""
+        """Chambers that are alike, each with `values` (K,) of the first as much later as it is."""
         count, twice = len(values), np.concatenate([values, values])
         for k in self._alike:
             lag = (k - self._alike[0]) * count // self._pistons
