@@ -37,10 +37,10 @@ def test_cnn1d_341_100_has_the_shapes_of_the_paper():
     before its ReLU."""
     network = build("cnn1d_341_100", channels=2)
     assert shapes(network, torch.zeros(1, 2, 3072)) == [
-        ("RowConvolution", (64, 1, 59)),
+        ("Convolution", (64, 1, 59)),
         ("MaxPool2d", (64, 1, 30)),
         ("ReLU", (64, 1, 30)),
-        ("RowConvolution", (64, 1, 30)),
+        ("Convolution", (64, 1, 30)),
         ("MaxPool2d", (64, 1, 30)),
         ("ReLU", (64, 1, 30)),
         ("AdaptiveAvgPool2d", (64, 1, 1)),
@@ -58,10 +58,10 @@ def test_cnn2d_3_1_has_the_shapes_of_the_paper():
     before its ReLU."""
     network = build("cnn2d_3_1", channels=2)
     assert shapes(network, torch.zeros(1, 2, 256, 256)) == [
-        ("Conv2d", (64, 256, 256)),
+        ("Convolution", (64, 256, 256)),
         ("MaxPool2d", (64, 128, 128)),
         ("ReLU", (64, 128, 128)),
-        ("Conv2d", (64, 128, 128)),
+        ("Convolution", (64, 128, 128)),
         ("MaxPool2d", (64, 64, 64)),
         ("ReLU", (64, 64, 64)),
         ("AdaptiveAvgPool2d", (64, 1, 1)),

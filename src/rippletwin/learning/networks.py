@@ -16,7 +16,7 @@ from torch import nn
 
 from rippletwin import store
 from rippletwin.learning.architectures import ARCHITECTURES, CLASSES, Architecture
-from rippletwin.learning.row_convolution import RowConvolution
+from rippletwin.learning.convolution import Convolution
 
 MAPS = 64  # feature maps of every plain layer and of the first residual stage
 BATCH = 64  # inputs that a trained network answers at once
@@ -156,9 +156,9 @@ class BasicBlock(nn.Module):
         )
         self.shortcut: nn.Module = nn.Identity()
         if stride != 1 or width_in != width:
-            convolution = RowConvolution if domain == "time" else nn.Conv2d
+            strides = (1, stride) if domain == "time" else stride
             self.shortcut = nn.Sequential(
-                convolution(width_in, width, 1, stride, bias=False), nn.BatchNorm2d(width)
+                Convolution(width_in, width, 1, strides, bias=False), nn.BatchNorm2d(width)
             )
         self.activation = nn.ReLU(inplace=True)
 
@@ -166,14 +166,17 @@ class BasicBlock(nn.Module):
         return self.activation(self.residual(x) + self.shortcut(x))
 
 
-def _first(a: Architecture, channels: int, bias: bool = True) -> nn.Conv2d:
+def _first(a: Architecture, channels: int, bias: bool = True) -> Convolution:
     if a.domain == "time":
-        return RowConvolution(channels, MAPS, a.kernel, a.stride, a.padding, bias, cyclic=True)
-    return nn.Conv2d(channels, MAPS, a.kernel, a.stride, a.padding, bias=bias)
+        kernel, stride, padding = (1, a.kernel), (1, a.stride), (0, a.padding)
+        return Convolution(channels, MAPS, kernel, stride, padding, bias=bias, cyclic=True)
+    return Convolution(channels, MAPS, a.kernel, a.stride, a.padding, bias=bias)
 
 
-def _same(domain: str, width_in: int, width: int, stride: int = 1, bias: bool = True) -> nn.Conv2d:
+def _same(
+    domain: str, width_in: int, width: int, stride: int = 1, bias: bool = True
+) -> Convolution:
     """Three taps (3 x 3 in an image), padded so that stride 1 keeps the shape."""
     if domain == "time":
-        return RowConvolution(width_in, width, 3, stride, 1, bias)
-    return nn.Conv2d(width_in, width, 3, stride, 1, bias=bias)
+        return Convolution(width_in, width, (1, 3), (1, stride), (0, 1), bias=bias)
+    return Convolution(width_in, width, 3, stride, 1, bias=bias)
