@@ -28,6 +28,7 @@ MAX_PASSES = 80
 HOPELESS_PASSES, HOPELESS_CHANGE = 25, 0.5  # no better change after so many passes: give up
 CONTINUATION_SHARES = (0.35, 0.7, 1.0)  # of the outflows, in turn, where all at once fails
 SAMPLES_PER_HIGHEST_HARMONIC = 3  # the aliases of its square then fall above half of it
+TINY = 1e-300  # lest the square of nothing be divided by
 MAX_RELATIVE_PRESSURE = 0.9  # |x| at which the law is clipped: the series diverges at 1
 
 
@@ -125,8 +126,7 @@ class NonlinearComplianceSolver:
             acceleration.start()
         for done in range(1, MAX_PASSES + 1):
             value = share * function(x)
-            change, size = np.abs(value - x).max(axis=0), np.abs(value).max(axis=0)
-            error = max(change[part].max() / max(size[part].max(), 1e-300) for part in parts)
+            error = max(_relative_change(x[:, part], value[:, part]) for part in parts)
             reached = min(reached, error)
             self.solved = bool(error <= self.tolerance)
             hopeless = done > HOPELESS_PASSES and reached > HOPELESS_CHANGE
@@ -146,7 +146,19 @@ def _stored_share(law, pressure, harmonic, samples):
     return peak_amplitudes(wave)[:, harmonic]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def _relative_change(x, value):
+    """Largest change from x to `value` (N, F) over the largest value; nan if one is not finite."""
+    change = largest = check = 0.0
+    for n in range(len(x)):
+        for f in range(x.shape[1]):
+            v, d = value[n, f], value[n, f] - x[n, f]
+            size, moved = v.real**2 + v.imag**2, d.real**2 + d.imag**2
+            largest, change, check = max(largest, size), max(change, moved), check + moved
+    return np.sqrt(change / max(largest, TINY)) if np.isfinite(check) else np.nan
+
+
+@njit(cache=True, error_model="numpy")
 def _apply_law(law, wave):
     """Replace pressures (cells, samples) by the shares stored."""
     for law_here, row in zip(law, wave):
