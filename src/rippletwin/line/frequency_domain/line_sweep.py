@@ -11,6 +11,8 @@ from numba import njit
 
 from rippletwin.line.compilation import uncounted
 
+SAME_DISTANCE = 1e-12
+"""Relative difference up to which two distances are one: cells are evenly spaced to rounding."""
 ENTER, WALK, RECORD, SHUNT, SERIES, OUTFLOW = range(6)
 
 
@@ -94,10 +96,12 @@ def _sweep_frequencies(
         for m in range(states):
             p[m], q[m] = load[m, 0, i], load[m, 1, i]
         gamma = zc = yc = 0j
+        distance, factor, square = 0.0, 1.0 + 0j, 1.0 + 0j
         behind = 1.0 + 0j  # the factors taken out so far
         for n in range(len(plan)):
             what, index = int(plan[n, 0]), int(plan[n, 1])
             if what == ENTER:
+                distance = 0.0  # of the last walk
                 gamma = _take_root(series[index, i] * shunt[index, i])
                 over = gamma.conjugate() / (gamma.real**2 + gamma.imag**2)
                 zc, yc = series[index, i] * over, shunt[index, i] * over  # on gamma's branch
@@ -108,9 +112,14 @@ def _sweep_frequencies(
                 if plan[n, 2] == 0.0:
                     factors[n] = 1.0
                     continue
-                factors[n] = np.exp(-gamma * plan[n, 2])
-                behind *= factors[n]
-                square = factors[n] * factors[n]
+                if (
+                    abs(plan[n, 2] - distance) > SAME_DISTANCE * distance
+                ):  # not that of a cell before
+                    distance = plan[n, 2]
+                    factor = np.exp(-gamma * distance)
+                    square = factor * factor
+                factors[n] = factor
+                behind *= factor
                 for m in range(states):
                     b[m] *= square
                     p[m], q[m] = f[m] + b[m], (f[m] - b[m]) * yc
