@@ -5,6 +5,7 @@ import pytest
 
 from default_pump import LOAD, OIL, PIPE, POSITIONS, SPEED, relative_rms
 from kinematic_flow import kinematic_flow
+from rippletwin.pump import chambers
 from rippletwin.pump.faults import Cylinder, Slipper
 from rippletwin.pump.geometry import Geometry
 from rippletwin.pump.outlets import ConstantPressure, Pipe, PressureWave
@@ -188,3 +189,20 @@ def test_impossible_geometry_is_named(pump, outlet):
     """The error names the key."""
     with pytest.raises(ValueError, match=next(iter(pump))):
         simulate(pump, OIL, SPEED, outlet)
+
+
+def test_a_pressure_that_is_no_number_has_no_flow():
+    """Newton's method claims no solution where one of its pressures is nan, be it in the last step
+    of a run."""
+    tables = np.array([[1e-5, 1e-5], [1e-3, 1e-3], [1e-7, 1e-7], [0.0, 0.0]])
+    compressed, leaks = 1e7 / 1.5e9, np.zeros(2)
+
+    def flow(target):
+        pressures = np.full(3, 1e7)
+        return chambers.solve_stage(
+            pressures, np.zeros(2), target, 1e-6, tables, (1.5e9, 0.0, 0.0, 1e5), leaks, leaks,
+            1e7, 0.0, np.empty((3, 3)), np.empty(3),
+        )  # fmt: skip
+
+    assert np.isfinite(flow(np.full(2, compressed)))
+    assert np.isnan(flow(np.array([compressed, np.nan])))

@@ -2,8 +2,8 @@
 
 In channels-last order the inputs that an output sees lie side by side, so that a convolution is the
 product of a matrix of windows and the weights. Where few outputs share many weights, that takes
-less time on a processor than torch's convolution, a third of it backward through the last stage of
-a residual network. Larger maps are left to torch, and so is everything on a GPU.
+less time on a processor than torch's convolution, above all backward. Larger maps are left to
+torch, and so is everything on a GPU.
 """
 
 from __future__ import annotations

@@ -131,7 +131,7 @@ def solve_stage(
         matrix[n, n] = 1.0 + impedance * slopes
         rhs[n] = c_plus + impedance * delivered - p[n]
         _eliminate(matrix, rhs)
-        largest = highest = 0.0
+        largest = highest = total = 0.0
         for k in range(n + 1):
             new = p[k] + rhs[k]
             if air > 0.0 and new < 0.2 * p[k]:
@@ -139,7 +139,8 @@ def solve_stage(
             largest = max(largest, abs(new - p[k]))
             p[k] = new
             highest = max(highest, abs(new))
-        if largest <= NEWTON_TOLERANCE * highest:
+            total += new
+        if largest <= NEWTON_TOLERANCE * highest and np.isfinite(total):  # `max` passes over nan
             return delivered
     return np.nan
 

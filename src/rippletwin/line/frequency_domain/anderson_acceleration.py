@@ -13,18 +13,12 @@ once each. Sums are of double precision.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from rippletwin.line.compilation import summing
 
 MAX_HISTORY = 30  # changes stored; beyond that the oldest is overwritten
 RIDGE = 1e-12  # added to the squares of unit changes: below it, directions are rounding
 CHUNK = 2048  # numbers at a time, so that they stay in the first-level cache
-
-SUMMING = njit(
-    cache=True,
-    error_model="numpy",
-    fastmath={"reassoc", "contract"},  # the order of sums is free
-    _nrt=False,
-)  # type: ignore[call-overload]
 
 
 class AndersonAcceleration:
@@ -53,8 +47,6 @@ class AndersonAcceleration:
             newest = self._store(residual - self._last[0], flat - self._last[1])
         self._last = residual, flat
         kept = min(self._stored, MAX_HISTORY)
-        if not kept:
-            return flat.view(complex).reshape(value.shape)
         latest = residual if newest is None else self._residuals[newest].astype(float)
         row, projection = np.zeros((2, kept))
         _add_products(self._residuals[:kept], latest, residual, row, projection)
@@ -78,7 +70,7 @@ class AndersonAcceleration:
         return k
 
 
-@SUMMING
+@summing
 def _add_products(history, one, two, by_one, by_two):
     """Add the products of the rows of `history` (K, N) with `one` and `two` (N,) to (K,).
 
@@ -97,7 +89,7 @@ def _add_products(history, one, two, by_one, by_two):
             by_two[k] += second
 
 
-@SUMMING
+@summing
 def _subtract_combination(history, weights, result):
     """Subtract sum_k weights[k] history[k] of the rows of `history` (K, N) from `result` (N,)."""
     for start in range(0, len(result), CHUNK):

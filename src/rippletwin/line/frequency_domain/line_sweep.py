@@ -12,7 +12,8 @@ from numba import njit
 from rippletwin.line.compilation import uncounted
 
 SAME_DISTANCE = 1e-12
-"""Relative difference up to which two distances are one: cells are evenly spaced to rounding."""
+"""Relative difference up to which a walk takes the factor of the walk before: the cells of a
+nonlinear compliance are evenly spaced to rounding."""
 ENTER, WALK, RECORD, SHUNT, SERIES, OUTFLOW = range(6)
 
 
@@ -112,9 +113,7 @@ def _sweep_frequencies(
                 if plan[n, 2] == 0.0:
                     factors[n] = 1.0
                     continue
-                if (
-                    abs(plan[n, 2] - distance) > SAME_DISTANCE * distance
-                ):  # not that of a cell before
+                if abs(plan[n, 2] - distance) > SAME_DISTANCE * distance:
                     distance = plan[n, 2]
                     factor = np.exp(-gamma * distance)
                     square = factor * factor
