@@ -19,7 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
-from concealed.score import assign_claims, intervals_hold, named_effects
+from concealed.names import assign_claims, named_effects
+from concealed.score import intervals_hold
 from opened_trial import check_opened, open_truth
 from rippletwin.case.load import load_case
 

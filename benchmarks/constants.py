@@ -89,7 +89,8 @@ def explain_case(setting: str, case: Path, out: Path) -> None:
 
 def score(trial: Path, out: Path, setting: str, cases: list[str]) -> dict:
     """Counts over the cases: see the columns of `table`."""
-    from concealed.score import named_effects, score_case
+    from concealed.names import named_effects
+    from concealed.score import score_case
 
     rows = []
     for case in cases:

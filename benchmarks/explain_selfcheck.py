@@ -25,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
-from concealed.score import assign_claims
+from concealed.names import assign_claims
 from rippletwin.calibration.frequency_continuation import refine
 from rippletwin.calibration.misfit import relative_misfit
 from rippletwin.explanation.checks.profile_intervals import effect_intervals, own_parameter_indices

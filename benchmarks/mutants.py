@@ -44,7 +44,7 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ),
     ),
     "scoring": (
-        ("concealed/score.py", "diagnosis_trial/score.py"),
+        ("concealed/names.py", "concealed/score.py", "diagnosis_trial/score.py"),
         (
             "tests/concealed/test_score.py",
             "tests/diagnosis_trial/test_score.py",

@@ -47,6 +47,9 @@ def report_page(rows: list[dict], origin: dict) -> str:
                 ("score", "target", "result"),
                 [(s.what, s.target, str(s.rate)) for s in summary.score_table(rows)],
             ),
+            "## What supported effects would add",
+            "",
+            *_levels(rows),
             "## Comparison with simpler methods",
             "",
             *_methods(rows),
@@ -140,6 +143,24 @@ def _terms() -> list[str]:
         "* *Floor*: misfit that the true line has with the nominal flow ripple. The corrected twin "
         "corrects the ripple and may misfit less.",
         "",
+    ]
+
+
+def _levels(rows: list[dict]) -> list[str]:
+    return [
+        "The scores above count established effects alone.",
+        "",
+        markdown_table(
+            (
+                "effects that count as named",
+                "truly there",
+                "plain single effects: named",
+                "pairs: both named",
+                "no effect: not there",
+                "outside the library: not there",
+            ),
+            [tuple(map(str, score)) for score in summary.support_table(rows)],
+        ),
     ]
 
 

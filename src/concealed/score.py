@@ -1,17 +1,19 @@
 """Scoring of one case: the tool's verdict against the truth."""
 
-from collections.abc import Sequence
-
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+
+from concealed.names import (
+    SUPPORTED_TOO,
+    is_place_right,
+    judge_names,
+    rank_effects,
+    same_or_equivalent,
+)
 
 SILENT_VERDICTS = ("consistent", "calibration_only")
 PLAIN_CHANGE = 0.05
 """Relative change of the ripple from which an effect counts as plain: above the 1 to 4 % by which
 the nominal flow ripple is wrong."""
-
-POSITION_TOLERANCE = 0.01
-"""Of the line's length, added to both ends of a position's interval: lengths are known to that."""
 
 ACCEPTABLE_MISFIT = 0.05
 """Relative misfit above which calibration alone raises the alarm."""
@@ -45,6 +47,8 @@ def score_case(truth: dict, verdict: dict, baselines: dict, oracle: dict = NO_OR
         intervals_hold   for each interval of a right effect, whether it holds the true value
         probabilities    pairs (stated probability, right) of the named effects that state one
         established      of each named effect, whether it is there
+        supported_too    `there` (of each effect), `right`, `effects_found` and `wrong`, where an
+                         effect that is only supported counts as named too
         misfit_nominal   relative, of the whole data, with nominal values
         misfit_calibrated, misfit_corrected   the same before and after, as the verdict states it
         absorbed         1 - misfit_calibrated/misfit_nominal, the share that calibration absorbs
@@ -53,20 +57,9 @@ def score_case(truth: dict, verdict: dict, baselines: dict, oracle: dict = NO_OR
         baselines        {"bic", "sparse", "recalibrate"}: see `score_baseline`
         seconds          processor time of the tool, s
     """
-    true, named = truth["effects"], named_effects(verdict)
-    nuisance = truth.get("nuisance", [])
-    classes = [set(names) for names in [*verdict["equivalents"], *truth["classes"]]]
-    claims = assign_claims(true, named, classes, truth["length"])
-    found = [(effect, claim) for effect, claim in zip(true, claims) if claim is not None]
-    rest = [claim for claim in named if not any(claim is each for each in claims)]
-    there = [
-        claim
-        for effect, claim in zip(nuisance, assign_claims(nuisance, rest, [], truth["length"]))
-        if claim is not None and is_place_right(effect, claim, truth["length"])
-    ]
-    right = [any(claim is each for each in [*claims, *there]) for claim in named]
-    ranked = rank_effects(verdict, there)
-    wrong = [claim["name"] for claim, ok in zip(named, right) if not ok]
+    names, supported = judge_names(truth, verdict), judge_names(truth, verdict, SUPPORTED_TOO)
+    true, named, found = names.true, names.named, names.found
+    ranked = rank_effects(verdict, names.nuisance)
     fit = verdict["fit"]
     nominal, calibrated = baselines["nominal"], fit["before"]["in_sample"]
     return {
@@ -86,9 +79,9 @@ def score_case(truth: dict, verdict: dict, baselines: dict, oracle: dict = NO_OR
         "sentence": verdict["sentence"],
         "alarm": verdict["verdict"] not in SILENT_VERDICTS,
         "effects_found": len(found),
-        "right": bool(true) and len(found) == len(true),
-        "named_first": bool(ranked) and any(ranked[0] is claim for claim in claims),
-        "wrong": " + ".join(wrong),
+        "right": names.is_right,
+        "named_first": bool(ranked) and any(ranked[0] is claim for _, claim in found),
+        "wrong": names.wrong,
         "places_right": [is_place_right(*pair, truth["length"]) for pair in found],
         "remainder_right": [
             is_remainder_at(effect, verdict.get("remainder"), truth["length"])
@@ -98,10 +91,16 @@ def score_case(truth: dict, verdict: dict, baselines: dict, oracle: dict = NO_OR
         "intervals_hold": [inside for pair in found for inside in intervals_hold(*pair)],
         "probabilities": [
             (claim["probability"], ok)
-            for claim, ok in zip(named, right)
+            for claim, ok in zip(named, names.there)
             if claim.get("probability") is not None
         ],
-        "established": right,
+        "established": names.there,
+        "supported_too": {
+            "there": supported.there,
+            "right": supported.is_right,
+            "effects_found": len(supported.found),
+            "wrong": supported.wrong,
+        },
         "misfit_nominal": nominal,
         "misfit_calibrated": calibrated,
         "misfit_corrected": fit["after"]["in_sample"],
@@ -122,40 +121,6 @@ def score_case(truth: dict, verdict: dict, baselines: dict, oracle: dict = NO_OR
     }
 
 
-def named_effects(verdict: dict) -> list[dict]:
-    """The effects that a verdict establishes; none unless it is `named` or `ambiguous`."""
-    if verdict["verdict"] not in ("named", "ambiguous"):
-        return []
-    return [e for e in verdict["effects"] if e.get("support", "established") == "established"]
-
-
-def rank_effects(verdict: dict, nuisance: Sequence[dict] = ()) -> list[dict]:
-    """The established effects of a verdict, most log evidence first, without those of `nuisance`:
-    physics that is there besides what is concealed.
-
-    The evidence is what is lost without the effect (`without[].evidence`), infinite where nothing
-    fits without it. Effects at shaft orders have none and come last.
-    """
-    rows, ranked = list(verdict["without"]), []
-    established = named_effects(verdict)
-    for effect in verdict["effects"]:
-        own = [r for r in rows if r["effect"] == effect["name"]]
-        row = next((r for r in own if _is_at(r["place"], effect["element"])), None)
-        evidence = -np.inf
-        if row is not None:
-            rows.remove(row)  # several of one name are in the same order in both lists
-            evidence = np.inf if row["evidence"] is None else row["evidence"]
-        counts = any(effect is each for each in established)
-        if counts and not any(effect is each for each in nuisance):
-            ranked.append((evidence, effect))
-    return [effect for _, effect in sorted(ranked, key=lambda pair: -pair[0])]
-
-
-def _is_at(place: str, element: str) -> bool:
-    """Whether a place, as "source (volume)" or "position 2", is at an element."""
-    return f"{place} ".startswith(f"{element} ")
-
-
 def is_remainder_at(effect: dict, remainder: dict | None, length: float) -> bool:
     """Whether what remains is within REMAINDER_TOLERANCE of an effect's actual or nominal position.
 
@@ -171,51 +136,6 @@ def is_remainder_at(effect: dict, remainder: dict | None, length: float) -> bool
         place = network["parameters"]["position"]["value"]
     distances = [abs(place - effect[key]) for key in ("position", "position_nominal")]
     return min(distances) <= REMAINDER_TOLERANCE * length
-
-
-def same_or_equivalent(name: str, other: str, classes: Sequence[set]) -> bool:
-    """Whether two names are equal or in one class of effects that cannot be told apart."""
-    return name == other or any({name, other} <= names for names in classes)
-
-
-def assign_claims(
-    true: Sequence[dict], named: Sequence[dict], classes: Sequence[set], length: float
-) -> list[dict | None]:
-    """For each true effect the named effect that counts for it, or None.
-
-    A named effect counts for one true effect at most, also where its class holds two. The
-    assignment finds as many true effects as possible; among those the most by their own names, and
-    then the most at their own places. `length` is the line's, m.
-    """
-    gain = np.zeros((len(true), len(named)))
-    for k, effect in enumerate(true):
-        for n, claim in enumerate(named):
-            if same_or_equivalent(claim["name"], effect["name"], classes):
-                same_name = claim["name"] == effect["name"]
-                gain[k, n] = 1e4 + 1e2 * same_name + is_place_right(effect, claim, length)
-    assigned = [None] * len(true)
-    for k, n in zip(*linear_sum_assignment(gain, maximize=True)):
-        if gain[k, n] > 0:
-            assigned[k] = named[n]
-    return assigned
-
-
-def is_place_right(effect: dict, claim: dict, length: float) -> bool:
-    """Whether a claim's element is the true one, or its position's interval holds the true one."""
-    position = claim["parameters"].get("position")
-    if effect["position"] is not None and position is not None:
-        return _holds_position(effect, position["ci95"], length)
-    return claim["element"] == effect["element"]
-
-
-def _holds_position(effect: dict, interval: Sequence[float], length: float) -> bool:
-    """Whether the widened interval holds the actual or the nominal position.
-
-    The calibrated line's metres are between the two.
-    """
-    low = interval[0] - POSITION_TOLERANCE * length
-    high = interval[1] + POSITION_TOLERANCE * length
-    return low <= effect["position"] <= high or low <= effect["position_nominal"] <= high
 
 
 def intervals_hold(effect: dict, claim: dict) -> list[bool]:

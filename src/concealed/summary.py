@@ -185,6 +185,40 @@ def method_table(rows: list[dict]) -> list[MethodScore]:
     ]
 
 
+class SupportScore(NamedTuple):
+    """Scores where effects of these levels count as named."""
+
+    levels: str
+    there: Rate
+    right: Rate
+    both: Rate
+    false_alarms: Rate
+    misnamed: Rate
+
+
+def support_table(rows: list[dict]) -> list[SupportScore]:
+    """The scores of established effects, and those where supported ones count as well."""
+
+    def scored(levels: str, result: Callable[[dict], dict]) -> SupportScore:
+        def results(*kinds: str) -> list[dict]:
+            return [result(row) for row in rows if row["kind"] in kinds]
+
+        plain = [result(row) for row in rows if row["kind"] == "single" and row["plain"]]
+        return SupportScore(
+            levels,
+            rate_of(there for row in rows for there in result(row)["there"]),
+            rate_of(each["right"] for each in plain),
+            rate_of(each["effects_found"] == 2 for each in results("pair")),
+            rate_of(bool(each["wrong"]) for each in results("none", "off")),
+            rate_of(bool(each["wrong"]) for each in results("outside")),
+        )
+
+    return [
+        scored("established", lambda row: row | {"there": row["established"]}),
+        scored("established or supported", lambda row: row["supported_too"]),
+    ]
+
+
 class PowerBin(NamedTuple):
     """Single effects whose change of the ripple lies between `low` and `high`."""
 

@@ -3,14 +3,8 @@
 import pytest
 
 from concealed.failures import failure
-from concealed.score import (
-    ACCEPTABLE_MISFIT,
-    assign_claims,
-    intervals_hold,
-    is_place_right,
-    score_baseline,
-    score_case,
-)
+from concealed.names import assign_claims, is_place_right
+from concealed.score import ACCEPTABLE_MISFIT, intervals_hold, score_baseline, score_case
 from concealed.tool import NO_BASELINES, crash_verdict
 from scored_cases import claim, effect, pair_truth, score_example, truth, verdict
 
@@ -127,7 +121,8 @@ def test_no_effect_and_effects_outside_the_library():
     elsewhere = verdict("named", claim("leak", position=(1.0, 1.2)))
     assert failure(score_example(there, elsewhere)) == "false alarm"
     only_supported = verdict("named", claim("leak") | {"support": "supported"})
-    assert failure(score_example(none, only_supported)) is None
+    row = score_example(none, only_supported)
+    assert failure(row) is None and row["supported_too"]["wrong"] == "leak"
     outside = truth(kind="outside")
     outside["effects"][0]["name"] = "resonator"
     assert failure(score_example(outside, verdict("unexplained"))) is None
@@ -292,6 +287,23 @@ def test_named_first_needs_an_established_name():
     assert not score_example(truth(effects=[spread]), with_evidence(both, sensor_gain=9.0))[
         "named_first"
     ]
+
+
+def test_supported_effects_count_in_scores_of_their_own():
+    """A leak that is supported only counts there and not among the named; a suggested one counts
+    nowhere; of a pair one is established and one supported, in an unexplained verdict none."""
+    leak, branch = claim("leak"), claim("side_branch") | {"support": "supported"}
+    row = score_example(pair_truth(), verdict("named", leak, branch))
+    assert row["effects_found"] == 1 and row["established"] == [True]
+    assert row["supported_too"] == {
+        "there": [True, True], "right": True, "effects_found": 2, "wrong": "",
+    }  # fmt: skip
+    suggested = claim("leak") | {"support": "suggested"}
+    said = verdict("unexplained", suggested, branch)
+    row = score_example(truth(), said)
+    assert row["named"] == "" and row["established"] == []
+    assert row["supported_too"]["there"] == [False]
+    assert row["supported_too"]["wrong"] == "side_branch" and not row["supported_too"]["right"]
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from concealed.summary import (
     rate_of,
     reliability_table,
     score_table,
+    support_table,
 )
 from scored_cases import claim, pair_truth, score_example, truth, verdict
 
@@ -66,6 +67,26 @@ def test_a_missed_effect_counts_only_where_the_data_support_it(rows):
     assert rates[supported] == Rate(1, 1)
     assert "do not support" in circumstance(rows[2])
     assert "support" in circumstance(rows[4]) and "not" not in circumstance(rows[4])
+
+
+def test_supported_effects_add_to_what_is_found_and_to_what_is_wrong():
+    """Of two leaks one is established and one supported; beside a third, established one a volume
+    that is not there is supported."""
+    established, supported = claim("leak"), claim("leak") | {"support": "supported"}
+    beside = verdict("named", established, claim("line_volume") | {"support": "supported"})
+    none = truth(kind="none", effects=[], change=0.0)
+    rows = [
+        score_example(truth(), verdict("named", established)),
+        score_example(truth(), verdict("unexplained", supported)),
+        score_example(truth(kind="outside"), beside),
+        score_example(none, verdict("unexplained", supported)),
+    ]
+    strict, wide = support_table(rows)
+    assert (strict.there, wide.there) == (Rate(2, 2), Rate(3, 5))
+    assert (strict.right, wide.right) == (Rate(1, 2), Rate(2, 2))
+    assert (strict.false_alarms, wide.false_alarms) == (Rate(0, 1), Rate(1, 1))
+    assert (strict.misnamed, wide.misnamed) == (Rate(0, 1), Rate(1, 1))
+    assert strict.both == Rate(0, 0)
 
 
 def test_every_kind_counts_in_its_own_scores(rows):
