@@ -186,7 +186,7 @@ class DifferentiableForward(ForwardModel):
 
     @property
     def _orifice_is_exact(self):
-        return not (self._freeze or self.freeze_compliance) and super()._orifice_is_exact
+        return not self._freeze and super()._orifice_is_exact
 
     def _balance(self, network, theta, whole):
         factor = self.twin.load_factor(theta)
@@ -196,7 +196,7 @@ class DifferentiableForward(ForwardModel):
                 network.load_outflow = factor * self._remainder
             return
         linear = network.load_state()
-        if self.freeze_compliance:
+        if self.freeze_compliance and whole is None:
             self._set_frozen_outflows(network)
             self._balance_load(network, theta)
         else:
