@@ -1,11 +1,12 @@
-"""The descent to a mode where no prediction exists."""
+"""The descent to a mode: its end, where no prediction exists, and the errors that it leaves."""
 
 import numpy as np
+import pytest
 
 from rippletwin.calibration.frequency_continuation import refine
 from rippletwin.calibration.levenberg_marquardt import descend
 from rippletwin.calibration.posterior import Posterior
-from synthetic_effects import AIR, MUCH_AIR, TRUTH
+from synthetic_effects import AIR, MUCH_AIR, TRUTH, VOLUME
 from synthetic_observations import POINTS, make
 
 
@@ -39,3 +40,23 @@ def test_descent_refuses_steps_to_infinite_predictions(monkeypatch):
     inside = truth.theta + 0.5 * np.eye(len(truth.theta))[0]
     fit = refine(base, (), observations, [inside])
     assert fit.twin.theta[0] >= boundary and np.isfinite(fit.evidence)
+
+
+@pytest.mark.parametrize("seed, turned_deg", [(0, 30), (1, 30), (2, 10), (2, 30)])
+def test_errors_at_the_end_are_the_likeliest_wherever_the_descent_began(seed, turned_deg):
+    """A shaft angle that is 10 or 30 degrees of a harmonic off makes errors look large. They shrink
+    with the angle, but not all the way by small steps: at the end no estimate that knows nothing of
+    the way makes the data likelier by more than 0.01; small steps alone leave 180 to 27000."""
+    rng = np.random.default_rng(seed)
+    source = 0.3 if seed == 2 else 0.1
+    _, observations, truth = make(rng, VOLUME, TRUTH, points=POINTS[:1], source=source, noise=500.0)
+    posterior, theta = Posterior(truth, observations), truth.theta.copy()
+    angle = truth.index["angle[point 1]"]
+    theta[angle] += np.deg2rad(turned_deg / 9) / 0.01
+    fixed = [k for k in range(len(theta)) if k != angle]
+    theta, value = descend(posterior, theta, 20, fixed)
+    prediction = posterior.predict(theta)
+    assert posterior.objective(theta, prediction) == pytest.approx(value, abs=1e-6)
+    fresh = Posterior(truth, observations)
+    fresh.estimate_errors(prediction, theta)
+    assert value < fresh.objective(theta, prediction) + 0.01

@@ -29,8 +29,8 @@ def descend(
     """Mode near theta (P,) and minus the log posterior there; infinite where theta is not valid.
 
     fixed      indices of the parameters that stay
-    errors     whether the errors of `model` are estimated again after each step; if not, only its
-               most likely source follows
+    errors     whether the errors of `model` are estimated again, near the last ones after each step
+               and anew where it ends; if not, only its most likely source follows
     converged  gain of a step below which it is the last
     damping    of the first step, relative to the diagonal of the Hessian
 
@@ -45,7 +45,7 @@ def descend(
     else:
         model.follow_source(prediction)
     value = model.objective(theta, prediction)
-    for _ in range(max_steps):
+    for done in range(1, max_steps + 1):
         r, jacobian = model.linearise(theta, prediction)
         jacobian = jacobian[:, free]
         gradient, hessian = jacobian.T @ r, jacobian.T @ jacobian
@@ -64,15 +64,23 @@ def descend(
                 accepted = True
                 break
             damping *= DAMPING_RISE
-        if not accepted:
+        gain = 0.0
+        if accepted:
+            damping = max(damping / DAMPING_FALL, MIN_DAMPING)
+            theta, prediction, gain = new, new_prediction, value - new_value
+            if errors:
+                model.estimate_errors(prediction, theta, near=True)
+            else:
+                model.follow_source(prediction)
+            value = model.objective(theta, prediction)
+        if gain >= converged and done < max_steps:
+            continue
+        if not errors:
             break
-        damping = max(damping / DAMPING_FALL, MIN_DAMPING)
-        theta, prediction, gain, value = new, new_prediction, value - new_value, new_value
-        if errors:
-            model.estimate_errors(prediction, theta, near=True)
-        else:
-            model.follow_source(prediction)
-        value = model.objective(theta, prediction)
-        if gain < converged:
+        # The errors have followed from those of the start, which may be far from the likeliest.
+        model.estimate_errors(prediction, theta)
+        before, value = value, model.objective(theta, prediction)
+        if before - value < converged:
             break
+        damping = FIRST_DAMPING
     return theta, value

@@ -61,10 +61,10 @@ MAX_DISAGREEMENT = 5.0
 all data, up to which they count as the same. Physics that is there rarely has more, an accumulator
 under the name of a volume has (docs/explanation/explain.md)."""
 DRIFT_SIGNIFICANCE = 1e-3  # p-value that both halves of a recording are of one state
-WIDE_PRIOR_MISFIT_RATIO = 2.0
-"""Between the accepted fit and a fit without an effect with wide priors. A fit that misfits less
-than this times the accepted misfit is a rival; one that misfits less by this factor refutes the
-effect."""
+WIDE_PRIOR_ERROR_RATIO = 2.0
+"""Between the accepted fit and a fit without an effect with wide priors. One whose misfit and model
+error are less than this times the accepted ones is a rival; one that misfits less by this factor
+refutes the effect."""
 
 # Shaft orders that are no multiples of the number of pistons
 

@@ -28,7 +28,7 @@ from rippletwin.explanation.thresholds import (
     LITTLE_MODEL_ERROR,
     MIN_LOG_BAYES_FACTOR,
     PULL_ALARM,
-    WIDE_PRIOR_MISFIT_RATIO,
+    WIDE_PRIOR_ERROR_RATIO,
 )
 from rippletwin.twin.parameters import coordinates
 from rippletwin.twin.twin import Twin
@@ -52,6 +52,9 @@ class PriorSensitivity:
     rivals     whether this fit is nearly as good as the accepted one, or little evidence is lost
     refutes    whether this fit is so much better, and so far from the data sheet, that the effect
                cannot be what is missing
+
+    A rival is nearly as good in its misfit and in its model error: where the nominal ripple is
+    wrong, misfits compare nothing; where a wrong ripple stands for an effect, model errors do not.
     """
 
     effect: str
@@ -122,13 +125,16 @@ def compare_without_each_effect(
                 unit=parameter.unit,
                 pull=pull,
                 rivals=bool(
-                    misfit < WIDE_PRIOR_MISFIT_RATIO * accepted_misfit
+                    (
+                        misfit < WIDE_PRIOR_ERROR_RATIO * accepted_misfit
+                        and wide.model_error < WIDE_PRIOR_ERROR_RATIO * accepted.model_error
+                    )
                     or lost < MIN_LOG_BAYES_FACTOR
                 ),
                 # A misfit below the model error says nothing.
                 refutes=bool(
                     pull > PULL_ALARM
-                    and WIDE_PRIOR_MISFIT_RATIO * max(misfit, LITTLE_MODEL_ERROR) < accepted_misfit
+                    and WIDE_PRIOR_ERROR_RATIO * max(misfit, LITTLE_MODEL_ERROR) < accepted_misfit
                 ),
             )
         )
@@ -140,7 +146,7 @@ def refit_with_wide_priors(
 ) -> list[tuple[float, Fit]]:
     """(misfit, fit) of each of `fits` refitted with wide priors.
 
-    Each starts from its mode and from that of `accepted`; the one with the smaller misfit is taken.
+    Each starts from its mode and from that of `accepted`; the one of more evidence is taken.
     """
     jobs = []
     for fit in fits:
@@ -160,8 +166,9 @@ def refit_with_wide_priors(
             jobs.append(
                 FitJob(fit.hypothesis, FromTheta(theta), base=base, source_free=fit.source_free)
             )
-    refits = [(score_fit(fit, workers.observations).misfit, fit) for fit in workers.fit(jobs)]
-    return [min(pair, key=lambda refit: refit[0]) for pair in zip(refits[::2], refits[1::2])]
+    refits = workers.fit(jobs)
+    best = [max(pair, key=lambda fit: fit.evidence) for pair in zip(refits[::2], refits[1::2])]
+    return [(score_fit(fit, workers.observations).misfit, fit) for fit in best]
 
 
 def widen_priors(rig: Rig) -> Rig:
