@@ -101,7 +101,7 @@ def draw_line_errors(rows: list[dict]) -> Figure:
         ax.set_xlabel(f"relative error of a segment's {quantity}")
     axes[0, 0].set_ylabel("share of segments below")
     if axes[0, 0].lines:
-        axes[0, 0].legend(loc="lower right")
+        axes[0, 0].legend(loc="upper left")
     return fig
 
 

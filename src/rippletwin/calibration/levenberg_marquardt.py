@@ -15,6 +15,7 @@ MAX_STEP = 1.5  # longest step of a coordinate, in prior standard deviations
 FIRST_DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-2, 1e-9, 1e6  # relative to the Hessian's diagonal
 DAMPING_RISE, DAMPING_FALL = 6.0, 8.0  # factors after a refused and after an accepted step
 MIN_CURVATURE = 1e-6  # of a coordinate, in the damping term
+OTHER_ERRORS_GAIN = 0.5  # of log posterior, by errors that are estimated anew: then it goes on
 
 
 def descend(
@@ -80,7 +81,7 @@ def descend(
         # The errors have followed from those of the start, which may be far from the likeliest.
         model.estimate_errors(prediction, theta)
         before, value = value, model.objective(theta, prediction)
-        if before - value < converged:
+        if before - value < OTHER_ERRORS_GAIN:
             break
         damping = FIRST_DAMPING
     return theta, value
