@@ -165,8 +165,23 @@ def refine(
         model.forward.freeze_compliance = True
     steps, converged = (MAX_STEPS[-1], ROUGHLY_CONVERGED) if rough else (MAX_LAST_STEPS, CONVERGED)
     modes = [descend(model, theta, steps, converged=converged) for theta in thetas]
-    best = min(modes, key=lambda mode: mode[1])[0]
+    best = _best_when_solved(model, modes)
     return conclude_fit(model, hypothesis, _unfreeze_and_refit(model, best, rounds))
+
+
+def _best_when_solved(model: ErrorModel, modes: Sequence[tuple[np.ndarray, float]]) -> np.ndarray:
+    """The theta (P,) of the likeliest of `modes` (theta, minus the log posterior), which have a
+    frozen compliance, with the compliance solved: frozen, they are of different lines."""
+    if len(modes) == 1 or not model.forward.has_nonlinear_compliance:
+        return min(modes, key=lambda mode: mode[1])[0]
+    values = []
+    model.forward.freeze_compliance = False
+    for theta, _ in modes:
+        prediction = model.predict(theta)
+        model.estimate_errors(prediction, theta)
+        values.append(model.objective(theta, prediction))
+    model.forward.freeze_compliance = True
+    return modes[int(np.argmin(values))][0]
 
 
 def _follow_best(model: ErrorModel, thetas: Sequence[np.ndarray]) -> list[np.ndarray]:
