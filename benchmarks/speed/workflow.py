@@ -19,7 +19,11 @@ DEFAULT_RUN, SMOKE_RUN = "RIPPLETWIN_BENCH_RUN", "RIPPLETWIN_BENCH_SMOKE"
 CORES = 2
 MOST_IMPORTS = 20.0  # per cent of a job's time
 SMOKE_MINUTES, MINUTES, MINUTES_WITH_BFLOAT16 = 3.0, 100.0, 60.0
-TAKEN = "from the first job's start to the last one's end; Snakemake's own start is not in it"
+LONGEST_WAIT_S = 60.0  # for the next job, while Snakemake plans; a longer one is an interruption
+TAKEN = (
+    "from the first job's start to the last one's end; neither Snakemake's own start nor an "
+    "interruption is in it"
+)
 
 
 def run(quick: bool = False) -> Result:
@@ -72,8 +76,12 @@ def default_minutes() -> float:
 
 def minutes_of(jobs: pd.DataFrame) -> float:
     """Length of a run (``jobs_of``): by the times of its files, which copies have lost, and never
-    less than all cores need for its jobs."""
-    taken = jobs.ended.max() - (jobs.ended - jobs.wall_s).min()
+    less than all cores need for its jobs. Waits of more than LONGEST_WAIT_S do not count: the run
+    was interrupted and continued."""
+    began = (jobs.ended - jobs.wall_s).sort_values()
+    all_ended = jobs.ended[began.index].cummax()  # the last end of the jobs that have begun
+    waits = (began - all_ended.shift()).clip(lower=0.0)
+    taken = all_ended.max() - began.min() - waits[waits > LONGEST_WAIT_S].sum()
     return max(taken, jobs.wall_s.sum() / CORES) / 60
 
 

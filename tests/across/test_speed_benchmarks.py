@@ -152,6 +152,14 @@ def test_time_of_a_run_by_hand(tmp_path, monkeypatch):
     assert workflow.minutes_of(workflow.jobs_of(copied)) == pytest.approx(0.2)
 
 
+def test_an_interruption_is_not_in_the_length_of_a_run(tmp_path):
+    """A job from 100 to 160 s holds another of 20 s; the next begins 40 s after it, which Snakemake
+    took, and lasts to 230 s. An hour later the last job takes 50 s: 180 s in all."""
+    jobs = {"train/a": (60, 160), "b": (20, 140), "c": (30, 230), "d": (50, 230 + 3650)}
+    taken = workflow.minutes_of(workflow.jobs_of(made_run(tmp_path, jobs)))
+    assert taken == pytest.approx((60 + 40 + 30 + 50) / 60)
+
+
 @pytest.mark.parametrize(("has", "minutes"), [(False, 100.0), (True, 60.0)])
 def test_target_of_the_default_run_is_that_of_the_processor(has, minutes, monkeypatch):
     """With either instruction for bfloat16 products an hour, without both 100 minutes."""
