@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from concealed.names import assign_claims, named_effects
+from concealed.names import judge_names
 from concealed.score import intervals_hold
 from opened_trial import check_opened, open_truth
 from rippletwin.case.load import load_case
@@ -59,12 +59,10 @@ def missed_intervals(trial: Path, rows: list[dict]) -> Iterator[str]:
         case = f"{row['case']:03d}"
         truth = open_truth(trial, case)
         verdict = json.loads((trial / "explained" / case / "verdict.json").read_text())
-        classes = [set(names) for names in [*verdict["equivalents"], *truth["classes"]]]
-        claims = assign_claims(truth["effects"], named_effects(verdict), classes, truth["length"])
-        for effect, claim in zip(truth["effects"], claims, strict=True):
+        for effect, claim in judge_names(truth, verdict).found:
             for name, value in effect["parameters"].items():
                 alone = effect | {"parameters": {name: value}}
-                if claim is not None and intervals_hold(alone, claim) == [False]:
+                if intervals_hold(alone, claim) == [False]:
                     stated = claim["parameters"][name]["value"]
                     yield (
                         f"case {row['case']}: {effect['name']} ({effect['element']}), {name}: "

@@ -89,7 +89,6 @@ def explain_case(setting: str, case: Path, out: Path) -> None:
 
 def score(trial: Path, out: Path, setting: str, cases: list[str]) -> dict:
     """Counts over the cases: see the columns of `table`."""
-    from concealed.names import named_effects
     from concealed.score import score_case
 
     rows = []
@@ -100,13 +99,12 @@ def score(trial: Path, out: Path, setting: str, cases: list[str]) -> dict:
         )
         truth = open_truth(trial, case)
         row = score_case(truth, verdict, baselines)
-        established = named_effects(verdict)
-        wrong = [name for name in row["wrong"].split(" + ") if name]
+        there = row["established"]
         z = [abs(each["z"]) for each in row["line_errors"]["corrected"]]
         rows.append(
             {
-                "true": len(established) - len(wrong),
-                "wrong": len(wrong),
+                "true": sum(there),
+                "wrong": len(there) - sum(there),
                 "found": row["effects_found"],
                 "concealed": len(truth["effects"]),
                 "held": sum(row["intervals_hold"]),

@@ -174,14 +174,8 @@ def _best_when_solved(model: ErrorModel, modes: Sequence[tuple[np.ndarray, float
     frozen compliance, with the compliance solved: frozen, they are of different lines."""
     if len(modes) == 1 or not model.forward.has_nonlinear_compliance:
         return min(modes, key=lambda mode: mode[1])[0]
-    values = []
-    model.forward.freeze_compliance = False
-    for theta, _ in modes:
-        prediction = model.predict(theta)
-        model.estimate_errors(prediction, theta)
-        values.append(model.objective(theta, prediction))
-    model.forward.freeze_compliance = True
-    return modes[int(np.argmin(values))][0]
+    thetas = [theta for theta, _ in modes]
+    return min(thetas, key=lambda theta: _objective_with_compliance(model, theta, own_errors=True))
 
 
 def _follow_best(model: ErrorModel, thetas: Sequence[np.ndarray]) -> list[np.ndarray]:
@@ -257,10 +251,16 @@ def _refreeze_compliance(
     return theta, value
 
 
-def _objective_with_compliance(model: ErrorModel, theta: np.ndarray) -> float:
-    """Minus the log posterior with the compliance solved, which is frozen from here on."""
+def _objective_with_compliance(
+    model: ErrorModel, theta: np.ndarray, own_errors: bool = False
+) -> float:
+    """Minus the log posterior with the compliance solved, which is frozen from here on; with the
+    likeliest errors there if `own_errors`, else with those that the model has."""
     model.forward.freeze_compliance = False
-    value = model.objective(theta, model.predict(theta))
+    prediction = model.predict(theta)
+    if own_errors:
+        model.estimate_errors(prediction, theta)
+    value = model.objective(theta, prediction)
     model.forward.freeze_compliance = True
     return value
 
