@@ -37,6 +37,7 @@ class ErrorModel(Protocol):
     prior                (P,) mask of the parameters that have a prior N(0, 1)
     source_free          whether the source is projected out of all observations
     needs_full_jacobian  whether fast derivatives may end a descent too far from the mode
+    errors_follow        whether errors that are estimated `near` the present ones depend on these
     model_error          relative error of the twin, set by `estimate_errors`
     max_model_error      the largest that `estimate_errors` sets
     """
@@ -46,6 +47,7 @@ class ErrorModel(Protocol):
     forward: Any
     prior: np.ndarray
     source_free: bool
+    errors_follow: bool
     model_error: float
     max_model_error: float
 

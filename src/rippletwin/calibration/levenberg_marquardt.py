@@ -76,7 +76,7 @@ def descend(
             value = model.objective(theta, prediction)
         if gain >= converged and done < max_steps:
             continue
-        if not errors:
+        if not errors or not model.errors_follow:
             break
         # The errors have followed from those of the start, which may be far from the likeliest.
         model.estimate_errors(prediction, theta)

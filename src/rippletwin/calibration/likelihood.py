@@ -66,7 +66,7 @@ class Likelihood:
     `estimate_errors`; `count` is the number of real data; `observations` are those used.
     """
 
-    source_free, smooth_sd = False, 0.0
+    source_free, smooth_sd, errors_follow = False, 0.0, False
     needs_full_jacobian = True
     """Derivatives that freeze the nonlinear load are wrong by up to 2 %. The model error may be far
     less, and then a descent by them ends too far from the mode."""

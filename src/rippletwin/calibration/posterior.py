@@ -34,6 +34,8 @@ class Posterior:
     `values` (S, F) are the measured values of all observations side by side, `power` (F,) is m.
     """
 
+    errors_follow = True
+
     def __init__(
         self,
         twin,
