@@ -45,7 +45,7 @@ rule diagnose_population:
     benchmark:
         f"{RESULTS}/benchmarks/diagnose_population/{{drawn}}.tsv"
     resources:
-        mem_mb=2000,
+        mem_mb=3000,
     params:
         out=subpath(output.diagnosis, parent=True),
         cache=f"{TRIAL}/cache",
