@@ -62,9 +62,11 @@ def solve(orders: np.ndarray) -> np.ndarray:
         np.array([MEAN_PRESSURE]),
         np.array([MEAN_FLOW / np.sqrt(MEAN_PRESSURE)]),
     )
-    relation, admittance = line.load_relation(), line.load[1]
-    line.load = ("state", load.solve(*relation, admittance, 1.0, tolerance=TOLERANCE))
-    return line.readings()
+
+    def solve_load(a, b, c):
+        return load.solve(a, b, c, line.load[1], 1.0, tolerance=TOLERANCE)
+
+    return line.read_with_load(solve_load)[2]
 
 
 def characteristics(steps: int) -> TimeDomainLine:
@@ -244,14 +246,14 @@ def bound(orders: np.ndarray, seconds: float) -> list[str]:
     parts = alternate(
         {
             "friction": lambda: series_impedance(s, **OIL, diameter=diameter),
-            "sweeps": lambda: (line.load_relation(), line.readings()),
+            "sweep": lambda: line.read_with_load(lambda a, b, c: (c / a, b)),
         },
         5,
     )
-    friction, sweeps = (float(np.median(parts[name])) for name in ("friction", "sweeps"))
+    friction, sweep = (float(np.median(parts[name])) for name in ("friction", "sweep"))
     return [
         f"Of {in_words(seconds)} for {len(orders)} frequencies, friction (a continued fraction at "
-        f"each frequency and segment) takes {100 * friction / seconds:.0f} %, the two sweeps along "
-        f"the line {100 * sweeps / seconds:.0f} %, and the orifice (a transform each way and pass) "
+        f"each frequency and segment) takes {100 * friction / seconds:.0f} %, the sweep along the "
+        f"line {100 * sweep / seconds:.0f} %, and the orifice (a transform each way and pass) "
         "the rest."
     ]

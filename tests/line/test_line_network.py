@@ -240,3 +240,25 @@ def test_some_frequencies_are_columns_of_all():
     line.sensor_factor = np.tile(1.0 + 1e-5 * S, (len(SENSORS), 1))
     which = np.array([0, 3])
     assert np.allclose(line.at_frequencies(which).readings(), line.readings()[:, which], rtol=1e-12)
+
+
+@pytest.mark.parametrize("leaks", [False, True])
+def test_one_sweep_reads_what_the_load_makes(leaks):
+    """The two solutions of the line, in the shares that a load asks for, are the readings with
+    that load; the state at the load obeys its law and the line's own equation."""
+    admittance = 1e-10 + 2e-15 * S
+    line = network(S, inserts=with_inserts(S), load=("admittance", admittance))
+    line.source_flow, line.source_admittance = 1e-5 * np.arange(1.0, 5.0), 1e-13 * S
+    line.sensor_positions = SENSORS
+    line.sensor_factor = np.tile(1.0 + 1e-5 * S, (len(SENSORS), 1))
+    if leaks:
+        line.outflows = np.array([1.0, 4.0]), 1e-6 * np.ones((2, 4), complex)
+
+    def solve_load(a, b, c):
+        p = c / (a + b * admittance)
+        return p, admittance * p
+
+    p, q, readings = line.read_with_load(solve_load)
+    a, b, c = line.load_relation()
+    assert np.allclose(a * p + b * q, c, rtol=1e-12)
+    assert np.allclose(readings, line.readings(), rtol=1e-10)

@@ -70,7 +70,7 @@ class DifferentiableForward(ForwardModel):
     def predict_held(self, theta: np.ndarray) -> list[np.ndarray]:
         """The prediction at theta (P,) with everything nonlinear as it was solved last."""
         with self._held():
-            return self._read(self.network(theta), theta)
+            return self._read(self.network(theta), None, theta)
 
     @contextmanager
     def _held(self) -> Iterator[None]:
@@ -194,19 +194,20 @@ class DifferentiableForward(ForwardModel):
             self._set_frozen_outflows(network)
             if self.load.orifice is not None:
                 network.load_outflow = factor * self._remainder
-            return
+            return None
         linear = network.load_state()
         if self.freeze_compliance and whole is None:
             self._set_frozen_outflows(network)
-            self._balance_load(network, theta)
+            pressure = self._balance_load(network, theta)
         else:
-            super()._balance(network, theta, whole)
+            pressure = super()._balance(network, theta, whole)
         if network.outflows is not None:
             positions, outflow = network.outflows
             self._outflows = positions / network.length, outflow
         if self.load.orifice is not None:
             p, q = network.load[1]
             self._remainder = (q - linear[1] / linear[0] * p) / factor
+        return pressure
 
     @cached_property
     def _extended_for_compliance(self):

@@ -80,7 +80,7 @@ class ForwardModel:
         self.compliance_solver = NonlinearComplianceSolver(periodic, self.order)
 
     def __call__(self, theta: np.ndarray) -> list[np.ndarray]:
-        return self._read(self.network(theta), theta)
+        return self._read(*self._solve(theta), theta)
 
     def _known_amplitude(self) -> np.ndarray:
         """(F,) by which the ripple of each recording is multiplied where load and compliance are
@@ -97,11 +97,15 @@ class ForwardModel:
         in the shaft's frame, and a ripple so small that load and line are linear."""
         network = self._linear(theta)
         network.source_flow = self.source.turn(theta)
-        return self._read(network, theta)
+        return self._read(network, None, theta)
 
-    def _read(self, network: FrequencyDomainLine, theta: np.ndarray) -> list[np.ndarray]:
-        """What each observation reads of `network`, (S, F)."""
-        pressure = network.readings() if len(network.sensor_positions) else None
+    def _read(
+        self, network: FrequencyDomainLine, pressure: np.ndarray | None, theta: np.ndarray
+    ) -> list[np.ndarray]:
+        """What each observation reads of `network`, (S, F); `pressure` are its readings where they
+        are known."""
+        if pressure is None and len(network.sensor_positions):
+            pressure = network.readings()
         impedance = None
         predicted = []
         for o, part, rows in zip(self.observations, self.slices, self.rows):
@@ -121,7 +125,11 @@ class ForwardModel:
     def network(self, theta: np.ndarray) -> FrequencyDomainLine:
         """The line with source, effects and load at `theta` (P,); nonlinear load and compliance are
         solved at full amplitude."""
-        whole = None
+        return self._solve(theta)[0]
+
+    def _solve(self, theta: np.ndarray) -> tuple[FrequencyDomainLine, np.ndarray | None]:
+        """`network`, and its readings (S, F) where the sweep that solved the load has them."""
+        whole = pressure = None
         if self.load.orifice is not None and self._orifice_is_exact:
             wide, seen = self._extended_for_orifice
             whole = wide._linear(theta)
@@ -129,8 +137,8 @@ class ForwardModel:
         else:
             network = self._linear(theta)
         if self.load.orifice is not None or (network.nonlinear_compliances and self._periodic):
-            self._balance(network, theta, whole)
-        return network
+            pressure = self._balance(network, theta, whole)
+        return network, pressure
 
     @property
     def _orifice_is_exact(self) -> bool:
@@ -263,8 +271,9 @@ class ForwardModel:
 
     def _balance(
         self, network: FrequencyDomainLine, theta: np.ndarray, whole: FrequencyDomainLine | None
-    ) -> None:
-        """Set the full-amplitude state at the load of `network`, and its outflows.
+    ) -> np.ndarray | None:
+        """Set the full-amplitude state at the load of `network`, and its outflows; returns the
+        readings (S, F) where they are known.
 
         Both are solved in a model with harmonics above those observed; `whole` is its line where
         only the orifice is nonlinear.
@@ -286,25 +295,29 @@ class ForwardModel:
             network.outflows = positions, outflow[:, seen] / self.amplitude
             if self.load.orifice is not None:
                 network.load = "state", tuple(state)
-        else:
-            wide, seen = self._extended_for_orifice
-            whole.source_flow = whole.source_flow * wide.amplitude
-            pressure, flow = wide.load.balance(whole, self.twin.load_factor(theta))
-            self.solved = wide.load.solved
-            here = self.amplitude
-            network.load = "state", (pressure[seen] / here, flow[seen] / here)
+            return None
+        wide, seen = self._extended_for_orifice
+        whole.source_flow = whole.source_flow * wide.amplitude
+        solution = wide.load.balance(whole, self.twin.load_factor(theta))
+        self.solved = wide.load.solved
+        p, q, pressure = (x[..., seen] / self.amplitude for x in solution)
+        network.load = "state", (p, q)
+        return pressure
 
-    def _balance_load(self, network: FrequencyDomainLine, theta: np.ndarray) -> None:
-        """Set the full-amplitude state at the load of `network`, whose outflows are given."""
+    def _balance_load(self, network: FrequencyDomainLine, theta: np.ndarray) -> np.ndarray | None:
+        """`_balance` of the load alone; the outflows of `network` are given."""
+        pressure = None
         if self.load.orifice is not None:
             scaled = copy(network)
             scaled.source_flow = network.source_flow * self.amplitude
             if network.outflows is not None:
                 positions, outflow = network.outflows
                 scaled.outflows = positions, outflow * self.amplitude
-            state = self.load.balance(scaled, self.twin.load_factor(theta))
-            network.load = "state", tuple(x / self.amplitude for x in state)
+            solution = self.load.balance(scaled, self.twin.load_factor(theta))
+            p, q, pressure = (x / self.amplitude for x in solution)
+            network.load = "state", (p, q)
         self.solved = self.load.solved
+        return pressure
 
     @cached_property
     def _extended_for_compliance(self) -> tuple[ForwardModel, np.ndarray]:

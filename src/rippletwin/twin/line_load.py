@@ -87,11 +87,10 @@ class LineLoad:
 
     def balance(
         self, network: FrequencyDomainLine, factor: float, **accuracy: float
-    ) -> tuple[np.ndarray, np.ndarray]:
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Pressure and flow (F,), Pa and m3/s, at the load of `network`, as the function of
-        `make_solver` finds them."""
-        solve_load = self.make_solver(network, factor, **accuracy)
-        return solve_load(*network.load_relation())
+        `make_solver` finds them, and what the sensors read, (S, F) Pa."""
+        return network.read_with_load(self.make_solver(network, factor, **accuracy))
 
     def make_solver(
         self, network: FrequencyDomainLine, factor: float, **accuracy: float

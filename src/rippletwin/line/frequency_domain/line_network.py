@@ -16,7 +16,7 @@ load: nothing overflows however large the loss, and only numbers of like size ar
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -168,9 +168,26 @@ class FrequencyDomainLine:
 
         This is Thévenin's theorem without its division, so it holds at resonance too.
         """
-        _, _, entry, decay = self.sweep([(1.0, 0.0), (0.0, 1.0)])
+        return self._relate_load(*self.sweep([(1.0, 0.0), (0.0, 1.0)])[2:])
+
+    def _relate_load(self, entry, decay):
+        """`load_relation` from what `sweep` gives at x = 0 for the load states (1, 0), (0, 1)."""
         a, b, *forced = entry[:, 1] + self.source_admittance * entry[:, 0]
         return a, b, self.source_flow * decay - sum(forced)
+
+    def read_with_load(self, solve_load: Callable) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Pressure (F,), Pa, and flow (F,), m3/s, at a load of any law, and `readings` (S, F) with
+        it.
+
+        `solve_load` maps a, b, c of `load_relation` to that pressure and flow. One sweep gives both
+        the relation and what each of its two solutions makes at the sensors.
+        """
+        pressure, _, *at_pump = self.sweep([(1.0, 0.0), (0.0, 1.0)], self.sensor_positions)
+        p, q = solve_load(*self._relate_load(*at_pump))
+        read = pressure[:, 0] * p + pressure[:, 1] * q
+        if self.outflows is not None:
+            read += pressure[:, 2]
+        return p, q, read * self.sensor_factor / at_pump[1]
 
     def thevenin_at_load(self) -> tuple[np.ndarray, np.ndarray]:
         """Open-circuit pressure (F,) Pa and source impedance (F,) Pa s/m3 seen by the load."""
