@@ -66,7 +66,7 @@ def solve(orders: np.ndarray) -> np.ndarray:
     def solve_load(a, b, c):
         return load.solve(a, b, c, line.load[1], 1.0, tolerance=TOLERANCE)
 
-    return line.read_with_load(solve_load)[2]
+    return line.balance_load(solve_load).readings
 
 
 def characteristics(steps: int) -> TimeDomainLine:
@@ -246,7 +246,7 @@ def bound(orders: np.ndarray, seconds: float) -> list[str]:
     parts = alternate(
         {
             "friction": lambda: series_impedance(s, **OIL, diameter=diameter),
-            "sweep": lambda: line.read_with_load(lambda a, b, c: (c / a, b)),
+            "sweep": lambda: line.balance_load(lambda a, b, c: (c / a, b)),
         },
         5,
     )

@@ -244,9 +244,9 @@ def test_some_frequencies_are_columns_of_all():
 
 @pytest.mark.parametrize("leaks", [False, True])
 def test_one_sweep_reads_what_the_load_makes(leaks):
-    """The two solutions of the line, in the shares that a load asks for, are the readings with
-    that load; the state at the load obeys its law and the line's own equation."""
-    admittance = 1e-10 + 2e-15 * S
+    """The two solutions of the line, in the shares that a load asks for, are the readings of a
+    sweep with that load: one that passes a flow beyond its linear part, and the linear part."""
+    admittance, beyond = 1e-10 + 2e-15 * S, (3.0 - 2.0j) * 1e-6 * np.ones(len(S))
     line = network(S, inserts=with_inserts(S), load=("admittance", admittance))
     line.source_flow, line.source_admittance = 1e-5 * np.arange(1.0, 5.0), 1e-13 * S
     line.sensor_positions = SENSORS
@@ -255,10 +255,11 @@ def test_one_sweep_reads_what_the_load_makes(leaks):
         line.outflows = np.array([1.0, 4.0]), 1e-6 * np.ones((2, 4), complex)
 
     def solve_load(a, b, c):
-        p = c / (a + b * admittance)
-        return p, admittance * p
+        p = (c - b * beyond) / (a + b * admittance)
+        return p, admittance * p + beyond
 
-    p, q, readings = line.read_with_load(solve_load)
-    a, b, c = line.load_relation()
-    assert np.allclose(a * p + b * q, c, rtol=1e-12)
-    assert np.allclose(readings, line.readings(), rtol=1e-10)
+    found = line.balance_load(solve_load)
+    assert np.allclose(found.linear_readings, line.readings(), rtol=1e-10)
+    line.load_outflow = beyond
+    assert np.allclose(found.readings, line.readings(), rtol=1e-10)
+    assert np.abs(found.readings / found.linear_readings - 1.0).max() > 0.01

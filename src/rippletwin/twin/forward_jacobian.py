@@ -56,7 +56,7 @@ class DifferentiableForward(ForwardModel):
         pump = {k for k, *_ in self.source.changes}
         apart = {*self._sensors, *self._angles, *self._positions, *pump}
         self._together = [k for k in range(len(names)) if k not in apart]
-        self._remainder = self._outflows = self._frozen_at = None
+        self._remainder = self._outflows = self._frozen_at = self._linear_readings = None
         self._freeze = False
         self.freeze_compliance = False
         self.jacobian_correction: np.ndarray | None = None
@@ -70,7 +70,7 @@ class DifferentiableForward(ForwardModel):
     def predict_held(self, theta: np.ndarray) -> list[np.ndarray]:
         """The prediction at theta (P,) with everything nonlinear as it was solved last."""
         with self._held():
-            return self._read(self.network(theta), None, theta)
+            return self._read(self.network(theta), theta)
 
     @contextmanager
     def _held(self) -> Iterator[None]:
@@ -117,6 +117,8 @@ class DifferentiableForward(ForwardModel):
         if self.load.orifice is None:
             return None
         self._solve_at(theta)
+        if self._linear_readings is not None:
+            return self._linear_readings
         network = self._linear(theta)
         self._set_frozen_outflows(network)
         return network.readings()
@@ -198,16 +200,17 @@ class DifferentiableForward(ForwardModel):
         linear = network.load_state()
         if self.freeze_compliance and whole is None:
             self._set_frozen_outflows(network)
-            pressure = self._balance_load(network, theta)
+            balance = self._balance_load(network, theta)
         else:
-            pressure = super()._balance(network, theta, whole)
+            balance = super()._balance(network, theta, whole)
+        self._linear_readings = balance and balance.linear_readings
         if network.outflows is not None:
             positions, outflow = network.outflows
             self._outflows = positions / network.length, outflow
         if self.load.orifice is not None:
             p, q = network.load[1]
             self._remainder = (q - linear[1] / linear[0] * p) / factor
-        return pressure
+        return balance
 
     @cached_property
     def _extended_for_compliance(self):

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
+from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine, LoadBalance
 from rippletwin.line.frequency_domain.nonlinear_compliance import NonlinearComplianceSolver
 from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
 from rippletwin.twin.effects.base import LineState
@@ -80,7 +80,8 @@ class ForwardModel:
         self.compliance_solver = NonlinearComplianceSolver(periodic, self.order)
 
     def __call__(self, theta: np.ndarray) -> list[np.ndarray]:
-        return self._read(*self._solve(theta), theta)
+        network, balance = self._solve(theta)
+        return self._read(network, theta, balance and balance.readings)
 
     def _known_amplitude(self) -> np.ndarray:
         """(F,) by which the ripple of each recording is multiplied where load and compliance are
@@ -97,10 +98,10 @@ class ForwardModel:
         in the shaft's frame, and a ripple so small that load and line are linear."""
         network = self._linear(theta)
         network.source_flow = self.source.turn(theta)
-        return self._read(network, None, theta)
+        return self._read(network, theta)
 
     def _read(
-        self, network: FrequencyDomainLine, pressure: np.ndarray | None, theta: np.ndarray
+        self, network: FrequencyDomainLine, theta: np.ndarray, pressure: np.ndarray | None = None
     ) -> list[np.ndarray]:
         """What each observation reads of `network`, (S, F); `pressure` are its readings where they
         are known."""
@@ -127,18 +128,19 @@ class ForwardModel:
         solved at full amplitude."""
         return self._solve(theta)[0]
 
-    def _solve(self, theta: np.ndarray) -> tuple[FrequencyDomainLine, np.ndarray | None]:
-        """`network`, and its readings (S, F) where the sweep that solved the load has them."""
-        whole = pressure = None
+    def _solve(self, theta: np.ndarray) -> tuple[FrequencyDomainLine, LoadBalance | None]:
+        """`network`, and what was found with the state at its load."""
+        whole = balance = None
         if self.load.orifice is not None and self._orifice_is_exact:
             wide, seen = self._extended_for_orifice
             whole = wide._linear(theta)
             network = whole.at_frequencies(seen)
+            self._last_linear = np.asarray(theta, float).tobytes(), copy(network)
         else:
             network = self._linear(theta)
         if self.load.orifice is not None or (network.nonlinear_compliances and self._periodic):
-            pressure = self._balance(network, theta, whole)
-        return network, pressure
+            balance = self._balance(network, theta, whole)
+        return network, balance
 
     @property
     def _orifice_is_exact(self) -> bool:
@@ -271,9 +273,9 @@ class ForwardModel:
 
     def _balance(
         self, network: FrequencyDomainLine, theta: np.ndarray, whole: FrequencyDomainLine | None
-    ) -> np.ndarray | None:
-        """Set the full-amplitude state at the load of `network`, and its outflows; returns the
-        readings (S, F) where they are known.
+    ) -> LoadBalance | None:
+        """Set the full-amplitude state at the load of `network`, and its outflows; returns what was
+        found with that state where one sweep gives all of it.
 
         Both are solved in a model with harmonics above those observed; `whole` is its line where
         only the orifice is nonlinear.
@@ -298,26 +300,26 @@ class ForwardModel:
             return None
         wide, seen = self._extended_for_orifice
         whole.source_flow = whole.source_flow * wide.amplitude
-        solution = wide.load.balance(whole, self.twin.load_factor(theta))
+        found = wide.load.balance(whole, self.twin.load_factor(theta))
         self.solved = wide.load.solved
-        p, q, pressure = (x[..., seen] / self.amplitude for x in solution)
-        network.load = "state", (p, q)
-        return pressure
+        balance = LoadBalance(*(x[..., seen] / self.amplitude for x in found))
+        network.load = "state", (balance.pressure, balance.flow)
+        return balance
 
-    def _balance_load(self, network: FrequencyDomainLine, theta: np.ndarray) -> np.ndarray | None:
+    def _balance_load(self, network: FrequencyDomainLine, theta: np.ndarray) -> LoadBalance | None:
         """`_balance` of the load alone; the outflows of `network` are given."""
-        pressure = None
+        balance = None
         if self.load.orifice is not None:
             scaled = copy(network)
             scaled.source_flow = network.source_flow * self.amplitude
             if network.outflows is not None:
                 positions, outflow = network.outflows
                 scaled.outflows = positions, outflow * self.amplitude
-            solution = self.load.balance(scaled, self.twin.load_factor(theta))
-            p, q, pressure = (x / self.amplitude for x in solution)
-            network.load = "state", (p, q)
+            found = self.load.balance(scaled, self.twin.load_factor(theta))
+            balance = LoadBalance(*(x / self.amplitude for x in found))
+            network.load = "state", (balance.pressure, balance.flow)
         self.solved = self.load.solved
-        return pressure
+        return balance
 
     @cached_property
     def _extended_for_compliance(self) -> tuple[ForwardModel, np.ndarray]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rippletwin.case.model import Rig
-from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
+from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine, LoadBalance
 from rippletwin.line.frequency_domain.orifice_load import OrificeLoad
 from rippletwin.twin.operating_point import OperatingPoint
 from rippletwin.twin.unknown_load import unknown_impedance
@@ -87,10 +87,10 @@ class LineLoad:
 
     def balance(
         self, network: FrequencyDomainLine, factor: float, **accuracy: float
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Pressure and flow (F,), Pa and m3/s, at the load of `network`, as the function of
-        `make_solver` finds them, and what the sensors read, (S, F) Pa."""
-        return network.read_with_load(self.make_solver(network, factor, **accuracy))
+    ) -> LoadBalance:
+        """State at the load of `network`, as the function of `make_solver` finds it, and readings
+        with it."""
+        return network.balance_load(self.make_solver(network, factor, **accuracy))
 
     def make_solver(
         self, network: FrequencyDomainLine, factor: float, **accuracy: float

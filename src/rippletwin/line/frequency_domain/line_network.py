@@ -43,6 +43,16 @@ class Insert(NamedTuple):
     immittance: np.ndarray
 
 
+class LoadBalance(NamedTuple):
+    """Pressure (F,), Pa, and flow (F,), m3/s, at a load; what the sensors then read, (S, F) Pa, and
+    what they would read if the load were linear."""
+
+    pressure: np.ndarray
+    flow: np.ndarray
+    readings: np.ndarray
+    linear_readings: np.ndarray
+
+
 @dataclass
 class FrequencyDomainLine:
     """Source, line and load at the F values of `s`; SI units, peak amplitudes.
@@ -175,19 +185,24 @@ class FrequencyDomainLine:
         a, b, *forced = entry[:, 1] + self.source_admittance * entry[:, 0]
         return a, b, self.source_flow * decay - sum(forced)
 
-    def read_with_load(self, solve_load: Callable) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Pressure (F,), Pa, and flow (F,), m3/s, at a load of any law, and `readings` (S, F) with
-        it.
+    def balance_load(self, solve_load: Callable) -> LoadBalance:
+        """The state at a load of any law, and the readings with it and with the linear `load`.
 
-        `solve_load` maps a, b, c of `load_relation` to that pressure and flow. One sweep gives both
-        the relation and what each of its two solutions makes at the sensors.
+        `solve_load` maps a, b, c of `load_relation` to pressure and flow at the load. One sweep
+        gives both the relation and what each of its two solutions makes at the sensors.
         """
         pressure, _, *at_pump = self.sweep([(1.0, 0.0), (0.0, 1.0)], self.sensor_positions)
-        p, q = solve_load(*self._relate_load(*at_pump))
-        read = pressure[:, 0] * p + pressure[:, 1] * q
-        if self.outflows is not None:
-            read += pressure[:, 2]
-        return p, q, read * self.sensor_factor / at_pump[1]
+        forced = np.sum(pressure[:, 2:], axis=1)
+        factor = self.sensor_factor / at_pump[1]
+
+        def read(p, q):
+            return factor * (pressure[:, 0] * p + pressure[:, 1] * q + forced)
+
+        a, b, c = self._relate_load(*at_pump)
+        p, q = solve_load(a, b, c)
+        linear_p, linear_q = self.load_state()
+        scale = c / (a * linear_p + b * linear_q)
+        return LoadBalance(p, q, read(p, q), read(scale * linear_p, scale * linear_q))
 
     def thevenin_at_load(self) -> tuple[np.ndarray, np.ndarray]:
         """Open-circuit pressure (F,) Pa and source impedance (F,) Pa s/m3 seen by the load."""
