@@ -246,7 +246,7 @@ def bound(orders: np.ndarray, seconds: float) -> list[str]:
     parts = alternate(
         {
             "friction": lambda: series_impedance(s, **OIL, diameter=diameter),
-            "sweep": lambda: line.balance_load(lambda a, b, c: (c / a, b)),
+            "sweep": lambda: line.balance_load(lambda a, b, c: (c / a, 0.0 * b)),
         },
         5,
     )

@@ -60,8 +60,7 @@ def run(quick: bool = False) -> Result:
             "Wall seconds of each rule, summed over its jobs, as the run itself recorded them.",
             "Imports are the processor seconds that the rule's script needs for them on this "
             "machine; a share is over the job's wall seconds, at most all of them.",
-            "The runs found compiled code in place; the first run in a clone compiles it, which "
-            "makes the smoke run about a minute longer.",
+            "The first run in a clone takes longer, because it compiles code.",
         ],
         claims=claims,
         tables=tables,

@@ -67,6 +67,21 @@ def test_a_frozen_compliance_leaves_a_linear_one_and_the_orifice_exact(hypothesi
     assert (np.linalg.norm(difference) < 1e-12 * np.linalg.norm(exact)) == (hypothesis is VOLUME)
 
 
+def test_readings_with_a_linear_load_are_those_of_a_small_ripple():
+    """With a linear orifice the readings are the source's flow times the response to a unit flow,
+    whatever was solved before at other values."""
+    rng = np.random.default_rng(7)
+    _, observations, truth = make(rng, VOLUME, TRUTH)
+    forward = DifferentiableForward(truth, observations)
+    theta = truth.theta + 0.1 * rng.normal(size=len(truth.theta))
+    response = np.concatenate(ForwardModel(truth, observations).unit_response(theta), 1)
+    linear = response * forward.source.at(theta)[0]
+    full = np.concatenate(forward(theta), 1)
+    forward.network(truth.theta)
+    assert np.linalg.norm(forward.linear_load(theta) - linear) < 1e-10 * np.linalg.norm(linear)
+    assert np.linalg.norm(full - linear) > 1e-4 * np.linalg.norm(linear)
+
+
 @pytest.mark.parametrize("load, tolerance", [(Load("closed"), 1e-9), (None, 0.03)])
 def test_lines_side_by_side_read_what_each_reads_alone(load, tolerance):
     """Twenty lines of other wave speeds, solved at once, against one at a time: the same with a

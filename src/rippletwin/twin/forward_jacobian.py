@@ -203,7 +203,6 @@ class DifferentiableForward(ForwardModel):
             balance = self._balance_load(network, theta)
         else:
             balance = super()._balance(network, theta, whole)
-        self._linear_readings = balance and balance.linear_readings
         if network.outflows is not None:
             positions, outflow = network.outflows
             self._outflows = positions / network.length, outflow
@@ -218,10 +217,12 @@ class DifferentiableForward(ForwardModel):
         wide.compliance_solver.warm_start = True
         return wide, seen
 
-    def __call__(self, theta):
-        prediction = super().__call__(theta)
-        self._frozen_at = np.array(theta)
-        return prediction
+    def _solve(self, theta):
+        network, balance = super()._solve(theta)
+        if not self._freeze:
+            self._frozen_at = np.array(theta)
+            self._linear_readings = balance and balance.linear_readings
+        return network, balance
 
     def _set_frozen_outflows(self, network):
         """Set the frozen outflows of `network`, at the same shares of its length."""

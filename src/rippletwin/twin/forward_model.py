@@ -302,9 +302,7 @@ class ForwardModel:
         whole.source_flow = whole.source_flow * wide.amplitude
         found = wide.load.balance(whole, self.twin.load_factor(theta))
         self.solved = wide.load.solved
-        balance = LoadBalance(*(x[..., seen] / self.amplitude for x in found))
-        network.load = "state", (balance.pressure, balance.flow)
-        return balance
+        return self._take_balance(network, found, seen)
 
     def _balance_load(self, network: FrequencyDomainLine, theta: np.ndarray) -> LoadBalance | None:
         """`_balance` of the load alone; the outflows of `network` are given."""
@@ -316,9 +314,17 @@ class ForwardModel:
                 positions, outflow = network.outflows
                 scaled.outflows = positions, outflow * self.amplitude
             found = self.load.balance(scaled, self.twin.load_factor(theta))
-            balance = LoadBalance(*(x / self.amplitude for x in found))
-            network.load = "state", (balance.pressure, balance.flow)
+            balance = self._take_balance(network, found, slice(None))
         self.solved = self.load.solved
+        return balance
+
+    def _take_balance(
+        self, network: FrequencyDomainLine, found: LoadBalance, seen: np.ndarray | slice
+    ) -> LoadBalance:
+        """Set the load of `network` to the columns `seen` of a balance at the known amplitude of
+        the ripple; returns these columns at that of `network`."""
+        balance = LoadBalance(*(x[..., seen] / self.amplitude for x in found))
+        network.load = "state", (balance.pressure, balance.flow)
         return balance
 
     @cached_property

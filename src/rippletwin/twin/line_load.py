@@ -85,12 +85,10 @@ class LineLoad:
         """Whether the last balance of the orifice is a steady state; True without an orifice."""
         return self.orifice is None or self.orifice.solved
 
-    def balance(
-        self, network: FrequencyDomainLine, factor: float, **accuracy: float
-    ) -> LoadBalance:
+    def balance(self, network: FrequencyDomainLine, factor: float) -> LoadBalance:
         """State at the load of `network`, as the function of `make_solver` finds it, and readings
         with it."""
-        return network.balance_load(self.make_solver(network, factor, **accuracy))
+        return network.balance_load(self.make_solver(network, factor))
 
     def make_solver(
         self, network: FrequencyDomainLine, factor: float, **accuracy: float
