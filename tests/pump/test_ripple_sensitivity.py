@@ -17,6 +17,7 @@ from rippletwin.pump.ripple_sensitivity import ripple_change
 from rippletwin.pump.simulation import simulate
 from rippletwin.spectra.observation import Observation
 from rippletwin.twin import twin_file
+from rippletwin.twin.flow_source import pump_changes
 from rippletwin.twin.forward_jacobian import DifferentiableForward
 from rippletwin.twin.propagation import propagate
 from rippletwin.twin.twin import Twin
@@ -93,7 +94,7 @@ def test_parabolas_predict_other_pumps(numbers):
         mean = float(np.mean(o.flow_ripple.flow))
         predicted = sheet.copy()
         names = ("modulus", "timing")
-        for name, (_, change) in zip(names, twin.pump_changes(o.speed_hz, pressure)):
+        for name, (_, change) in zip(names, pump_changes(twin, o.speed_hz, pressure)):
             u = numbers.get(name, 0.0)
             predicted = predicted + np.array([u, u**2]) @ change.harmonics(o.orders, mean)
         other = flow_harmonics(ripple(speed_rpm, pressure, **numbers), o.orders)
@@ -106,7 +107,7 @@ def test_operating_points_that_hardly_differ_share_their_changes():
     of the ripple at three standard deviations, against the change at the pressure itself."""
     o, pressure = observations()[0], POINTS[0][1]
     twin, names = Twin(bench(), [o], uncertain_pump=True), ("bulk_modulus", "port_timing")
-    one, other = (twin.pump_changes(o.speed_hz * x, pressure * x) for x in (1.0, 1.00005))
+    one, other = (pump_changes(twin, o.speed_hz * x, pressure * x) for x in (1.0, 1.00005))
     sheet, mean = flow_harmonics(o.flow_ripple, o.orders), float(np.mean(o.flow_ripple.flow))
     for (k, change), (_, again), name in zip(one, other, names):
         assert change.above is again.above and change.below is again.below

@@ -12,6 +12,7 @@ from rippletwin.harmonics import one_period, peak_amplitudes, resample_period
 from rippletwin.line.time_domain import method_of_characteristics
 from rippletwin.line.time_domain.line_elements import End, Pipe, TimeDomainLine, capacitance
 from rippletwin.twin.effects.base import LineState
+from rippletwin.twin.flow_source import pump_changes
 from rippletwin.twin.operating_point import guessed_flow
 from rippletwin.twin.time_domain_form import apply_in_time, series_elements
 from rippletwin.twin.twin import Twin
@@ -140,7 +141,7 @@ def pump_change(twin: Twin, healthy_flow, speed_hz: float, load_pressure: float)
     flow, capacity = np.zeros(count), 0.0
     pumping = np.array([2j * np.pi * speed_hz * twin.rig.pump.get("pistons", 1)])
     orders = np.arange(1, (count - 1) // 2 + 1)
-    for k, change in twin.pump_changes(speed_hz, load_pressure):
+    for k, change in pump_changes(twin, speed_hz, load_pressure):
         u = twin.theta[k]
         spectrum = np.array([u, u**2]) @ change.harmonics(orders, mean)
         flow += one_period(spectrum, count, orders)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rippletwin.line.time_domain.state_space import StateSpace, fit_state_space
+from rippletwin.twin.flow_source import pump_changes
 from rippletwin.twin.forward_model import ForwardModel
 from rippletwin.twin.operating_point import OperatingCondition
 from rippletwin.twin.twin import Twin
@@ -38,7 +39,7 @@ def line_response(twin: Twin, condition, frequency_hz: np.ndarray) -> np.ndarray
     if ripple is not None:
         chambers = ripple.source_admittance(line.s)
         if np.any(chambers):  # a ripple that is given is an ideal source
-            for k, change in twin.pump_changes(condition.speed_hz, condition.load_pressure):
+            for k, change in pump_changes(twin, condition.speed_hz, condition.load_pressure):
                 chambers = chambers + twin.theta[k] * change.source_admittance(line.s)
         line.source_admittance = line.source_admittance + chambers
     return np.vstack([line.pressure_at([0.0]), line.readings()])

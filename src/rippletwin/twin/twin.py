@@ -57,10 +57,6 @@ from rippletwin.twin.priors import Priors
 SOURCE_SD = 0.05
 """Largest relative standard deviation of a nominal flow ripple's harmonics."""
 
-OPERATING_STEP = 0.0002
-"""Relative distance of the speeds and load pressures at which changes of the pump's ripple are
-calculated. The error of the ripple is below a tenth of the least model error."""
-
 
 class Arrays(NamedTuple):
     """The line at one theta, in SI units: segments (n,), sensors (S,); kinematic viscosity and load
@@ -323,29 +319,3 @@ class Twin:
             load = replace(load, coefficient=load.coefficient * v.load)
         fluid = replace(self.rig.fluid, kinematic_viscosity=float(v.viscosity))
         return replace(self.rig, line=line, sensors=sensors, load=load, fluid=fluid)
-
-    def pump_changes(self, speed_hz: float, load_pressure: float) -> list[tuple]:
-        """(index, `RippleChange`) of each parameter of the pump, at rev/s and load pressure in Pa;
-        empty where there are no such parameters.
-
-        Operating points that differ by less than OPERATING_STEP have the same changes, so that the
-        halves of a recording, or a mean pressure that a fit moves, take no further simulation.
-        """
-        if not self.uncertain_pump or not np.isfinite(load_pressure):
-            return []
-        from rippletwin.pump.ripple_sensitivity import ripple_change
-
-        speed_hz, load_pressure = (
-            float(np.exp(OPERATING_STEP * np.round(np.log(x) / OPERATING_STEP)))
-            for x in (speed_hz, load_pressure)
-        )
-        rig, changes = self.rig, []
-        for k, p in enumerate(self.parameters):
-            if p.place != "pump":
-                continue
-            ends = p.value(1.0), p.value(-1.0)
-            change = ripple_change(
-                rig.pump, rig.fluid, 60.0 * speed_hz, load_pressure, p.name, ends
-            )
-            changes.append((k, change))
-        return changes
