@@ -9,6 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from run_costs import by_rule, jobs_of
+from speed import run_trainings
 from speed.machine import describe
 from speed.result import Chart, Claim, Result, Table
 from speed.starting import SCRIPTS, script_seconds
@@ -20,6 +21,7 @@ CORES = 2
 MOST_IMPORTS = 20.0  # per cent of a job's time
 SMOKE_MINUTES, MINUTES, MINUTES_WITH_BFLOAT16 = 3.0, 100.0, 60.0
 LONGEST_WAIT_S = 60.0  # for the next job, while Snakemake plans; a longer one is an interruption
+TRAININGS = "Wall seconds of the default run's trainings, all seeds of a network on a dataset"
 TAKEN = (
     "from the first job's start to the last one's end; neither Snakemake's own start nor an "
     "interruption is in it"
@@ -28,12 +30,13 @@ TAKEN = (
 
 def run(quick: bool = False) -> Result:
     """Minutes, charts and tables of the finished runs that are named; imports are measured here."""
-    claims, tables, charts, notes = [], [], [], []
+    claims, tables, charts, bound, notes = [], [], [], [], []
     for text, variable, target in (
         ("default run, images of 64 pixels, two cores", DEFAULT_RUN, default_minutes()),
         ("smoke run, two cores", SMOKE_RUN, SMOKE_MINUTES),
     ):
-        jobs = jobs_of(Path(os.environ.get(variable, "not_there")))
+        results = Path(os.environ.get(variable, "not_there"))
+        jobs = jobs_of(results)
         if jobs.empty:
             claims.append(Claim(text, None, target, "min", at_least=False))
             notes.append(f"Not measured: no finished run was named in {variable}.")
@@ -43,6 +46,10 @@ def run(quick: bool = False) -> Result:
         name, rules = text.split(",")[0], rules_of(jobs)
         claims += import_claims(name, jobs)
         tables.append(cost_table(f"Costs of the {name} by rule", rules))
+        if variable == DEFAULT_RUN:
+            seconds = run_trainings.training_seconds(results)
+            tables.append(run_trainings.training_table(TRAININGS, seconds))
+            bound += run_trainings.bound_sentences(results, seconds, jobs.wall_s.sum(), CORES)
         charts.append(
             Chart(
                 file=f"{name.replace(' ', '_')}.svg",
@@ -64,6 +71,7 @@ def run(quick: bool = False) -> Result:
         ],
         claims=claims,
         tables=tables,
+        bound=bound,
         notes=notes,
         charts=charts,
     )

@@ -19,6 +19,7 @@ from speed import (
     line_frequency_domain,
     line_time_domain,
     machine,
+    run_trainings,
     starting,
     training,
     workflow,
@@ -158,6 +159,29 @@ def test_an_interruption_is_not_in_the_length_of_a_run(tmp_path):
     jobs = {"train/a": (60, 160), "b": (20, 140), "c": (30, 230), "d": (50, 230 + 3650)}
     taken = workflow.minutes_of(workflow.jobs_of(made_run(tmp_path, jobs)))
     assert taken == pytest.approx((60 + 40 + 30 + 50) / 60)
+
+
+def test_costs_and_operations_of_trainings_by_hand(tmp_path):
+    """CNN1D 341@100, two channels. The first kernel has 59 places on a window (the paper's table),
+    30 after pooling, with 64 maps: 2 x 59 x 64 x 2 x 341 operations, and 2 x 30 x 64 x 64 x 3 in
+    the second layer. A step needs twice those of the first layer and three times those of the
+    second; a fifth of the samples is predicted. Two seeds have three epochs of 400 samples, of the
+    randomised dataset one of 1600. Recordings count in the seconds alone."""
+    made_run(
+        tmp_path, {f"train/{d}/cnn1d_341_100": (10.0, 9) for d in ("CFD-MOC-P", "experimental")}
+    )
+    made_run(tmp_path, {"train/CFD-MOC-PR/cnn1d_341_100": (25.0, 9)})
+    for dataset, epochs in {"CFD-MOC-P": (1, 2), "CFD-MOC-PR": (1,), "experimental": (5,)}.items():
+        path = tmp_path / "models" / dataset / "cnn1d_341_100.json"
+        path.parent.mkdir(parents=True)
+        path.write_text(json.dumps([{"validation_loss": [1.0] * n} for n in epochs]))
+    seconds = run_trainings.training_seconds(tmp_path)
+    table = run_trainings.training_table("made", seconds)
+    assert table.rows[-1] == ["all", "10", "25", "10", "45"]
+    first, second = 2 * 59 * 64 * 2 * 341, 2 * 30 * 64 * 64 * 3
+    sample = 0.8 * (2 * first + 3 * second) + 0.2 * (first + second)
+    found = run_trainings.operations_of_run(tmp_path)
+    assert found == pytest.approx((3 * 400 + 1600) * sample)
 
 
 @pytest.mark.parametrize(("has", "minutes"), [(False, 100.0), (True, 60.0)])
