@@ -15,6 +15,11 @@ from rippletwin.figures.fault_posterior import plot_change, plot_severity
 from rippletwin.figures.line_drawing import plot_place
 
 NETWORKS, STATES = ["CNN1D (341@100)", "CNN2D (7×7@2)"], ["H", "S", "C1"]
+DATASETS = (
+    "CFD-P CFD-MOC-P CFD-MOC-P+ CFD-Q CFD-Q+ CFD-MOC-PR CFD-MOC-PRA CFD-QR experimental".split()
+)
+ACCURACIES = dict.fromkeys(DATASETS, np.array([[90.0, 3.0]] * 2))
+RANKS = NETWORKS, [False, True], np.full((2, 2), 0.9), np.full((2, 2), 80.0)
 ANGLES, HZ = np.arange(0, 360, 7.5), np.geomspace(30, 1500, 16)
 RIPPLES = {"calibrated": 2e5 * np.sin(np.deg2rad([ANGLES] * 2))}
 SHARES = [["", "24% of it on the orange 24%", "called C1: 100%"]] * 2
@@ -39,17 +44,22 @@ DRAWN = {
     "accuracy": lambda: diagnosis.plot_accuracy(
         NETWORKS, {"CFD-P": np.array([[90.0, 3.0]] * 2)}, {"CFD-P": np.array([[80.0, 2.0]] * 2)}
     ),
+    "accuracy, all datasets": lambda: diagnosis.plot_accuracy(NETWORKS, ACCURACIES, ACCURACIES),
     "images": lambda: diagnosis.plot_sst(dict(zip(STATES, ALIKE)), HZ, 16.7, 9),
     "attention": lambda: attention.plot_windows(
         NETWORKS, STATES, ALIKE[:, 0], np.stack([ALIKE[:, 0]] * 2), SHARES, "ripple / bar"
     ),
     "attention in images": lambda: attended(region=False),
     "attention in images, marked": lambda: attended(region=True),
-    "ranks": lambda: attention.plot_ranks(
-        {"CFD-P": (NETWORKS, [False, True], np.full((2, 2), 0.9), np.full((2, 2), 80.0))}
-    ),
+    "ranks": lambda: attention.plot_ranks({"CFD-P": RANKS}),
+    "ranks, all datasets": lambda: attention.plot_ranks(dict.fromkeys(DATASETS[:-1], RANKS)),
     "claims": lambda: attention.plot_claims(
-        {"Images are better": (["a network", "another"], np.array([[5.0, 2, 8], [-3, -9, 1]]))}
+        {
+            "Images are better": (
+                ["a network", "CFD-MOC-P+: " + " − ".join(NETWORKS)],
+                np.array([[5.0, 2, 8], [-3, -9, 1]]),
+            )
+        }
     ),
     "ripple": lambda: plot_ripple(made_numbers()),
     "ripple, nothing found": lambda: plot_ripple(made_numbers(found=False)),
@@ -72,6 +82,9 @@ def texts(figure):
         for tick in [*axis.get_major_ticks(), *axis.get_minor_ticks()]:
             if not low <= tick.get_loc() <= high:
                 beyond |= {tick.label1, tick.label2}
+    for ax in figure.axes:
+        if not ax.get_visible():
+            beyond |= set(ax.findobj(Text))
     drawn = [t for t in figure.findobj(Text) if t.get_visible() and t not in beyond]
     return [t for t in drawn if t.get_text().strip()]
 

@@ -109,26 +109,23 @@ def plot_ranks(
     groups : dataset -> names, whether each judges images (A,), alignment (A, 2) and accuracy
     (A, 2) in per cent, mean and standard deviation over seeds.
     """
-    columns = min(3, len(groups))
-    fig, axes = style.figure(-(-len(groups) // columns), columns, height=2.7, sharey=True)
-    for ax in axes.flat[len(groups) :]:
-        ax.set_visible(False)
+    fig, axes = style.panels(len(groups), 3, height=2.7, sharey=True)
     kind = {name: square for group in groups.values() for name, square in zip(*group[:2])}
     colours = {
         name: style.CYCLE[[n for n in kind if kind[n] == kind[name]].index(name)] for name in kind
     }
-    for ax, (dataset, (labels, image, aligned, accuracy)) in zip(axes.flat, groups.items()):
+    for ax, (dataset, (labels, image, aligned, accuracy)) in zip(axes, groups.items()):
         for name, square, x, y in zip(labels, image, aligned, accuracy):
             ax.errorbar(
                 x[0], y[0], xerr=x[1], yerr=y[1], fmt="s" if square else "o", ms=5, elinewidth=0.6,
                 color=colours[name], label=name, mfc="white" if square else None,
             )  # fmt: skip
         ax.axvline(1, color=style.NEUTRAL, lw=0.8, ls=":")
-        ax.set(title=dataset, ylim=(-3, 103), xlabel="alignment of attention (1: chance)")
+        ax.set(title=dataset, ylim=(-3, 103), xlabel="alignment (1: chance)")
     fig.suptitle("Are networks that attend to the simulated fault right more often?")
     fig.supylabel("accuracy on recordings / %", fontsize=9)
     handles: dict[str, object] = {}
-    for ax in axes.flat:
+    for ax in axes:
         handles |= {label: handle for handle, label in zip(*ax.get_legend_handles_labels())}
     fig.legend(handles.values(), handles, loc="outside lower center", ncols=4, fontsize=7)
     return fig
@@ -156,7 +153,7 @@ def plot_claims(groups: Mapping[str, tuple[Sequence[str], np.ndarray]]) -> Figur
         ax.set_yticks(rows, labels, fontsize=6)
         ax.set_ylim(max(1, len(rows)) - 0.5, -0.5)
     fig.suptitle("Do these networks support the paper's claims?")
-    axes[-1].set_xlabel("difference of accuracy / % of the windows, 95 % interval over recordings")
+    axes[-1].set_xlabel("difference of accuracy / %, 95 % interval over recordings")
     style.legend_below(fig, axes[0])
     return fig
 

@@ -49,9 +49,9 @@ def plot_accuracy(
 
     ours, paper: dataset -> (A, 2) mean and standard deviation in per cent, NaN where absent.
     """
-    fig, axes = style.figure(1, len(ours), height=3.4, sharey=True)
+    fig, axes = style.panels(len(ours), 5, height=3.0, sharey=True)
     rows = np.arange(len(architectures))
-    for ax, dataset in zip(axes[0], ours):
+    for ax, dataset in zip(axes, ours):
         mean, spread = np.asarray(ours[dataset]).T
         ax.barh(rows, mean, xerr=spread, color=style.CALIBRATED, height=0.6, label="rippletwin")
         if dataset in paper:
@@ -61,10 +61,10 @@ def plot_accuracy(
             )
         ax.set_title(dataset, fontsize=8)
         ax.set(xlim=(0, 105), xlabel="accuracy / %")
-    axes[0, 0].set_yticks(rows, architectures)
-    axes[0, 0].invert_yaxis()
+    axes[0].set_yticks(rows, architectures)
+    axes[0].invert_yaxis()
     fig.suptitle("How often are the networks right on recordings?")
-    style.legend_below(fig, axes[0, 0])
+    style.legend_below(fig, axes[0])
     return fig
 
 

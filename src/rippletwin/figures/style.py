@@ -49,6 +49,16 @@ def figure(rows: int = 1, columns: int = 1, height: float = 2.2, **kwargs):
     return fig, fig.subplots(rows, columns, squeeze=False, **kwargs)
 
 
+def panels(count: int, most_columns: int, height: float, **kwargs):
+    """A figure of `count` panels in rows of at most `most_columns`, `height` inches a row, and the
+    axes of its panels."""
+    columns = min(most_columns, count)
+    fig, axes = figure(-(-count // columns), columns, height, **kwargs)
+    for ax in axes.flat[count:]:
+        ax.set_visible(False)
+    return fig, list(axes.flat[:count])
+
+
 def plain(text: str) -> str:
     """A name that a user gave, drawn as it is: between two $ matplotlib would read mathematics."""
     return text.replace("$", r"\$")
