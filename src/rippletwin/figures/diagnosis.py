@@ -17,12 +17,8 @@ def plot_confusion(
     matrices: Mapping[str, np.ndarray], truth: Sequence[str], predicted: Sequence[str]
 ) -> Figure:
     """Confusion matrices, one panel a name: (len(truth), len(predicted)) shares of a row."""
-    columns = min(5, len(matrices))
-    rows = -(-len(matrices) // columns)
-    fig, axes = style.figure(rows, columns, height=1.7, sharex=True, sharey=True)
-    for ax in axes.flat[len(matrices) :]:
-        ax.set_visible(False)
-    for ax, (name, matrix) in zip(axes.flat, matrices.items()):
+    fig, axes = style.panels(len(matrices), 5, height=1.7, sharex=True, sharey=True)
+    for ax, (name, matrix) in zip(axes, matrices.items()):
         ax.imshow(matrix, vmin=0, vmax=1, cmap="Blues", aspect="auto")
         for (i, j), share in np.ndenumerate(matrix):
             ax.text(
@@ -84,15 +80,11 @@ def plot_sst(
     and the pumping frequency. Time runs over two revolutions. `top` ends the colour scale, which is
     then of square roots, so that weak ridges show beside strong ones.
     """
-    columns = min(columns, len(images))
-    rows = -(-len(images) // columns)
-    fig, axes = style.figure(rows, columns, height=2.4, sharex=True, sharey=True)
-    for ax in axes.flat[len(images) :]:
-        ax.set_visible(False)
+    fig, axes = style.panels(len(images), columns, height=2.4, sharex=True, sharey=True)
     low = min(float(np.min(image)) for image in images.values())
     norm = PowerNorm(0.5 if top else 1, low, top or max(np.max(image) for image in images.values()))
     log_axis = np.log(frequency_hz)
-    for ax, (name, image) in zip(axes.flat, images.items()):
+    for ax, (name, image) in zip(axes, images.items()):
         mesh = ax.imshow(
             image, origin="lower", aspect="auto", cmap=style.SEQUENTIAL, norm=norm,
             extent=(0, 2, log_axis[0], log_axis[-1]),
