@@ -58,7 +58,7 @@ def analyse(index: int) -> tuple[float, float, np.ndarray, np.ndarray]:
             change = ripple_change(
                 sheet["pump"], fluid, point.speed_rpm, point.load_pressure, name, pair
             )
-            own[:, j] = change.harmonics(orders, float(np.mean(flows[0])))[0]
+            own[:, j] = change.harmonics(orders, float(np.mean(flows[0])))[1]
         own[:, 2 + k] = 1j * orders * a
         columns.append(own)
         errors.append(aligned(b, a, orders) - a)

@@ -17,11 +17,10 @@ from rippletwin.explanation.fit_jobs import Continuation, FitJob, FromTheta, Wor
 from rippletwin.explanation.fit_starts import transfer_theta
 from rippletwin.explanation.search.stepwise_search import SHAFT_ORDER_EFFECTS
 from rippletwin.explanation.stages.preparation import observe_all, select_fitted_as
-from rippletwin.explanation.stages.staged_search import prepare_stage
+from rippletwin.explanation.stages.staged_search import prepare_stage, settle_ripple
 from rippletwin.twin.effects.base import Effect, Place
 from rippletwin.twin.effects.library import candidates, next_instance
 from rippletwin.twin.parameters import coordinates
-from rippletwin.twin.pump_line_coupling import couple_pump_to_line
 
 
 def fit_from_truth(case_folder: str | Path, truth: dict) -> dict:
@@ -112,12 +111,8 @@ def held_out_misfit(workers: Workers, fit: Fit, early: Sequence, late: Sequence)
     A simulated pump responds to the line first, as in `explain`. `early` and `late` are the
     observations of the halves of periodic recordings.
     """
-    coupled = couple_pump_to_line(fit.twin, workers.observations)
-    if coupled is not None:
-        workers = Workers(make_base(workers.base.rig, coupled), coupled)
-        theta = transfer_theta(fit, fit.hypothesis, workers.base)
-        (fit,) = workers.fit([FitJob(fit.hypothesis, FromTheta(theta))])
-    data = workers.observations
+    data, fit = settle_ripple(workers.base, workers.observations, fit)
+    workers = Workers(make_base(workers.base.rig, data), data)
     early, late = (select_fitted_as(half, fit.twin.rig, data) for half in (early, late))
     halves = (early[0], late[0]) if len(data) == 1 and late else None
     return float(score_held_out(workers, fit, halves).misfit)

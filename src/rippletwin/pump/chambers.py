@@ -204,7 +204,10 @@ def _take_steps(
         c_new = line_p[1] - (zc - half) * line_q[1] if piped else outlet[i]
         for k in range(n):
             content[k], _ = compression(p[k], pump[0], pump[1])
-        c_stage = c_old + GAMMA * (c_new - c_old)
+        # With twice its curvature at the stage, a pressure that is given leaves the flow of a wide
+        # port, which is its derivative, right to second order at the end of the step.
+        bend = 0.0 if piped else outlet[(i + 1) % len(flow)] - 2.0 * c_new + c_old
+        c_stage = c_old + GAMMA * (c_new - c_old + (GAMMA - 0.5) * bend)
         first = solve_stage(
             p, rate, content, GAMMA * step, stage_tables[i], pump, case_leak, cross_leak,
             c_stage, impedance, matrix, rhs,

@@ -12,13 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 
 from rippletwin.case.model import Fluid
 from rippletwin.harmonics import peak_amplitudes
-from rippletwin.pump.outlets import ConstantPressure
+from rippletwin.pump.outlets import ConstantPressure, PressureWave
 from rippletwin.pump.simulation import PumpRipple, simulate
 
 KEYS = {
@@ -33,39 +33,58 @@ KEYS = {
 }
 """Names of the uncertain parameters -> keys of `Geometry`."""
 
+CACHED = 512  # simulations: seventeen an operating point, of some 0.3 MB
 STEPS_PER_REVOLUTION = 6144  # enough for differences between runs, whose errors are alike
+STEPS_AGAINST_WAVE = 3072  # no chamber stands for others then, and only changes near by matter
 
 
 @dataclass(frozen=True)
 class RippleChange:
-    """The parabola through three ripples: a parameter at its nominal value, and one standard
+    """The parabola through three ripples: a parameter at the value of a pump, and one standard
     deviation above and below.
 
-    turn   rad, by which the shaft angle of the ripple above is advanced and that below retarded:
-           the shaft angle is unknown anyway, and without its change the parabola fits further
+    turns    rad, by which the shaft angles of the ripples are advanced, above, there and below:
+             the shaft angle is unknown anyway, and without its change the parabola fits further
+    centre   coordinate of the value there; 0 is the data sheet's
+    speed_hz of the shaft, rev/s
     """
 
     above: PumpRipple
-    nominal: PumpRipple
+    there: PumpRipple
     below: PumpRipple
-    turn: float
+    turns: tuple[float, float, float]
+    centre: float
+    speed_hz: float
 
     def harmonics(self, orders: np.ndarray, mean_flow: float) -> np.ndarray:
-        """Slope and curvature (2, F), m3/s peak, at positive shaft `orders` (F,): a parameter at
-        coordinate u adds u times the slope and u^2 times the curvature to a ripple of mean flow
-        `mean_flow`, m3/s, whatever its origin."""
+        """What coordinates 1, u and u^2 are multiplied with, (3, F), m3/s peak, at positive shaft
+        `orders` (F,): together they are added to a ripple of mean flow `mean_flow`, m3/s, whatever
+        its origin, at coordinate u."""
         orders = np.asarray(orders, int)
+        above, there, below = (
+            self._source(ripple, orders) * np.exp(1j * orders * turn)
+            for ripple, turn in zip((self.above, self.there, self.below), self.turns)
+        )
+        scale = 0.5 * mean_flow / np.mean(self.there.flow)
+        slope, curvature = above - below, above + below - 2.0 * there
+        c = self.centre
+        return scale * np.array(
+            [(c * curvature - slope) * c, slope - 2.0 * c * curvature, curvature]
+        )
 
-        def at(ripple, turn):
-            count = len(ripple.flow)
-            spectrum = np.append(peak_amplitudes(ripple.flow), 0.0)
-            return spectrum[np.minimum(orders, count // 2 + 1)] * np.exp(1j * orders * turn)
+    def _source(self, ripple: PumpRipple, orders: np.ndarray) -> np.ndarray:
+        """Flow (F,), m3/s peak, into a constant pressure, which with the admittance of the chambers
+        delivers what `ripple` does at its outlet's pressure."""
 
-        above, nominal, below = (
-            at(self.above, self.turn), at(self.nominal, 0.0), at(self.below, -self.turn)
-        )  # fmt: skip
-        scale = 0.5 * mean_flow / np.mean(self.nominal.flow)
-        return scale * np.array([above - below, above + below - 2.0 * nominal])
+        def at_orders(period):
+            spectrum = np.append(peak_amplitudes(period), 0.0)
+            return spectrum[np.minimum(orders, len(period) // 2 + 1)]
+
+        flow = at_orders(ripple.flow)
+        if ripple.meets_ripple:
+            s = 2j * np.pi * self.speed_hz * orders
+            flow = flow + ripple.source_admittance(s) * at_orders(ripple.outlet_pressure)
+        return flow
 
     def source_admittance(self, s: np.ndarray) -> np.ndarray:
         """Change of the source admittance (F,), m3/(Pa s), by one standard deviation."""
@@ -73,24 +92,42 @@ class RippleChange:
 
 
 def ripple_change(
-    pump: Mapping, fluid: Fluid, speed_rpm: float, pressure: float, name: str, ends: tuple
+    pump: Mapping,
+    fluid: Fluid,
+    speed_rpm: float,
+    pressure: float | np.ndarray,
+    name: str,
+    ends: tuple,
+    centre: float = 0.0,
+    advance: float = 0.0,
 ) -> RippleChange:
-    """`RippleChange` of a pump that delivers into `pressure` (Pa), with the values `ends` of its
-    parameter `name` of KEYS above and below. Simulations are cached."""
+    """`RippleChange` of a pump, with the values `ends` of its parameter `name` of KEYS above and
+    below its coordinate `centre`.
+
+    pressure   Pa, into which it delivers: a number, or a period (M,) over a revolution
+    advance    rad, by which the shaft angle of its own ripple is advanced
+
+    The last simulations are cached.
+    """
+    outlet = float(pressure) if np.ndim(pressure) == 0 else np.asarray(pressure, float).tobytes()
 
     def run(**changed) -> PumpRipple:
         numbers = {k: v for k, v in {**pump, **changed}.items() if v is not None}
-        return _simulate_cached(
-            tuple(sorted(numbers.items())), fluid, float(speed_rpm), float(pressure)
-        )
+        return _simulate_cached(tuple(sorted(numbers.items())), fluid, float(speed_rpm), outlet)
 
     above, below = (run(**{KEYS[name]: float(end)}) for end in ends)
-    turn = 0.5 * np.radians(ends[0] - ends[1]) if name == "port_timing" else 0.0
-    return RippleChange(above, run(), below, float(turn))
+    turn = 0.5 * float(np.radians(ends[0] - ends[1])) if name == "port_timing" else 0.0
+    turns = advance + turn, advance, advance - turn
+    return RippleChange(above, run(), below, turns, centre, speed_rpm / 60.0)
 
 
-@cache
-def _simulate_cached(pump: tuple, fluid: Fluid, speed_rpm: float, pressure: float) -> PumpRipple:
+@lru_cache(maxsize=CACHED)
+def _simulate_cached(
+    pump: tuple, fluid: Fluid, speed_rpm: float, outlet: float | bytes
+) -> PumpRipple:
+    if isinstance(outlet, bytes):
+        wave = PressureWave(np.frombuffer(outlet))
+        return simulate(dict(pump), fluid, speed_rpm, wave, min_steps=STEPS_AGAINST_WAVE)
     return simulate(
-        dict(pump), fluid, speed_rpm, ConstantPressure(pressure), min_steps=STEPS_PER_REVOLUTION
+        dict(pump), fluid, speed_rpm, ConstantPressure(outlet), min_steps=STEPS_PER_REVOLUTION
     )

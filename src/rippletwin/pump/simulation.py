@@ -53,6 +53,12 @@ class PumpRipple(FlowRipple):
     geometry: Geometry | None = None
     density: float | None = None
 
+    @property
+    def meets_ripple(self) -> bool:
+        """Whether the pressure at the outlet changes within a revolution, by more than rounding."""
+        assert self.outlet_pressure is not None  # a result of `simulate`
+        return bool(np.ptp(self.outlet_pressure) > 1e-9 * np.max(np.abs(self.outlet_pressure)))
+
     def source_admittance(self, s: np.ndarray) -> np.ndarray:
         """Admittance (F,), m3/(Pa s), of the chambers, beside the flow into a constant pressure.
 

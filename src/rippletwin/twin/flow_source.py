@@ -23,7 +23,8 @@ calculated. The error of the ripple is below a tenth of the least model error.""
 class FlowSource:
     """The sources of observations whose frequencies are side by side in `slices`.
 
-    flow        (F,) of the nominal ripple, m3/s; 1 where there is none: a free source
+    flow        (F,) of the nominal ripple, m3/s, with the pump's parameters at coordinates 0; 1
+                where there is none: a free source
     admittance  (F,) of the pump's chambers parallel to it, m3/(Pa s)
     changes     (index, slope and curvature (2, F) of the flow, slope (F,) of the admittance) for
                 each of the pump's parameters, by its coordinate
@@ -49,13 +50,16 @@ class FlowSource:
             s = 2j * np.pi * o.frequency_hz
             self.flow[part] = flow_harmonics(point.ripple, o.orders)
             self.admittance[part] = point.ripple.source_admittance(s)
-            for k, slopes, own in _changes_at(twin, o, point):
+            ideal = not np.any(self.admittance[part])  # a ripple given is an ideal source
+            for k, polynomial, own in _changes_at(twin, o, point):
                 flow, added = changes.setdefault(
                     k, (np.zeros((2, count), complex), np.zeros(count, complex))
                 )
-                flow[:, part] = slopes
-                if np.any(self.admittance[part]):  # a ripple given is an ideal source
-                    added[part] = own
+                self.flow[part] += polynomial[0]
+                flow[:, part] = polynomial[1:]
+                if not ideal:
+                    self.admittance[part] += own[0]
+                    added[part] = own[1]
         self.changes = [(k, *each) for k, each in changes.items()]
         self._changing = np.array([k for k, *_ in self.changes], int)
         self._slopes, self._curvatures = (
@@ -84,34 +88,50 @@ class FlowSource:
         return turn
 
 
-def pump_changes(twin: Twin, speed_hz: float, load_pressure: float) -> list[tuple]:
+def pump_changes(
+    twin: Twin, speed_hz: float, load_pressure: float, ripple: FlowRipple | None = None
+) -> list[tuple]:
     """(index, `RippleChange`) of each parameter of the pump, at rev/s and load pressure in Pa;
     empty where there are no such parameters.
 
+    They are about the pump that `ripple` is simulated with, against the pressure at its outlet, in
+    the frame of the data sheet's port plate. Where it is not simulated, they are about the data
+    sheet's pump.
     Operating points that differ by less than OPERATING_STEP have the same changes, so that the
     halves of a recording, or a mean pressure that a fit moves, take no further simulation.
     """
     if not twin.uncertain_pump or not np.isfinite(load_pressure):
         return []
-    from rippletwin.pump.ripple_sensitivity import ripple_change
+    from rippletwin.pump.ripple_sensitivity import KEYS, ripple_change
+    from rippletwin.pump.simulation import PumpRipple
 
     speed_hz, load_pressure = (
         float(np.exp(OPERATING_STEP * np.round(np.log(x) / OPERATING_STEP)))
         for x in (speed_hz, load_pressure)
     )
     rig, changes = twin.rig, []
-    for k, p in enumerate(twin.parameters):
-        if p.place != "pump":
-            continue
-        ends = p.value(1.0), p.value(-1.0)
-        change = ripple_change(rig.pump, rig.fluid, 60.0 * speed_hz, load_pressure, p.name, ends)
+    uncertain = [(k, p) for k, p in enumerate(twin.parameters) if p.place == "pump"]
+    values = sheet = {p.name: p.nominal for _, p in uncertain}
+    pressure: float | np.ndarray = load_pressure
+    if isinstance(ripple, PumpRipple):
+        values = {name: getattr(ripple.geometry, KEYS[name]) for name in sheet}
+        if ripple.meets_ripple:
+            pressure = ripple.outlet_pressure
+    pump = {**rig.pump, **{KEYS[name]: value for name, value in values.items()}}
+    advance = float(np.radians(values.get("port_timing", 0.0) - sheet.get("port_timing", 0.0)))
+    for k, p in uncertain:
+        centre = float(p.prior.coordinate(values[p.name]))
+        ends = p.value(centre + 1.0), p.value(centre - 1.0)
+        change = ripple_change(
+            pump, rig.fluid, 60.0 * speed_hz, pressure, p.name, ends, centre, advance
+        )
         changes.append((k, change))
     return changes
 
 
 def _changes_at(twin: Twin, observation, point: OperatingPoint) -> list[tuple]:
-    """(index, slope and curvature (2, F) of the flow, slope (F,) of the admittance) for each of the
-    pump's parameters at an observation's frequencies.
+    """(index, `RippleChange.harmonics`, constant and slope (2, F) of the admittance) for each of
+    the pump's parameters at an observation's frequencies.
 
     The twin and its copies keep them: a search makes hundreds of forward models of few recordings.
     """
@@ -122,8 +142,12 @@ def _changes_at(twin: Twin, observation, point: OperatingPoint) -> list[tuple]:
         mean = flow_harmonics(ripple, np.zeros(1))[0].real
         s = 2j * np.pi * o.frequency_hz
         changes = [
-            (k, _modulate_change(change, ripple, o.orders, mean), change.source_admittance(s))
-            for k, change in pump_changes(twin, o.speed_hz, point.load_pressure)
+            (
+                k,
+                _modulate_change(change, ripple, o.orders, mean),
+                np.outer([-change.centre, 1.0], change.source_admittance(s)),
+            )
+            for k, change in pump_changes(twin, o.speed_hz, point.load_pressure, ripple)
         ]
         twin.kept_changes[key] = ripple, changes
     return twin.kept_changes[key][1]
@@ -132,11 +156,11 @@ def _changes_at(twin: Twin, observation, point: OperatingPoint) -> list[tuple]:
 def _modulate_change(
     change, ripple: FlowRipple, orders: np.ndarray, mean_flow: float
 ) -> np.ndarray:
-    """Slope and curvature (2, F) of a `RippleChange`, phase modulated as `ripple` is."""
+    """`RippleChange.harmonics` (3, F), phase modulated as `ripple` is."""
     if not ripple.modulation:
         return change.harmonics(orders, mean_flow)
     orders = np.asarray(orders, int)
-    even = np.zeros((2, 2 * np.max(orders)), complex)
+    even = np.zeros((3, 2 * np.max(orders)), complex)
     even[:, 1:] = change.harmonics(np.arange(1, even.shape[1]), mean_flow)
     even[np.abs(even) < 1e-9 * np.max(np.abs(even))] = 0.0  # rounding
     return np.array(

@@ -129,7 +129,7 @@ def _load_pressure(rig: Rig, observation, flow: float) -> float | None:
     if observation.kind == "input_impedance" or not len(means) or not stated > 0.0:
         return stated
     sensors = observation.sensors or rig.sensors
-    fall = np.array([_fall(rig, sensor.position, flow) for sensor in sensors]) / stated
+    fall = np.array([pressure_fall(rig, sensor.position, flow) for sensor in sensors]) / stated
     if len(fall) != len(means):
         return stated
     used = np.abs(means / stated - 1.0 - fall) < MAX_MEAN_DEVIATION
@@ -164,7 +164,7 @@ def _estimate_pressure(means: tuple[float, ...], falls: tuple[float, ...], fall_
     return float(estimate[0])
 
 
-def _fall(rig: Rig, position: float, flow: float) -> float:
+def pressure_fall(rig: Rig, position: float, flow: float) -> float:
     """Pressure, Pa, that `flow` loses between a position and the load (Hagen-Poiseuille; Blasius
     1913 where it is turbulent)."""
     flow = GUESSED_VELOCITY * rig.line[-1].area if not np.isfinite(flow) else flow

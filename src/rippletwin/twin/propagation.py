@@ -143,7 +143,7 @@ def pump_change(twin: Twin, healthy_flow, speed_hz: float, load_pressure: float)
     orders = np.arange(1, (count - 1) // 2 + 1)
     for k, change in pump_changes(twin, speed_hz, load_pressure):
         u = twin.theta[k]
-        spectrum = np.array([u, u**2]) @ change.harmonics(orders, mean)
+        spectrum = np.array([1.0, u, u**2]) @ change.harmonics(orders, mean)
         flow += one_period(spectrum, count, orders)
         capacity += u * float(change.source_admittance(pumping)[0].imag / pumping[0].imag)
     if twin.ripple is not None:

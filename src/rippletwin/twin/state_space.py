@@ -39,8 +39,11 @@ def line_response(twin: Twin, condition, frequency_hz: np.ndarray) -> np.ndarray
     if ripple is not None:
         chambers = ripple.source_admittance(line.s)
         if np.any(chambers):  # a ripple that is given is an ideal source
-            for k, change in pump_changes(twin, condition.speed_hz, condition.load_pressure):
-                chambers = chambers + twin.theta[k] * change.source_admittance(line.s)
+            for k, change in pump_changes(
+                twin, condition.speed_hz, condition.load_pressure, ripple
+            ):
+                moved = twin.theta[k] - change.centre
+                chambers = chambers + moved * change.source_admittance(line.s)
         line.source_admittance = line.source_admittance + chambers
     return np.vstack([line.pressure_at([0.0]), line.readings()])
 

@@ -37,6 +37,7 @@ from rippletwin.twin.twin import Twin
 
 MAX_MODEL_ERROR_FOR_COUPLING = 10.0 * LITTLE_MODEL_ERROR
 """Relative model error above which pressure and flow at the pump are too uncertain."""
+LIKELIER = 1.0  # log evidence that a step of the pump's response adds
 NOTICED_CHANGE = 0.25  # of LITTLE_MODEL_ERROR: a change of the prediction that is fitted again
 MAX_RESUMED = 2  # times
 MAX_SETTLED = 4  # fits of one hypothesis, each with the ripple that the last one found
@@ -114,19 +115,14 @@ def _resume_search(
     ripple that it shows, let a simulated pump respond to the line's pressure, and resume the
     search."""
     search, scale = _widen_tolerances(stage, search, processes)
-    best, data = search.best, stage.observations
-    if best.model_error < MAX_MODEL_ERROR_FOR_COUPLING:
-        coupled = couple_pump_to_line(best.twin, data) or data
-        corrected = with_corrected_ripple(best, data, coupled)
-        if coupled is not data or changes_prediction(best, data, corrected):
-            data = corrected
-    if data is stage.observations and scale == 1.0:
-        return stage, search
+    data = stage.observations
     for _ in range(MAX_RESUMED):
-        rig = scale_tolerances(stage.base.rig, scale)
-        base = make_base(rig, data)
+        base = make_base(scale_tolerances(stage.base.rig, scale), data)
         search = with_coordinates_of(search, base)
-        data, best = _settle_ripple(base, data, search.best)
+        settled, best = settle_ripple(base, data, search.best)
+        if settled is data and scale == 1.0:
+            break
+        data = settled
         with open_workers(base, data, processes) as workers:
             search = resume_search(workers, replace(search, best=best), progress)
         stage = Stage(base, data, stage.modulation)
@@ -136,18 +132,37 @@ def _resume_search(
     return stage, search
 
 
-def _settle_ripple(base: Twin, data: list[Observation], best: Fit) -> tuple[list, Fit]:
-    """The data whose nonlinear flows are those of the ripple that `best` finds in them, and `best`
-    refitted: products of harmonics follow from the ripple, and the ripple that is found from them.
+def settle_ripple(base: Twin, data: list[Observation], best: Fit) -> tuple[list, Fit]:
+    """The data with the ripple that `best` finds in them, and `best` refitted: the pump's response
+    and products of harmonics follow from the fit, and the fit from them.
+
+    A step of the pump's response is kept where it makes the data likelier. Of a pump whose ripple
+    is far from the recorded one the response is wrong too. The data are the same list where nothing
+    changes.
     """
+    best = _refit(base, data, best)
+    if best.model_error >= MAX_MODEL_ERROR_FOR_COUPLING:
+        return data, best
     for _ in range(MAX_SETTLED):
-        with open_workers(base, data, 1) as workers:
-            (best,) = workers.fit([job_from(best)])
+        coupled = couple_pump_to_line(best.twin, data)
+        if coupled is None:
+            break
+        coupled = with_corrected_ripple(best, data, coupled)
+        fit = _refit(base, coupled, best)
+        if fit.evidence < best.evidence + LIKELIER:
+            break
+        data, best = coupled, fit
+    for _ in range(MAX_SETTLED):
         corrected = with_corrected_ripple(best, data, data)
         if not changes_prediction(best, data, corrected):
             break
-        data = corrected
+        data, best = corrected, _refit(base, corrected, best)
     return data, best
+
+
+def _refit(base: Twin, data: list[Observation], fit: Fit) -> Fit:
+    with open_workers(base, data, 1) as workers:
+        return workers.fit([job_from(fit)])[0]
 
 
 def changes_prediction(fit: Fit, before: Sequence[Observation], after: Sequence) -> bool:
