@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rippletwin.calibration.fit import Fit
+from rippletwin.calibration.laplace import UNCONVERGED_GAIN
 from rippletwin.calibration.ripple_correction import with_corrected_ripple
 from rippletwin.case.model import Rig
 from rippletwin.explanation.fit_jobs import FitJob, job_from, make_base, open_workers
@@ -38,9 +39,6 @@ from rippletwin.twin.twin import Twin
 MAX_MODEL_ERROR_FOR_COUPLING = 10.0 * LITTLE_MODEL_ERROR
 """Relative model error above which pressure and flow at the pump are too uncertain."""
 LIKELIER = 1.0  # log evidence that a step of the pump's response adds
-MAX_RIPPLE_ERROR_FOR_RESPONSE = 0.1
-"""Relative error of the pump's ripple above which a simulated response to the line, wrong by as
-much, is not better than the mean admittance."""
 NOTICED_CHANGE = 0.25  # of LITTLE_MODEL_ERROR: a change of the prediction that is fitted again
 MAX_RESUMED = 2  # times
 MAX_SETTLED = 4  # fits of one hypothesis, each with the ripple that the last one found
@@ -139,21 +137,23 @@ def settle_ripple(base: Twin, data: list[Observation], best: Fit) -> tuple[list,
     """The data with the ripple that `best` finds in them, and `best` refitted: the pump's response
     and products of harmonics follow from the fit, and the fit from them.
 
-    A step of the pump's response is made where the ripple errs little, and kept where it makes the
-    data likelier. The data are the same list where nothing changes.
+    A step of the pump's response is kept where it makes the data likelier. Both fits must have
+    converged: what another one says of the pump, and how likely it is, are not known. The data are
+    the same list where nothing changes.
     """
     best = _refit(base, data, best)
     if best.model_error >= MAX_MODEL_ERROR_FOR_COUPLING:
         return data, best
     for _ in range(MAX_SETTLED):
-        if np.hypot(best.source_sd, best.smooth_sd) > MAX_RIPPLE_ERROR_FOR_RESPONSE:
+        if best.expected_gain > UNCONVERGED_GAIN:
             break
         coupled = couple_pump_to_line(best.twin, data)
         if coupled is None:
             break
         coupled = with_corrected_ripple(best, data, coupled)
         fit = _refit(base, coupled, best)
-        if fit.evidence < best.evidence + LIKELIER:
+        likelier = fit.evidence >= best.evidence + LIKELIER
+        if fit.expected_gain > UNCONVERGED_GAIN or not likelier:
             break
         data, best = coupled, fit
     for _ in range(MAX_SETTLED):
