@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rippletwin.calibration.fit import Fit
-from rippletwin.calibration.laplace import UNCONVERGED_GAIN
 from rippletwin.calibration.ripple_correction import with_corrected_ripple
 from rippletwin.case.model import Rig
 from rippletwin.explanation.fit_jobs import FitJob, job_from, make_base, open_workers
@@ -137,23 +136,20 @@ def settle_ripple(base: Twin, data: list[Observation], best: Fit) -> tuple[list,
     """The data with the ripple that `best` finds in them, and `best` refitted: the pump's response
     and products of harmonics follow from the fit, and the fit from them.
 
-    A step of the pump's response is kept where it makes the data likelier. Both fits must have
-    converged: what another one says of the pump, and how likely it is, are not known. The data are
-    the same list where nothing changes.
+    A step of the pump's response is kept where it makes the data likelier, by more than a fit that
+    has not converged leaves open. The data are the same list where nothing changes.
     """
     best = _refit(base, data, best)
     if best.model_error >= MAX_MODEL_ERROR_FOR_COUPLING:
         return data, best
     for _ in range(MAX_SETTLED):
-        if best.expected_gain > UNCONVERGED_GAIN:
-            break
         coupled = couple_pump_to_line(best.twin, data)
         if coupled is None:
             break
         coupled = with_corrected_ripple(best, data, coupled)
         fit = _refit(base, coupled, best)
-        likelier = fit.evidence >= best.evidence + LIKELIER
-        if fit.expected_gain > UNCONVERGED_GAIN or not likelier:
+        undecided = max(fit.expected_gain, best.expected_gain)
+        if fit.evidence < best.evidence + undecided + LIKELIER:
             break
         data, best = coupled, fit
     for _ in range(MAX_SETTLED):
