@@ -112,7 +112,8 @@ def held_out_misfit(workers: Workers, fit: Fit, early: Sequence, late: Sequence)
     observations of the halves of periodic recordings.
     """
     data, fit = settle_ripple(workers.base, workers.observations, fit)
-    workers = Workers(make_base(workers.base.rig, data), data)
+    if data is not workers.observations:
+        workers = Workers(make_base(workers.base.rig, data), data)
     early, late = (select_fitted_as(half, fit.twin.rig, data) for half in (early, late))
     halves = (early[0], late[0]) if len(data) == 1 and late else None
     return float(score_held_out(workers, fit, halves).misfit)
