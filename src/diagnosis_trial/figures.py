@@ -16,6 +16,7 @@ from diagnosis_trial.summary import (
     columns_of,
     confusion_matrix,
     covers,
+    parts_of_page,
     reliability_table,
 )
 from rippletwin.figures import style
@@ -44,17 +45,29 @@ def file_name(figure: str, column: str) -> str:
 
 def draw_detection(columns: dict[str, list[dict]]) -> Figure:
     """Probability of detection of one leak at 5 % false alarms against the change that it makes,
-    one panel a fault, one curve a column."""
-    fig, axes = style.figure(1, len(SINGLE), height=2.8, sharey=True)
-    for ax, state in zip(axes[0], SINGLE, strict=True):
-        for k, (column, rows) in enumerate(columns.items()):
-            _draw_curve(ax, detection.detect_leaks(rows, state), column, k)
+    one panel a fault, one curve a column; further columns in further rows of panels."""
+    parts = parts_of_page(columns)
+    fig, axes = style.figure(len(parts), len(SINGLE), height=2.8, sharex="col", sharey=True)
+    for panels, part in zip(axes, parts, strict=True):
+        for ax, state in zip(panels, SINGLE, strict=True):
+            for k, (column, rows) in enumerate(part.items()):
+                _draw_curve(ax, detection.detect_leaks(rows, state), column, k)
+        panels[0].set_ylabel("probability of detection")
+        _draw_legend(panels[-1], len(part))
+    for ax, state in zip(axes[-1], SINGLE, strict=True):
         ax.set_xlabel(f"relative change of the ripple by a {state}'s leak")
-    axes[0, 0].set_ylabel("probability of detection")
     axes[0, 0].set_ylim(-0.12, 1.12)
-    if axes[0, -1].lines:
-        axes[0, -1].legend(loc="lower right", fontsize=7)
     return fig
+
+
+def _draw_legend(ax, columns: int) -> None:
+    """The names of the curves in one line above the panel, over the panels left of it too."""
+    ax.set_title(" ", fontsize=9)  # room for the line
+    if ax.lines:
+        legend = ax.legend(
+            loc="lower right", bbox_to_anchor=(1, 1), ncols=columns, fontsize=7, columnspacing=1.2
+        )
+        legend.set_in_layout(False)  # else the panel becomes so narrow that the line fits above it
 
 
 def _draw_curve(ax, leaks: detection.Leaks, label: str, rank: int) -> None:
@@ -63,7 +76,7 @@ def _draw_curve(ax, leaks: detection.Leaks, label: str, rank: int) -> None:
     shown = leaks.shown
     if not len(shown):
         return
-    colour, marker, dash = f"C{rank}", "osD^vP*X"[rank % 8], ("-", "--", ":")[rank % 3]
+    colour, marker, dash = f"C{rank}", "osD^"[rank], ("-", "--", ":", "-.")[rank]
     curve = detection.fit_curve(leaks.change, leaks.hit)
     if curve is not None:
         grid = np.geomspace(shown.min(), shown.max(), 200)

@@ -78,6 +78,10 @@ def _costs(rows: list[dict]) -> tuple[str, str, str]:
 
 
 def _scores(columns: dict[str, list[dict]]) -> str:
+    return "\n".join(_score_table(part) for part in summary.parts_of_page(columns))
+
+
+def _score_table(columns: dict[str, list[dict]]) -> str:
     tables = [summary.score_table(rows) for rows in columns.values()]
     lines = [
         (same[0].what, same[0].target, *(str(score.rate) for score in same))

@@ -20,12 +20,20 @@ KNOWN = ("healthy", *LEAK_STATES)
 STATES = (*KNOWN, *OUTSIDE_STATES, CHANGED_LINE)
 ANSWERS = (*KNOWN, "unlike", "crashed")
 PLAIN = 0.05  # change of the ripple from which a state counts as plain
+SIDE_BY_SIDE = 4  # columns that a page shows beside each other
 
 
 def columns_of(rows: list[dict]) -> dict[str, list[dict]]:
     """Column -> its rows, one for each recording that it has answered."""
     columns = dict.fromkeys(row["column"] for row in rows)
     return {name: [row for row in rows if row["column"] == name] for name in columns}
+
+
+def parts_of_page(columns: dict[str, list[dict]]) -> list[dict[str, list[dict]]]:
+    """The columns in their order, SIDE_BY_SIDE at a time."""
+    names = list(columns)
+    parts = [names[k : k + SIDE_BY_SIDE] for k in range(0, len(names), SIDE_BY_SIDE)]
+    return [{name: columns[name] for name in part} for part in parts]
 
 
 def shared_rows(rows: list[dict]) -> list[dict]:

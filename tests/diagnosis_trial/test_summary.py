@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from diagnosed_rigs import made_rows as rows
-from diagnosis_trial.figures import draw_figures
+from diagnosis_trial.figures import draw_detection, draw_figures
 from diagnosis_trial.page import report_page
 from diagnosis_trial.summary import (
     ANSWERS,
@@ -100,3 +100,19 @@ def test_page_and_pictures_are_written(tmp_path, monkeypatch):
         assert all(path.stat().st_size > 5000 for path in paths)
         assert len(paths) == 1 + 2 * columns
         assert all(f"figures/{path.name}" in page for path in paths)
+
+
+def test_many_columns_stand_in_tables_that_fit_on_a_page(monkeypatch):
+    """Each column's recordings are counted in one table of scores, each has one curve."""
+    monkeypatch.setattr("diagnosis_trial.detection.RESAMPLED", 2)
+    names = [f"{method}@{twin}" for method in ("P", "PR", "Q") for twin in ("nominal", "explained")]
+    made = [row | {"column": name} for name in names for row in rows()]
+    page = report_page(made, {"commit": "0" * 40, "number": 1000, "not_committed": False})
+    heads = [line for line in page.splitlines() if line.startswith("| score |")]
+    assert [head.count("@") for head in heads] == [4, 2]
+    assert all(sum(name in head for head in heads) == 1 for name in names)
+    figure = draw_detection(columns_of(made))
+    curves = [
+        text.get_text() for ax in figure.axes if ax.get_legend() for text in ax.get_legend().texts
+    ]
+    assert curves == names
