@@ -66,10 +66,9 @@ def test_slopes_of_a_port_that_opens_slowly_are_there():
 
 
 def test_a_leak_has_a_discharge_coefficient_of_its_own_where_the_sheet_has_none():
-    """An area of 0.7 stands for as much leak as a larger one of the default pump's 0.65."""
-    pump = {"pistons": 9}
-    flow = simulate_leak_flow(pump, OIL, SPEED, PRESSURE, FAULTS["slipper"])
-    truth = simulated(pump, Slipper(4e-7 * 0.7 / 0.65)) - simulated(pump)
+    """An area at 0.7 stands for as much leak as a larger one of a pump with a stated 0.65."""
+    flow = simulate_leak_flow({"pistons": 9}, OIL, SPEED, PRESSURE, FAULTS["slipper"])
+    truth = simulated(PUMP, Slipper(4e-7 * 0.7 / 0.65)) - simulated(PUMP)
     assert np.linalg.norm(flow.harmonics(4e-7)[ORDERS] - truth) < 0.01 * np.linalg.norm(truth)
 
 

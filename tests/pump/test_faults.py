@@ -5,7 +5,7 @@ import pytest
 
 from default_pump import LOAD, OIL, SPEED
 from rippletwin.pump.faults import Cylinder, Slipper
-from rippletwin.pump.geometry import Geometry
+from rippletwin.pump.geometry import LEAK_DISCHARGE, Geometry
 from rippletwin.pump.outlets import ConstantPressure
 from rippletwin.pump.simulation import simulate
 
@@ -21,7 +21,7 @@ def test_slipper_drops_the_flow_once_a_revolution(constant):
     area = 4e-7
     faulty = simulate({}, OIL, SPEED, ConstantPressure(LOAD), Slipper(area))
     deficit = constant.flow - faulty.flow
-    leak = 0.65 * area * np.sqrt(2 * LOAD / OIL.density)
+    leak = LEAK_DISCHARGE * area * np.sqrt(2 * LOAD / OIL.density)
     plateau = deficit[(constant.angle_deg > 40) & (constant.angle_deg < 140)]
     np.testing.assert_allclose(plateau, leak, rtol=0.01)
     assert intervals_below(faulty.flow - constant.flow, -0.5 * leak) == 1
@@ -42,7 +42,7 @@ def test_slipper_leak_integral_is_the_flow_deficit(constant):
     area = 4e-7
     faulty = simulate({}, OIL, SPEED, ConstantPressure(LOAD), Slipper(area))
     drop = np.maximum(faulty.chamber_pressure[0], 0.0)
-    leak = 0.65 * area * np.sqrt(2 * drop / OIL.density)
+    leak = LEAK_DISCHARGE * area * np.sqrt(2 * drop / OIL.density)
     # once the delivery port is shut the leak comes from no delivery
     facing = faulty.angle_deg < 180.0 - Geometry().port_overlap_deg / 2
     assert (leak * facing).mean() == pytest.approx(
@@ -58,7 +58,7 @@ def test_cylinder_drops_the_flow_twice_a_revolution(constant):
     area = 8e-7
     faulty = simulate({}, OIL, SPEED, ConstantPressure(LOAD), Cylinder(area))
     deficit = constant.flow - faulty.flow
-    leak = 0.65 * area * np.sqrt(2 * LOAD / OIL.density)
+    leak = LEAK_DISCHARGE * area * np.sqrt(2 * LOAD / OIL.density)
     # with the compression ripple of the pump averaged out over a piston's spacing
     width = len(deficit) // 9
     smooth = np.real(np.fft.ifft(np.fft.fft(deficit) * np.fft.fft(np.ones(width) / width, 3072)))
@@ -86,3 +86,14 @@ def test_compound_fault_is_the_sum_of_far_apart_faults(constant):
     both = simulate({}, OIL, SPEED, outlet, [slipper, cylinder]).flow
     single = [simulate({}, OIL, SPEED, outlet, fault).flow for fault in (slipper, cylinder)]
     np.testing.assert_allclose(both, sum(single) - constant.flow, atol=1e-4 * both.mean())
+
+
+def test_a_leak_has_the_discharge_coefficient_of_the_sheet_or_its_own():
+    """Of the same flow: an area at the 0.7 of a sheet that states no coefficient, and a larger one
+    at the 0.65 that a sheet states, which is also that of the default pump's ports."""
+    stated = {"discharge_coefficient": Geometry.discharge_coefficient}
+    own, larger = (
+        simulate(pump, OIL, SPEED, ConstantPressure(LOAD), Slipper(area))
+        for pump, area in (({}, 4e-7), (stated, 4e-7 * 0.7 / 0.65))
+    )
+    np.testing.assert_allclose(own.flow, larger.flow, rtol=1e-9)

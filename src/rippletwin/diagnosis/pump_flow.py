@@ -27,7 +27,6 @@ from rippletwin.twin.twin import Twin
 STEPS = 3072  # a revolution: the change moves by 0.3 % when they are doubled, 1 % at 1e-8 m2
 NODES = 21  # leak areas that are simulated, a factor of 1.5 apart
 ORDERS = 600  # highest shaft order whose flow is kept
-LEAK_DISCHARGE = 0.7  # discharge coefficient of a leak where the data sheet gives none
 SLOPE_NODES = slice(2, None, 4)  # of these areas, at which slopes by the pump's numbers are taken
 UNCERTAIN = {
     "bulk_modulus": 0.08,
@@ -172,20 +171,16 @@ def simulate_leaking_pump(
 ) -> PumpRipple:
     """Ripple of the pump with a fault of this leak area, m2, at piston 0; simulations are kept.
 
-    The area is of a leak with LEAK_DISCHARGE where the data sheet gives no discharge coefficient.
     Raises ArithmeticError where the chamber equations cannot be solved.
     """
-    scale = 1.0
-    if not pump.get("discharge_coefficient"):
-        scale = LEAK_DISCHARGE / Geometry.discharge_coefficient
     point = _key(pump), fluid, float(speed_rpm), float(pressure)
-    return _simulated(*point, fault, float(scale * area))
+    return _simulated(*point, fault, float(area))
 
 
 def leak_velocity(pump: Mapping, fluid: Fluid, pressure: float) -> float:
     """Flow of a leak over its area, m/s, under a pressure, Pa: that of a sharp-edged orifice."""
-    coefficient = pump.get("discharge_coefficient") or LEAK_DISCHARGE
-    return coefficient * np.sqrt(2.0 * pressure / fluid.density)
+    discharge = Geometry.from_dict(dict(pump)).leak_discharge
+    return discharge * np.sqrt(2.0 * pressure / fluid.density)
 
 
 def simulate_leak_flow(

@@ -33,10 +33,12 @@ def leak_conductances(geometry, fluid, fault):
     case_leak, cross_leak = np.zeros((2, geometry.pistons))
     for item in faults:
         leak = case_leak if isinstance(item, Slipper) else cross_leak
-        leak[item.piston % geometry.pistons] += orifice_conductance(geometry, fluid, item.leak_area)
+        leak[item.piston % geometry.pistons] += orifice_conductance(
+            fluid, item.leak_area, geometry.leak_discharge
+        )
     return case_leak, cross_leak
 
 
-def orifice_conductance(geometry, fluid, area):
+def orifice_conductance(fluid, area, discharge_coefficient):
     """Cd A sqrt(2/rho), m3/s/sqrt(Pa), of an orifice of `area` A, m2."""
-    return geometry.discharge_coefficient * area * np.sqrt(2 / fluid.density)
+    return discharge_coefficient * area * np.sqrt(2 / fluid.density)

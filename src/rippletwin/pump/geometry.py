@@ -12,11 +12,15 @@ import numpy as np
 
 from rippletwin.case.model import absolute
 
+LEAK_DISCHARGE = 0.7
+"""Discharge coefficient of a leak where the data sheet gives none."""
+
 
 @dataclass(frozen=True)
 class Geometry:
     """The keys of rig.yaml's `pump`, SI units; defaults describe a pump of 42 cm3/rev, see
-    docs/explanation/pump.md for their origin."""
+    docs/explanation/pump.md for their origin. `leak_discharge` is no key: a leak has the discharge
+    coefficient that the data sheet states."""
 
     pistons: int = 9
     piston_diameter: float = 0.017
@@ -32,16 +36,19 @@ class Geometry:
     discharge_coefficient: float = 0.65
     case_leakage: float = 3e-13  # laminar, of a chamber, m3/s/Pa
     suction_pressure: float = 0.0  # gauge, also that of the case, Pa: an open tank
+    leak_discharge: float = LEAK_DISCHARGE
 
     @classmethod
     def from_dict(cls, pump: dict) -> Geometry:
         """Geometry from rig.yaml's `pump`. Raises ValueError for an unknown key and an impossible
         value."""
-        known = [field.name for field in fields(cls)]
+        known = [field.name for field in fields(cls) if field.name != "leak_discharge"]
         unknown = sorted(set(pump) - set(known))
         if unknown:
             raise ValueError(f"unknown pump keys {unknown}; known are {known}")
-        geometry = cls(**{key: value for key, value in pump.items() if value is not None})
+        stated = {key: value for key, value in pump.items() if value is not None}
+        leak_discharge = stated.get("discharge_coefficient", LEAK_DISCHARGE)
+        geometry = cls(**stated, leak_discharge=leak_discharge)
         may_be_negative = ("port_timing_deg", "port_overlap_deg", "suction_pressure")
         may_be_zero = ("air_fraction", "case_leakage")
         for name in known:

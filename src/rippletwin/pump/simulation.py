@@ -228,11 +228,10 @@ def _tables(geometry, fluid, period, steps, group):
     tables = []
     for fraction in (1.0, chambers.GAMMA):
         phi = 2 * np.pi * (np.arange(steps) + fraction)[:, None] / steps - lag
-        columns = [
-            geometry.volume(phi),
-            geometry.volume_slope(phi) * 2 * np.pi / period,
-            orifice_conductance(geometry, fluid, geometry.delivery_area(phi)),
-            orifice_conductance(geometry, fluid, geometry.suction_area(phi)),
+        ports = [
+            orifice_conductance(fluid, area, geometry.discharge_coefficient)
+            for area in (geometry.delivery_area(phi), geometry.suction_area(phi))
         ]
+        columns = [geometry.volume(phi), geometry.volume_slope(phi) * 2 * np.pi / period, *ports]
         tables.append(np.ascontiguousarray(np.stack(columns, axis=1)))
     return tables
