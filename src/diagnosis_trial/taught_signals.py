@@ -25,7 +25,8 @@ from rippletwin.learning.architectures import CLASSES
 from rippletwin.twin.twin import Twin
 
 FIXED = {"H": 0.0, "S": 0.26, "C1": 0.26, "C2": 0.77}
-"""Class -> the paper's leak on the default pump: its flow over the mean flow of one piston."""
+"""Class -> leak of `faults.leak_area` on the default pump: its flow over the mean flow of one
+piston."""
 
 
 def fixed_signals(

@@ -49,7 +49,7 @@ def plot_evidence(numbers: ExplainedNumbers) -> Figure | None:
         )  # fmt: skip
     points = [(c.source_free, y) for y, c in zip(heights, shown) if c.source_free is not None]
     if points:
-        marker = dict(ms=5, color=style.MEASURED, mfc="white", label="with an unknown pump")
+        marker = dict(ms=5, color=style.MEASURED, mfc="white", label="source-free fit")
         ax.plot(*np.array(points).T, "D", **marker)
     label = f"threshold {write_number(threshold)}"
     ax.axvline(threshold, color=style.ALARM, ls="--", lw=1, label=label)
@@ -63,7 +63,7 @@ def plot_evidence(numbers: ExplainedNumbers) -> Figure | None:
     ax.minorticks_off()
     ax.set_yticks(heights, [style.plain("\n+ ".join(c.effects)) for c in shown])
     ax.set_xlabel(
-        "log Bayes factor against the calibrated line\n(scale linear to ±10, logarithmic beyond)"
+        "log evidence, counted from the calibrated line\n(scale linear to ±10, logarithmic beyond)"
     )
     fig.suptitle("Which effects explain the recording?")
     style.legend_below(fig, ax)

@@ -1,4 +1,4 @@
-"""Steps 1 and 3 of `explain`: observe the recordings, and set up the twin and what it is fitted to.
+"""Preparation of `explain`: observe the recordings, and set up the twin and what it is fitted to.
 
 Periodic recordings are observed as a whole and in two halves.
 """

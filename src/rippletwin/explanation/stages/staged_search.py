@@ -1,4 +1,4 @@
-"""Steps 4 to 6 of `explain`: search, and search again with what the first search has shown.
+"""Search of `explain` in stages: search, and search again with what the first search has shown.
 
 The explained line gives a better modulation of the shaft, the ripple that is there, with which
 nonlinear flows are calculated, the pressure at the pump, to which a simulated pump responds, and

@@ -89,7 +89,7 @@ copyreg.pickle(Effect, lambda effect: (find_effect, (effect.name,)))
 
 
 def candidates(rig, named: bool = True) -> list[tuple[Effect, Place]]:
-    """Every effect that the rig's medium allows, at every place it can be.
+    """Every effect that the rig's medium allows, at every place where it can act.
 
     With `named` False the passive networks that represent physics without a name.
     """
