@@ -74,3 +74,36 @@ def test_flow_harmonics_are_those_of_the_ripple():
         assert mean == pytest.approx(2.0, rel=1e-4)
         assert ninth == pytest.approx(0.5 * np.exp(0.3j), rel=2e-3)
         assert abs(other) < 1e-3
+
+
+def cosines(angle_deg, orders=(9, 90, 135)):
+    """Flow at these angles with a cosine of 0.5 and phase 0.3 at each order, and a mean of 2."""
+    angle = np.deg2rad(angle_deg)
+    return 2.0 + sum(0.5 * np.cos(k * angle + 0.3) for k in orders)
+
+
+@pytest.mark.parametrize(
+    ("angle", "tolerance"),
+    [
+        (np.round(np.arange(512) * 360 / 512, 3), 0.005),  # as a file rounds them
+        (np.arange(512) * 360 / 512 + 0.15 * np.sin(np.arange(512)), 0.03),
+    ],
+)
+def test_high_orders_of_rounded_and_of_uneven_angles_keep_their_size(angle, tolerance):
+    """Against the cosines that were put in, with three and more angles a period. A straight line
+    between angles would lose 20 % of order 135."""
+    orders = np.array([9, 90, 135])
+    found = flow_harmonics(FlowRipple(angle, cosines(angle)), orders)
+    np.testing.assert_allclose(found, 0.5 * np.exp(0.3j), atol=0.5 * tolerance)
+
+
+@pytest.mark.parametrize("count", [180, 181])
+def test_orders_that_the_angles_do_not_resolve_have_no_amplitude(count):
+    """Of n angles an order of n/2 or more is the mirror of a lower one, and order n the mean."""
+    angle = 360.0 * np.arange(count) / count
+    ripple = FlowRipple(angle, cosines(angle, (9, 81)))
+    assert ripple.highest_order == (count - 1) // 2
+    found = flow_harmonics(ripple, np.array([0, 9, 81, 90, 99, 171, 180, 181, 270]))
+    np.testing.assert_allclose(found[:3], [2.0, 0.5 * np.exp(0.3j), 0.5 * np.exp(0.3j)], rtol=1e-9)
+    # of 181 angles order 90 is resolved, and nothing is there
+    np.testing.assert_allclose(found[3:], 0.0, atol=1e-12)

@@ -6,10 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.fft import ifft, irfft, rfft
+from scipy.interpolate import CubicSpline
 from scipy.special import jv
 
 from rippletwin.case.model import FlowRipple
 
+ROUNDED_ANGLE = 0.01  # of a step: as much off an even grid are angles that a file rounds
 ROUNDING = 1e-13  # of the largest amplitude: below it are errors of rounding
 
 
@@ -88,8 +90,9 @@ def resample_period(period: np.ndarray, count: int) -> np.ndarray:
 def flow_harmonics(ripple: FlowRipple, orders: np.ndarray) -> np.ndarray:
     """Peak complex amplitudes (F,), m3/s, at shaft `orders` (F,); that of order 0 is the mean.
 
-    Angles need not be evenly spaced: the ripple is interpolated linearly over the revolution. The
-    result is cached with the ripple and read-only, since fits need the same orders very often.
+    Orders that the angles do not resolve have no amplitude. Angles need not be evenly spaced: the
+    ripple is interpolated by a periodic cubic spline over the revolution. The result is cached with
+    the ripple and read-only, since fits need the same orders very often.
     """
     key = np.asarray(orders, dtype=float).tobytes()
     known = ripple.known_harmonics
@@ -100,17 +103,19 @@ def flow_harmonics(ripple: FlowRipple, orders: np.ndarray) -> np.ndarray:
 
 
 def _calculate_harmonics(ripple: FlowRipple, orders: np.ndarray) -> np.ndarray:
-    angle = np.deg2rad(np.asarray(ripple.angle_deg, dtype=float))
-    orders, flow = np.asarray(orders, float), np.asarray(ripple.flow, float)
-    highest = int(np.ceil(np.max(np.abs(orders), initial=0.0)))
-    is_even = np.allclose(np.diff(angle), 2 * np.pi / len(angle), rtol=1e-6, atol=0)
-    if is_even and 2 * highest < len(flow) and np.all(orders == np.abs(np.round(orders))):
-        return peak_amplitudes(flow)[orders.astype(int)] * np.exp(-1j * orders * angle[0])
-    count = max(4 * len(angle), 4 * highest)
-    even = angle[0] + 2 * np.pi * np.arange(count) / count
-    if is_even:
-        even = angle
+    angle, flow = (np.asarray(x, float) for x in (ripple.angle_deg, ripple.flow))
+    orders, count = np.asarray(orders, float), len(flow)
+    even = angle[0] + 360.0 * np.arange(count) / count
+    if np.max(np.abs(angle - even)) > ROUNDED_ANGLE * 360.0 / count:
+        count *= 4
+        even = angle[0] + 360.0 * np.arange(count) / count
+        around, closed = np.append(angle, angle[0] + 360.0), np.append(flow, flow[0])
+        flow = CubicSpline(around, closed, bc_type="periodic")(even)
+    is_resolved = np.abs(orders) <= ripple.highest_order
+    if np.all(orders == np.abs(np.round(orders))):
+        known = peak_amplitudes(flow)[np.where(is_resolved, orders, 0).astype(int)]
+        known *= np.exp(-1j * orders * np.deg2rad(angle[0]))
     else:
-        flow = np.interp(even, angle, flow, period=2 * np.pi)
-    spectrum = np.exp(-1j * np.outer(orders, even)) @ flow / len(even)
-    return np.where(orders == 0, spectrum, 2 * spectrum)
+        known = np.exp(-1j * np.outer(orders, np.deg2rad(even))) @ flow / count
+        known = np.where(orders == 0, known, 2 * known)
+    return np.where(is_resolved, known, 0.0)

@@ -120,6 +120,31 @@ def test_the_sheet_arrives_in_the_dataclasses(tmp_path):
     assert observe(recording, case.rig).source == "nominal"
 
 
+@pytest.mark.parametrize(
+    ("angles", "stated", "highest"), [(180, None, 89), (180, 1200.0, 72), (720, None, 299)]
+)
+def test_a_recording_is_used_as_far_as_its_flow_ripple_resolves(tmp_path, angles, stated, highest):
+    """180 angles resolve order 89 (1.48 kHz at 1000 r/min): above it the nominal ripple is unknown,
+    a warning says so, and names the angles that 5 kHz need. A lower stated band stays."""
+    content = sheet()
+    content["recordings"][0] |= {"flow_ripple": "flow.csv"} | (
+        {"max_frequency_hz": stated} if stated else {}
+    )
+    write_case(tmp_path, content)
+    angle = np.arange(angles) * 360.0 / angles
+    flow = 5e-4 + 1e-5 * np.cos(np.radians(9 * angle))
+    table = np.column_stack([angle, flow])
+    np.savetxt(
+        tmp_path / "flow.csv", table, delimiter=",", header="angle_deg,flow_m3_s", comments=""
+    )
+    case = load_case(tmp_path)
+    observed = observe(case.recordings[0], case.rig)
+    assert observed.orders[-1] == pytest.approx(highest, abs=1)
+    warned = [w for w in case.warnings if "flow_ripple" in w]
+    assert len(warned) == (angles == 180 and stated is None)
+    assert not warned or ("healthy_0" in warned[0] and "602 even angles" in warned[0])
+
+
 def test_only_the_asked_states_are_read(tmp_path):
     """A recording of a state not asked for is not opened: this one would not open."""
     content = sheet()

@@ -42,6 +42,24 @@ def narrow_band(
     return replace(recording, min_frequency_hz=low, max_frequency_hz=high)
 
 
+def limit_to_ripple(recording: Recording) -> tuple[Recording, list[str]]:
+    """The recording up to the highest order that its stated flow ripple resolves, and a line that
+    says so where that is less than its band."""
+    ripple = recording.flow_ripple
+    if ripple is None:
+        return recording, []
+    limit = (ripple.highest_order + 0.5) * recording.speed_rpm / 60.0
+    highest = _highest(recording)
+    if highest <= limit:
+        return recording, []
+    needed = 2 * int(highest * 60.0 / recording.speed_rpm) + 2
+    warning = (
+        f"{recording.label}: used up to {limit:.4g} instead of {highest:.4g} Hz, since the angles "
+        f"of its flow_ripple resolve no higher harmonics; give {needed} even angles or more"
+    )
+    return replace(recording, max_frequency_hz=limit), [warning]
+
+
 def band_warnings(rig: Rig, recordings: Sequence[Recording]) -> Iterator[str]:
     """A line for every recording that is used above the plane-wave limit of the rig."""
     limit, segment = plane_wave_limit(rig)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from rippletwin.case import tables
-from rippletwin.case.band import band_warnings, narrow_band
+from rippletwin.case.band import band_warnings, limit_to_ripple, narrow_band
 from rippletwin.case.model import (
     STATE_CODES,
     Case,
@@ -69,7 +69,7 @@ def load_case(
     sheet = parse_sheet(sheet_path)
     raise_any([*find_sheet_faults(sheet_path, sheet), *missing_files(sheet_path, sheet)])
     rig = rig_of(folder, sheet)
-    recordings, errors = [], []
+    recordings, errors, limits = [], [], []
     chosen = [
         entry
         for entry in sheet["recordings"]
@@ -78,14 +78,17 @@ def load_case(
     ]
     for done, entry in enumerate(chosen, 1):
         try:
-            recordings.append(narrow_band(_recording(folder, entry, rig), *band_hz))
+            recording = narrow_band(_recording(folder, entry, rig), *band_hz)
+            recording, limited = limit_to_ripple(recording)
+            recordings.append(recording)
+            limits += limited
         except InputError as error:
             errors.append(error)
         if progress is not None:
             progress("reading", done, len(chosen))
     raise_any(errors)
     rig = replace(rig, displacement=_displacement(recordings))
-    warnings = [*unusual_values(sheet_path, sheet), *band_warnings(rig, recordings)]
+    warnings = [*unusual_values(sheet_path, sheet), *limits, *band_warnings(rig, recordings)]
     return Case(folder=folder, rig=rig, recordings=tuple(recordings), warnings=tuple(warnings))
 
 

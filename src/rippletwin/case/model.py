@@ -124,6 +124,12 @@ class FlowRipple:
     pressure_mean: float | None = None
     modulation: complex = 0.0
 
+    @property
+    def highest_order(self) -> int:
+        """The highest shaft order that the angles resolve: more than two of them, on average, lie
+        in its period."""
+        return (len(self.angle_deg) - 1) // 2
+
     @cached_property
     def known_harmonics(self) -> dict[bytes, np.ndarray]:
         """Harmonics calculated before, by their orders (`rippletwin.harmonics.flow_harmonics`)."""
