@@ -10,6 +10,7 @@ from paper_rig import paper_rig
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.harmonics import flow_harmonics
 from rippletwin.line.frequency_domain.orifice_load import OrificeLoad
+from rippletwin.spectra.frequency_selection import select_frequencies
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.forward_model import ForwardModel
@@ -59,3 +60,19 @@ def test_an_orifice_that_does_not_settle_is_told(monkeypatch, effects, frozen):
         with pytest.warns(RuntimeWarning, match="a: no steady state"):
             twin.predict([o])
     assert np.isfinite(objective())
+
+
+@pytest.mark.parametrize("effects", [(), AIR])
+@pytest.mark.parametrize("kept", [slice(4, None), slice(3, 4), np.r_[0:2, 5:8]])
+def test_harmonics_left_out_of_a_band_are_still_in_the_ripple(effects, kept):
+    """The readings of some harmonics are those of the whole band: with its low ones left out, one
+    alone, and a part in the middle left out. Orifice and air couple all of them. The top order
+    stays, up to which more are added."""
+    rig = paper_rig()
+    whole = point(rig)
+    top = len(whole.orders) - 1
+    columns = np.append(np.arange(len(whole.orders))[kept], top)
+    part = select_frequencies(whole, columns)
+    twin = Twin(rig, [whole], effects=effects)
+    (expected,), (found,) = (ForwardModel(twin, [o])(twin.theta) for o in (whole, part))
+    np.testing.assert_allclose(found, expected[:, columns], rtol=1e-9)
