@@ -249,3 +249,44 @@ def test_three_pistons_have_one_pattern_only():
     twin = Twin(replace(twin.rig, pump={"pistons": 3}), [stated], theta=twin.theta)
     found = analyse_shaft_orders(twin, [stated], 4000.0)
     assert found.names == ("piston_spread",)
+
+
+def test_a_band_leaves_out_shaft_orders_too():
+    """Hum at order 3, which every sensor reads as a flow at the pump would make it, is not analysed
+    above 100 Hz, and other orders are: of a spread over orders 1 to 8 the two that are left give
+    its size to 5 %."""
+
+    def with_spread(even):
+        angle = np.deg2rad(even.angle_deg)
+        extra = sum(np.cos(n * angle + n**2) for n in range(1, 9))
+        return replace(even, flow=even.flow + 0.01 * np.mean(even.flow) * extra)
+
+    def with_hum(even):
+        return replace(even, flow=even.flow * (1.0 + 0.02 * np.cos(3 * np.deg2rad(even.angle_deg))))
+
+    for ripple_of, names in ((with_hum, ()), (with_spread, ("piston_spread",))):
+        twin, stated, _ = recorded(ripple_of)
+        assert analyse_shaft_orders(twin, [stated], 4000.0).names == ("piston_spread",)
+        found = analyse_shaft_orders(twin, [replace(stated, min_frequency_hz=110.0)], 4000.0)
+        assert found.names == names
+    assert found.effects[0].value == pytest.approx(0.01 * np.sqrt(0.5 * 8), rel=0.05)
+
+
+def test_a_spread_has_no_size_where_the_mean_flow_or_its_orders_are_unknown():
+    """A free source of an anechoic line has an unknown mean flow, and above the piston frequency no
+    order of the first pitch is left: the name stays, without a number that would be made up."""
+
+    def with_spread(even):
+        angle = np.deg2rad(even.angle_deg)
+        extra = sum(np.cos(n * angle + n**2) for n in (1, 4, 11, 13, 22))
+        return replace(even, flow=even.flow + 0.01 * np.mean(even.flow) * extra)
+
+    twin, stated, _ = recorded(with_spread)
+    free = replace(stated, source="free", flow_ripple=None)
+    line = Twin(twin.rig, [free])
+    above = replace(stated, min_frequency_hz=160.0)
+    for own, o in ((line, free), (twin, above)):
+        found = analyse_shaft_orders(own, [o], 4000.0)
+        assert found.names == ("piston_spread",)
+        assert found.effects[0].value is None
+        assert "unequal pistons. " in shaft_order_sentences(found)[0]

@@ -108,6 +108,13 @@ def test_an_unknown_interval_is_left_out(explanation):
     assert effect["parameters"]["amplitude"] == {"value": 4e-3, "unit": "rad"}
 
 
+def test_a_spread_without_a_size_has_no_parameter(explanation):
+    """Where no mean flow is known the effect is named, and no number is written."""
+    spread = replace(MODULATION, effects=(ShaftEffect("piston_spread", None),))
+    (effect,) = verdict_dict(replace(explanation, shaft_orders=spread))["effects"]
+    assert effect["name"] == "piston_spread" and effect["parameters"] == {}
+
+
 @pytest.mark.parametrize(
     ("verdict", "supports"), [("bad_data", []), ("unexplained", ["supported"])]
 )

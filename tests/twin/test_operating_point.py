@@ -58,3 +58,13 @@ def test_sensors_without_a_mean_are_ignored():
 def test_no_mean_is_no_error_where_one_is_stated():
     o = replace(point(RIG), mean=None)
     assert operating_point(RIG, o, o.flow_ripple).load_pressure == o.load_pressure
+
+
+def test_without_a_stated_pressure_the_sensor_nearest_the_load_tells_it():
+    """Whatever the order of the sensors in the data sheet."""
+    means = 9.5e6 + falls(FLOW)
+    for order in ([0, 1, 2], [2, 0, 1]):
+        rig = replace(RIG, sensors=tuple(RIG.sensors[k] for k in order))
+        o = replace(point(rig), load_pressure=None, mean=means[order])
+        nearest = np.argmax([sensor.position for sensor in RIG.sensors])
+        assert operating_point(rig, o, o.flow_ripple).load_pressure == means[nearest]

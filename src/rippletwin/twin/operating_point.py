@@ -124,11 +124,12 @@ def _load_pressure(rig: Rig, observation, flow: float) -> float | None:
     """Mean pressure before the load, Pa: as stated, corrected by the sensors' means."""
     stated = observation.load_pressure
     means = np.zeros(0) if observation.mean is None else np.atleast_1d(observation.mean)
+    sensors = observation.sensors or rig.sensors
     if stated is None:
-        return float(means[-1]) if len(means) else None
+        nearest = np.argmax([sensor.position for sensor in sensors[: len(means)]] or [0])
+        return float(means[nearest]) if len(means) else None
     if observation.kind == "input_impedance" or not len(means) or not stated > 0.0:
         return stated
-    sensors = observation.sensors or rig.sensors
     fall = np.array([pressure_fall(rig, sensor.position, flow) for sensor in sensors]) / stated
     if len(fall) != len(means):
         return stated

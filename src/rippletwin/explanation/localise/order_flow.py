@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rippletwin.spectra.frequency_selection import select_below
+from rippletwin.spectra.frequency_selection import select_below, select_frequencies
 from rippletwin.twin.forward_model import ForwardModel
 
 LINE_MODEL_ERROR = 0.02
@@ -23,7 +23,7 @@ class OrderFlow(NamedTuple):
     variance   (F,) its variance, (m3/s)^2
     gain       (F,) norm over the sensors of the pressures that a unit of flow makes, Pa s/m3
     unmatched  (S, F) readings less those that the flow makes, Pa
-    mean_flow  m3/s
+    mean_flow  m3/s; NaN where it is not known
     """
 
     orders: np.ndarray
@@ -48,6 +48,8 @@ def estimate_order_flow(
     (response,) = forward.unit_response(theta)
     weight = 1.0 / variance_about_twin(o)
     square = np.sum(weight * np.abs(response) ** 2, axis=0)
+    is_guessed = forward.twin.guessed_load
+    mean_flow = np.nan if is_guessed else float(forward.twin.operating_point(o).mean_flow)
     flow = np.sum(weight * np.conj(response) * readings, axis=0) / square
     return OrderFlow(
         np.asarray(o.orders, int),
@@ -55,13 +57,15 @@ def estimate_order_flow(
         1.0 / square,
         np.sqrt(np.sum(np.abs(response) ** 2, axis=0)),
         readings - response * flow,
-        float(forward.twin.operating_point(o).mean_flow),
+        mean_flow,
     )
 
 
 def with_shaft_orders(observations: Sequence, pistons: int, highest_hz: float) -> list[tuple]:
-    """(observation, mask (F,) of orders that are no multiple of `pistons`) where there are any."""
-    selected = [select_below(o, highest_hz) for o in observations if o.orders is not None]
+    """(observation in its band, mask (F,) of orders that are no multiple of `pistons`) where there
+    are any."""
+    below = [select_below(o, highest_hz) for o in observations if o.orders is not None]
+    selected = [select_frequencies(o, o.frequency_hz >= o.min_frequency_hz) for o in below]
     pairs = [(o, np.asarray(o.orders) % pistons != 0) for o in selected]
     return [(o, is_shaft_order) for o, is_shaft_order in pairs if np.any(is_shaft_order)]
 

@@ -61,11 +61,15 @@ def add_amplitude_intervals(
         pattern = complex(*rng.normal(size=2))
         drawn = [recording.draw_amplitudes(theta, pattern, rng) for recording in recordings]
         values[k] = np.mean(drawn, axis=0)
-    values = values[np.all(np.isfinite(values), axis=1)]
+    is_known = np.array([effect.value is not None for effect in shaft_orders.effects])
+    values = values[np.all(np.isfinite(values[:, is_known]), axis=1)]
     if len(values) < MIN_VALID_SHARE * draws:
         return shaft_orders
     effects = []
     for effect, column in zip(shaft_orders.effects, values.T):
+        if effect.value is None:
+            effects.append(effect)
+            continue
         centre = 2.0 * effect.value - np.mean(column)
         reach = HALF_INTERVAL * np.std(column, ddof=1)
         interval = (max(float(centre - reach), 0.0), float(centre + reach))

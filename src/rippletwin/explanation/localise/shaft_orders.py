@@ -42,12 +42,13 @@ class ShaftEffect:
     """What makes lines at shaft orders.
 
     name      "speed_fluctuation" or "piston_spread"
-    value     amplitude of the modulation in rad, or rms spread of the flow over the mean flow
+    value     amplitude of the modulation in rad, or rms spread of the flow over the mean flow; None
+              where the mean flow, or the flow at all orders below the number of pistons, is unknown
     interval  95 % interval of `value`; None where it is not known
     """
 
     name: str
-    value: float
+    value: float | None
     interval: tuple[float, float] | None = None
 
 
@@ -163,7 +164,8 @@ def _effect(
 ) -> ShaftEffect:
     """An effect with its mean amplitude in all recordings."""
     values = [amplitude_of(name, f, m, pistons) for f, m in zip(flows, modulations)]
-    return ShaftEffect(name, float(np.mean(values)))
+    known = [value for value in values if np.isfinite(value)]
+    return ShaftEffect(name, float(np.mean(known)) if known else None)
 
 
 def probability_of_share(share: float, pistons: int) -> float:
@@ -173,16 +175,20 @@ def probability_of_share(share: float, pistons: int) -> float:
 
 
 def amplitude_of(name: str, flow: OrderFlow, modulation: Modulation | None, pistons: int) -> float:
-    """`value` of an effect in one recording; `modulation` is None where there is none."""
+    """`value` of an effect in one recording, NaN where it is not known; `modulation` is None where
+    there is none."""
     if name == "speed_fluctuation":
         assert modulation is not None
         return abs(modulation.amplitude)
-    below = flow.orders < pistons
-    if modulation is None:
-        return _rms(flow.values[below]) / flow.mean_flow
-    below = below & _apart(flow.orders, pistons)
-    rest = _rms((flow.values - modulation.sidebands)[below])
-    return rest / np.sqrt(_share_apart(pistons)) / flow.mean_flow
+    below, spread = flow.orders < pistons, flow.values
+    if modulation is not None:
+        below = below & _apart(flow.orders, pistons)
+        spread = flow.values - modulation.sidebands
+    if not np.any(below):
+        return np.nan
+    # Of independent deviations each of these orders has the same share of the energy.
+    seen = np.count_nonzero(below) / (pistons - 1)
+    return _rms(spread[below]) / np.sqrt(seen) / flow.mean_flow
 
 
 def _apart(orders: np.ndarray, pistons: int) -> np.ndarray:

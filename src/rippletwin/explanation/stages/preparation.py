@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from rippletwin.case.model import Case, Recording, Rig
@@ -22,6 +23,7 @@ from rippletwin.twin.forward_model import ForwardModel
 from rippletwin.twin.twin import Twin
 
 HIGHEST_HZ = 4000.0  # of the harmonics that are fitted
+REVOLUTIONS_OF_HALVES = 8  # of the least recording of which halves are compared
 
 
 def observe_all(case: Case, processes: int) -> tuple[list, list, list]:
@@ -36,16 +38,28 @@ def observe_all(case: Case, processes: int) -> tuple[list, list, list]:
 
 
 def observe_whole_and_halves(recording: Recording, rig: Rig) -> list[Observation]:
-    """The observation of a recording; for a periodic one also those of both halves."""
+    """The observation of a recording; for a periodic one that is long enough also those of both
+    halves.
+
+    The scatter of a half is that of the whole recording: few revolutions do not tell it.
+    """
     if recording.kind != "periodic":
         return [observe(recording, rig, HIGHEST_HZ)]
     revolutions = revolutions_of(recording, rig)
-    half = len(revolutions.windows) // 2
-    parts = [
-        replace(revolutions, windows=revolutions.windows[part], speed_hz=revolutions.speed_hz[part])
-        for part in (slice(None), slice(0, half), slice(half, None))
-    ]
-    return [observe(recording, rig, HIGHEST_HZ, revolutions=part) for part in parts]
+    count = len(revolutions.windows)
+    whole = observe(recording, rig, HIGHEST_HZ, revolutions=revolutions)
+    if count < REVOLUTIONS_OF_HALVES:
+        return [whole]
+    halves = []
+    for part in (slice(0, count // 2), slice(count // 2, None)):
+        windows, speed_hz = revolutions.windows[part], revolutions.speed_hz[part]
+        cut = replace(revolutions, windows=windows, speed_hz=speed_hz)
+        half = observe(recording, rig, HIGHEST_HZ, revolutions=cut)
+        # A half that turns more slowly may reach an order higher.
+        own = np.searchsorted(whole.orders, np.minimum(half.orders, whole.orders[-1]))
+        covariance = whole.covariance[own] * (count / len(windows))
+        halves.append(replace(half, covariance=covariance))
+    return [whole, *halves]
 
 
 def prepare_base(

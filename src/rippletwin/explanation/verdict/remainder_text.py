@@ -73,6 +73,8 @@ def shaft_order_sentences(shaft_orders: ShaftOrders | None) -> list[str]:
 
 
 def _shaft_effect_in_words(effect: ShaftEffect) -> str:
+    if effect.value is None:
+        return "unequal pistons"
     is_speed = effect.name == "speed_fluctuation"
     unit = unit_of("rad" if is_speed else "1", "amplitude")
     value = write_value(effect.value, unit, effect.interval)

@@ -127,7 +127,7 @@ def _shaft_effect(effect: ShaftEffect, support: str) -> dict:
     return {
         "name": effect.name,
         "element": "source",
-        "parameters": {"amplitude": amplitude},
+        "parameters": {} if effect.value is None else {"amplitude": amplitude},
         "support": support,
     }
 
