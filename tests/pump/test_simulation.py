@@ -206,3 +206,18 @@ def test_a_pressure_that_is_no_number_has_no_flow():
 
     assert np.isfinite(flow(np.full(2, compressed)))
     assert np.isnan(flow(np.array([compressed, np.nan])))
+
+
+def test_defaults_grow_with_the_pump():
+    """A pump of half the size in each direction delivers as large a share of its displacement as
+    the default one: at each speed and pressure losses in ports, by compression and by leakage are
+    the same shares. A stated number stays, and an unknown pump is the default one."""
+    small = {"piston_diameter": 0.0085, "pitch_radius": 0.01675}
+    shares = []
+    for pump in ({}, small):
+        geometry = Geometry.from_dict(pump)
+        flow = simulate(pump, OIL, 1500.0, ConstantPressure(2e7)).flow.mean()
+        shares.append(flow / (geometry.displacement * 25.0))
+    assert 0.85 < shares[1] == pytest.approx(shares[0], abs=0.02)
+    assert Geometry.from_dict({"pistons": 7}).dead_volume == Geometry().dead_volume
+    assert Geometry.from_dict(small | {"dead_volume": 3e-6}).dead_volume == 3e-6

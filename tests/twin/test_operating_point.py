@@ -7,7 +7,9 @@ import pytest
 
 from paper_rig import paper_rig
 from rippletwin.case.model import Fluid
+from rippletwin.errors import InputError
 from rippletwin.twin.operating_point import operating_point
+from rippletwin.twin.twin import Twin
 from synthetic_recordings import point
 
 RIG = replace(paper_rig(), fluid=Fluid(870.0, 6e-5))
@@ -68,3 +70,12 @@ def test_without_a_stated_pressure_the_sensor_nearest_the_load_tells_it():
         o = replace(point(rig), load_pressure=None, mean=means[order])
         nearest = np.argmax([sensor.position for sensor in RIG.sensors])
         assert operating_point(rig, o, o.flow_ripple).load_pressure == means[nearest]
+
+
+def test_a_pump_that_delivers_nothing_is_refused():
+    """Ports of 1 mm2 at 3000 r/min: the mean flow would be negative, and the orifice with it."""
+    rig = replace(RIG, pump={"pistons": 9, "piston_diameter": 0.017, "port_area": 1e-6})
+    o = replace(point(rig, speed_rpm=3000.0), flow_ripple=None)
+    with pytest.raises(InputError, match="delivers nothing") as refused:
+        Twin(rig, [o]).operating_point(o)
+    assert "rig.yaml" in str(refused.value) and "r/min" in str(refused.value)

@@ -106,7 +106,8 @@ class NewSheet:
         if any(self.pump.get(key) is None for key in GENERIC_PUMP):
             lines += [
                 "  # A number behind a # is not known; faults are then simulated with that of a",
-                "  # generic pump of 42 cm3 per revolution. Correct it and take the # away.",
+                "  # generic pump of 42 cm3 per revolution, with dead_volume and port_area in",
+                "  # proportion to the size of your pistons. Correct it and take the # away.",
             ]
         for key, (example, unit, words) in GENERIC_PUMP.items():
             value = self.pump.get(key)

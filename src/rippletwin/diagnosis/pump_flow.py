@@ -83,7 +83,7 @@ def _with_stated_discharge(pump: dict, stated: float | None) -> dict:
     if fitted in (None, stated):
         return pump
     ratio = fitted / (stated or Geometry.discharge_coefficient)
-    area = ratio * pump.get("port_area", Geometry.port_area)
+    area = ratio * Geometry.from_dict(pump).port_area
     return pump | {"port_area": area, "discharge_coefficient": stated}
 
 

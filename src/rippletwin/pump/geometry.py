@@ -6,7 +6,7 @@ its inner dead centre. Piston k lags piston 0 by k/pistons of a revolution.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -16,10 +16,19 @@ LEAK_DISCHARGE = 0.7
 """Discharge coefficient of a leak where the data sheet gives none."""
 
 
+GROWS_WITH = {
+    "dead_volume": "stroke_volume",
+    "port_area": "piston_area",
+    "case_leakage": "stroke_volume",
+}
+"""Key -> the size of a pump with which its default grows."""
+
+
 @dataclass(frozen=True)
 class Geometry:
     """The keys of rig.yaml's `pump`, SI units; defaults describe a pump of 42 cm3/rev, see
-    docs/explanation/pump.md for their origin. `leak_discharge` is no key: a leak has the discharge
+    docs/explanation/pump.md for their origin. `from_dict` scales those of GROWS_WITH to the
+    pistons of another pump. `leak_discharge` is no key: a leak has the discharge
     coefficient that the data sheet states."""
 
     pistons: int = 9
@@ -49,6 +58,12 @@ class Geometry:
         stated = {key: value for key, value in pump.items() if value is not None}
         leak_discharge = stated.get("discharge_coefficient", LEAK_DISCHARGE)
         geometry = cls(**stated, leak_discharge=leak_discharge)
+        scaled = {
+            name: getattr(cls, name) * getattr(geometry, size) / getattr(cls(), size)
+            for name, size in GROWS_WITH.items()
+            if name not in stated
+        }
+        geometry = replace(geometry, **scaled)
         may_be_negative = ("port_timing_deg", "port_overlap_deg", "suction_pressure")
         may_be_zero = ("air_fraction", "case_leakage")
         for name in known:
@@ -70,10 +85,15 @@ class Geometry:
         return geometry
 
     @property
+    def piston_area(self) -> float:
+        """Area of a piston, m2."""
+        return np.pi * self.piston_diameter**2 / 4
+
+    @property
     def stroke_volume(self) -> float:
         """What one piston displaces in one revolution, m3: A_p 2 R tan(alpha)."""
-        area = np.pi * self.piston_diameter**2 / 4
-        return area * 2 * self.pitch_radius * np.tan(np.radians(self.swash_angle_deg))
+        stroke = 2 * self.pitch_radius * np.tan(np.radians(self.swash_angle_deg))
+        return self.piston_area * stroke
 
     @property
     def displacement(self) -> float:

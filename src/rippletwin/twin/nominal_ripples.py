@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from rippletwin.case.model import FlowRipple, Rig
+from rippletwin.errors import InputError
 from rippletwin.harmonics import modulate_ripple
 
 
@@ -30,10 +31,19 @@ class NominalRipples:
             from rippletwin.pump.outlets import ConstantPressure
             from rippletwin.pump.simulation import simulate
 
-            self._made[key] = simulate(
+            made = simulate(
                 self._rig.pump,
                 self._rig.fluid,
                 60.0 * observation.speed_hz,
                 ConstantPressure(observation.load_pressure),
             )
+            if not made.flow.mean() > 0.0:
+                raise InputError(
+                    "rig.yaml",
+                    "pump",
+                    f"this pump delivers nothing at {60.0 * observation.speed_hz:.4g} r/min and "
+                    f"{observation.load_pressure / 1e5:.4g} bar, as of {observation.label}",
+                    "Correct its numbers, the speed or the load pressure",
+                )
+            self._made[key] = made
         return self._made[key]
