@@ -11,6 +11,7 @@ from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.ripple_correction import correct_ripple, with_corrected_ripple
 from rippletwin.harmonics import one_period, peak_amplitudes
 from rippletwin.spectra.corrected_ripple import CorrectedRipple
+from rippletwin.spectra.frequency_selection import select_frequencies
 from synthetic_observations import make
 
 
@@ -57,6 +58,19 @@ def test_the_correction_holds_at_an_operating_point_that_was_not_fitted(fitted):
     ripple = correct_ripple(fit, data[:2])
     nominal = score_fit(fit, data[2:], turn=True).misfit
     assert score_fit(fit, data[2:], turn=True, ripple=ripple).misfit < 0.1 * nominal
+
+
+def test_recordings_without_a_common_order_are_corrected_too(fitted):
+    """One recording has the lower half of the band, another the upper half: each has the known
+    error of its own orders."""
+    fit, data = fitted
+    low, high = (
+        select_frequencies(o, (o.orders < 100) if k == 0 else (o.orders > 100))
+        for k, o in enumerate(data[:2])
+    )
+    ripple = correct_ripple(fit, [low, high])
+    np.testing.assert_allclose(ripple.at(low.label, low.orders), by_order(low.orders), atol=0.02)
+    assert np.all(np.isfinite(ripple.at(high.label, high.orders)))
 
 
 def test_what_turns_the_shaft_is_no_error_of_the_ripple():

@@ -154,6 +154,16 @@ def test_pieces_too_short_for_cells_converge():
     assert errors[1] < errors[0] / 4
 
 
+def test_a_branch_too_short_for_cells_is_its_admittance():
+    """A dead end of 1 cm, less than two cells at 1152 steps, reads as the frequency domain says: it
+    is a volume with the mass of a third of its oil. Its bore is wide, so that it matters."""
+    stub = Branch(0.8, Pipe(0.01, 0.06, 1250.0), 0.6)
+    moc, net, positions = short_line(1152, inserts=[stub])
+    chain = net.pressure_at(positions)
+    assert misfit(moc, chain) < 0.002
+    assert misfit(without_effect(net).pressure_at(positions), chain) > 0.02
+
+
 def test_order_within_a_ladder_matters():
     """A volume before and behind an inertance are two things, in both domains."""
     ahead, behind = [

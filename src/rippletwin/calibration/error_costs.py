@@ -12,7 +12,7 @@ TINY = 1e-300
 def error_costs(
     residual, h, variance, power, source_scale, nominal, basis, model_errors, sds, smooth_sds, scale
 ):
-    """Twice minus the log likelihood of residuals, but for a constant: (T, G, D) for smooth_sds
+    """Minus the log likelihood of complex residuals, but for a constant: (T, G, D) for smooth_sds
     (T, J), sds (G,) and model_errors (D,).
 
     residual, h, variance   (S, F), in a basis in which the noise is diagonal

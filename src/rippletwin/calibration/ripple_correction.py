@@ -39,7 +39,8 @@ def correct_ripple(fit: Fit, observations: Sequence) -> CorrectedRipple:
             first = next(iter(ratios))
             common, a, b = np.intersect1d(orders[first], orders[o.label], return_indices=True)
             weighted = posterior.power[part][b] * np.conj(ratios[o.label][b]) * ratios[first][a]
-            turns[o.label] = find_best_turn(weighted, common)[0]
+            # Recordings of bands without a common order do not tell how their angles differ.
+            turns[o.label] = find_best_turn(weighted, common)[0] if len(common) else 0.0
     return CorrectedRipple(orders, ratios, turns)
 
 

@@ -2,7 +2,8 @@
 
 Elements and branches divide the segments. Between two pipes is a junction: a ladder of rungs in
 order from pump to load. A piece too short for cells of its own (fewer than three) becomes rungs
-too, its pi section: half of its capacitance, its inertance, the other half.
+too, its pi section: half of its capacitance, its inertance, the other half. Of a branch that is so
+short the mass that moves is a third of its inertance.
 """
 
 from __future__ import annotations
@@ -83,19 +84,39 @@ def discretise(line: TimeDomainLine, dt: float) -> tuple[list[Pipe], list[float]
                 joints.append([])
             else:
                 joints[-1] += _pi_section(piece, line)
-        joints[-1] += [insert for insert, k in zip(line.inserts, at) if k == n]
+        joints[-1] += [_rung(insert, line, dt) for insert, k in zip(line.inserts, at) if k == n]
     joints[-1] += line.load
     if not pipes:
         raise ValueError("the line is cut into pieces shorter than three steps")
     return pipes, starts, joints
 
 
+def _rung(
+    insert: Element | Storage | Branch, line: TimeDomainLine, dt: float
+) -> Element | Storage | Branch:
+    """The insert as a rung: a branch too short for cells of its own as its admittance C s/(1 + C
+    L/3 s (s + loss)), the first terms of sqrt(Y'/Z') tanh(l sqrt(Z' Y'))."""
+    if not isinstance(insert, Branch) or cells_of(insert.pipe, dt) >= MIN_CELLS:
+        return insert
+    storage, mass, loss = _lumped(insert.pipe, line)
+    moved = storage * mass / 3.0
+    denominator = moved, moved * loss * insert.viscosity_ratio, 1.0
+    return Element(insert.position, "shunt", (storage, 0.0), denominator)
+
+
+def _lumped(pipe: Pipe, line: TimeDomainLine) -> tuple[float, float, float]:
+    """Capacitance, m3/Pa, inertance, Pa s2/m3, and its decay rate by friction, 1/s, of a pipe."""
+    area = 0.25 * np.pi * pipe.diameter**2
+    loss = 0.0 if line.friction == "none" else 32.0 * line.viscosity / pipe.diameter**2
+    storage = area * pipe.length / (line.density * pipe.wave_speed**2)
+    return storage, line.density * pipe.length / area, loss
+
+
 def _pi_section(piece: Pipe, line: TimeDomainLine) -> list[Element]:
     """A piece much shorter than the wave, with an elastic and a yielding wall."""
-    piece, area = piece.linear(line.density), 0.25 * np.pi * piece.diameter**2
-    half = 0.5 * area * piece.length / (line.density * piece.wave_speed**2)
-    mass = line.density * piece.length / area
-    loss = 0.0 if line.friction == "none" else 32.0 * line.viscosity / piece.diameter**2
+    piece = piece.linear(line.density)
+    storage, mass, loss = _lumped(piece, line)
+    half = 0.5 * storage
     side = [capacitance(0.0, half)]
     side += [Element(0.0, "shunt", (half * kappa, 0.0), (tau, 1.0)) for kappa, tau in piece.creep]
     return [*side, Element(0.0, "series", (mass, mass * loss)), *side]
