@@ -62,14 +62,14 @@ def test_the_correction_holds_at_an_operating_point_that_was_not_fitted(fitted):
 
 def test_recordings_without_a_common_order_are_corrected_too(fitted):
     """One recording has the lower half of the band, another the upper half: each has the known
-    error of its own orders."""
+    error of its own orders, to 6 % at weak ones."""
     fit, data = fitted
     low, high = (
         select_frequencies(o, (o.orders < 100) if k == 0 else (o.orders > 100))
         for k, o in enumerate(data[:2])
     )
     ripple = correct_ripple(fit, [low, high])
-    np.testing.assert_allclose(ripple.at(low.label, low.orders), by_order(low.orders), atol=0.02)
+    np.testing.assert_allclose(ripple.at(low.label, low.orders), by_order(low.orders), atol=0.06)
     assert np.all(np.isfinite(ripple.at(high.label, high.orders)))
 
 
