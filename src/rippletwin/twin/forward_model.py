@@ -1,6 +1,7 @@
 """The twin's forward model: what the sensors read, with the nonlinear load and compliance solved.
 
-Both couple harmonics, and are solved in a model with harmonics above those observed.
+Both couple harmonics, and are solved in a model with all harmonics of the pump, also above those
+observed.
 """
 
 from __future__ import annotations
@@ -113,7 +114,7 @@ class ForwardModel(SmallRippleLine):
 
     @property
     def _orifice_is_exact(self) -> bool:
-        """Whether the orifice alone is solved with harmonics above those observed."""
+        """Whether the orifice alone is solved with all harmonics."""
         return not self.has_nonlinear_compliance
 
     def _balance(
@@ -122,8 +123,8 @@ class ForwardModel(SmallRippleLine):
         """Set the full-amplitude state at the load of `network`, and its outflows; returns what was
         found with that state where one sweep gives all of it.
 
-        Both are solved in a model with harmonics above those observed; `whole` is its line where
-        only the orifice is nonlinear.
+        Both are solved in a model with all harmonics; `whole` is its line where only the orifice is
+        nonlinear.
         """
         if whole is None:
             wide, seen = self._extended_for_compliance
@@ -181,18 +182,25 @@ class ForwardModel(SmallRippleLine):
         return self._extend(lambda top, step: top + (ORIFICE_HARMONICS + 0.5) * step)
 
     def _extend(self, highest) -> tuple[ForwardModel, np.ndarray]:
-        """The model with more harmonics of every recording, up to the order `highest` (top order
-        observed, step), and the columns of those observed in it."""
+        """The model with all harmonics of every recording, up to the order `highest` (top order
+        observed, step), and the columns of those observed in it.
+
+        Those below and between the observed ones are there too: a band or a part of it that is
+        left out of a fit is still in the pump's ripple.
+        """
         wide = list(self.observations)
+        observed = [np.arange(part.stop - part.start) for part in self.slices]
         for r in self._periodic:
             o = wide[r]
-            step, top = np.gcd.reduce(np.asarray(o.orders, int)), np.max(o.orders)
-            most = min(highest(top, step), 0.5 * len(self._ripples[r].angle_deg))
-            orders = np.append(o.orders, np.arange(top + step, most, step))
+            own, top = np.asarray(o.orders, int), np.max(o.orders)
+            step = np.gcd.reduce([*own, self.twin.rig.pump["pistons"]])
+            most = min(highest(top, step), self._ripples[r].highest_order + 0.5)
+            orders = np.union1d(own, np.arange(step, most, step))
             wide[r] = replace(o, orders=orders, frequency_hz=orders * o.speed_hz)
+            observed[r] = np.searchsorted(orders, own)
         forward = ForwardModel(self.twin, wide)
-        own = [np.r_[b][: a.stop - a.start] for a, b in zip(self.slices, forward.slices)]
-        return forward, np.concatenate(own)
+        columns = [part.start + own for part, own in zip(forward.slices, observed)]
+        return forward, np.concatenate(columns)
 
 
 def _rows(observation, names: list[str]) -> list[int]:
