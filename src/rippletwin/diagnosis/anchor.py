@@ -54,11 +54,18 @@ def distance(
 ) -> float:
     """Sum of the relative differences of speed and load pressure of two operating points; 0 where
     they are one, set twice. A pressure that is not known is no difference."""
-    by_speed = abs(np.log(speed / other_speed))
+    by_speed, by_pressure = differences(speed, other_speed, pressure, other_pressure)
+    same = by_speed < SAME_SPEED and by_pressure < SAME_PRESSURE
+    return 0.0 if same else by_speed + by_pressure
+
+
+def differences(
+    speed: float, other_speed: float, pressure: float | None, other_pressure: float | None
+) -> tuple[float, float]:
+    """Relative differences of speed and load pressure of two operating points, as `distance`."""
     both = (pressure or 0.0) > 0.0 and (other_pressure or 0.0) > 0.0
     by_pressure = abs(np.log(pressure / other_pressure)) if both else 0.0
-    same = by_speed < SAME_SPEED and by_pressure < SAME_PRESSURE
-    return 0.0 if same else float(by_speed + by_pressure)
+    return float(abs(np.log(speed / other_speed))), float(by_pressure)
 
 
 def distance_between(one, other) -> float:

@@ -11,7 +11,7 @@ from rippletwin.calibration.likelihood import Likelihood
 from rippletwin.calibration.misfit import measure_misfit
 from rippletwin.calibration.shaft_angles import fit_shaft_angles
 from rippletwin.case.model import Case, Recording, Rig
-from rippletwin.diagnosis.anchor import distance
+from rippletwin.diagnosis.anchor import differences, distance
 from rippletwin.diagnosis.diagnoser import MOST_REPEATS, Diagnoser
 from rippletwin.diagnosis.diagnosis import Diagnosis
 from rippletwin.diagnosis.faults.base import Fault
@@ -180,12 +180,11 @@ def select_recordings(case: Case, labels: Sequence[str] = ()) -> list[Recording]
 
 def find_anchors(case: Case, recording: Recording) -> list[Recording]:
     """The healthy recording whose operating point is nearest, and others of the same point: as many
-    as `Diagnoser` looks at. Raises InputError where there is none."""
+    as `Diagnoser` looks at. Among those of one point the least different come first, then by their
+    labels: the order of the sheet does not count. Raises InputError where there is none."""
 
-    def apart(other: Recording) -> float:
-        return distance(
-            other.speed_rpm, recording.speed_rpm, other.load_pressure, recording.load_pressure
-        )
+    def points(other: Recording) -> tuple:
+        return other.speed_rpm, recording.speed_rpm, other.load_pressure, recording.load_pressure
 
     healthy = [r for r in case.healthy if r.kind == "periodic" and r.label != recording.label]
     if not healthy:
@@ -195,8 +194,11 @@ def find_anchors(case: Case, recording: Recording) -> list[Recording]:
             f"no healthy periodic recording beside {recording.label}",
             "Diagnosing needs one, best of the same operating point",
         )
-    nearest = min(map(apart, healthy))
-    return [r for r in healthy if apart(r) == nearest][: 1 + MOST_REPEATS]
+    apart = {r.label: distance(*points(r)) for r in healthy}
+    nearest = min(apart.values())
+    same = [r for r in healthy if apart[r.label] == nearest]
+    same.sort(key=lambda r: (sum(differences(*points(r))), r.label))
+    return same[: 1 + MOST_REPEATS]
 
 
 def check_twin(case: Case, twin: Twin) -> None:
