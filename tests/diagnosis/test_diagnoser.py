@@ -18,8 +18,10 @@ from rippletwin.diagnosis.faults.library import select_faults
 from rippletwin.diagnosis.hypothesis import Errors, Hypothesis
 from rippletwin.diagnosis.screening import Screen
 from rippletwin.diagnosis.unlike import combine, judge_residual
+from rippletwin.errors import InputError
 from rippletwin.figures import fault_posterior
 from rippletwin.pump.faults import Cylinder, Slipper
+from rippletwin.spectra.frequency_selection import select_frequencies
 from rippletwin.twin.twin import Twin
 
 DRIFTED = leaking_pump.WAVE_SPEED * 1.003
@@ -279,3 +281,15 @@ def test_both_pictures_of_every_state_are_written(diagnoses, tmp_path):
     written = fault_posterior.draw(numbers, tmp_path, [".svg"])
     assert len(written) == 2 * len(STATES) + 1
     assert all(path.stat().st_size > 1000 for path in written)
+
+
+@pytest.mark.parametrize("which", ["now", "anchor"])
+def test_a_band_below_the_pistons_is_refused(which):
+    """Eight orders of a pump of nine pistons, of the recording or of its anchor: the message names
+    it and the key, where a filter of size zero ended the diagnosis."""
+    records = {label: leaking_pump.record(label) for label in ("now", "anchor")}
+    twin = Twin(leaking_pump.rig(), [records["anchor"]])
+    records[which] = select_frequencies(records[which], slice(8))
+    with pytest.raises(InputError, match=rf"recording {which}: max_frequency_hz: .* 133.3 Hz") as e:
+        Diagnoser(twin, ()).make_model(records["now"], records["anchor"])
+    assert "150 Hz" in e.value.problem and e.value.remedy
