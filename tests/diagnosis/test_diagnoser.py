@@ -10,6 +10,7 @@ import pytest
 from scipy.stats import kstest
 
 import leaking_pump
+from rippletwin.case.model import Load
 from rippletwin.diagnosis.diagnosed_numbers import gather
 from rippletwin.diagnosis.diagnoser import Diagnoser
 from rippletwin.diagnosis.diagnosis_file import diagnosis_dict
@@ -293,3 +294,15 @@ def test_a_band_below_the_pistons_is_refused(which):
     with pytest.raises(InputError, match=rf"recording {which}: max_frequency_hz: .* 133.3 Hz") as e:
         Diagnoser(twin, ()).make_model(records["now"], records["anchor"])
     assert "150 Hz" in e.value.problem and e.value.remedy
+
+
+def test_a_load_that_was_not_measured_in_the_band_is_refused():
+    """A table to 2 kHz behind harmonics to 3 kHz, of which the upper third had its end value."""
+    table = np.array([50.0, 2000.0])
+    load = Load("impedance", frequency_hz=table, impedance=np.full(2, 4e9 + 0j))
+    anchor = leaking_pump.record("anchor")
+    diagnoser = Diagnoser(Twin(replace(leaking_pump.rig(), load=load), [anchor]), ())
+    with pytest.raises(InputError, match=r"to 2000 Hz, but anchor is fitted .* to 3000 Hz"):
+        diagnoser.make_model(anchor, anchor)
+    within = select_frequencies(anchor, slice(120))
+    assert len(diagnoser.make_model(within, within).anchor.orders) == 120

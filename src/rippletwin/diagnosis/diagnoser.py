@@ -29,7 +29,7 @@ from rippletwin.diagnosis.pump_flow import (
 )
 from rippletwin.diagnosis.unlike import judge_residual
 from rippletwin.errors import InputError
-from rippletwin.spectra.frequency_selection import select_frequencies
+from rippletwin.spectra.frequency_selection import check_load_table, select_frequencies
 from rippletwin.twin.twin import Twin
 
 MOST_REPEATS = 2  # healthy recordings beside the anchor whose scatter is looked at
@@ -84,10 +84,11 @@ class Diagnoser:
         """The observation model of an observation, anchored to a healthy one, at the orders that
         both have, `ORDERS` at most. `start` and `repeats` as in `ObservationModel`.
 
-        Raises InputError where none of them is the pistons'.
+        Raises InputError where none of them is the pistons', and as `check_load_table`.
         """
         for each in (observation, healthy):
             _check_orders(each, self.twin.rig.pump["pistons"])
+        check_load_table([observation, healthy], self.twin.rig)
         count = min(len(healthy.orders), len(observation.orders), ORDERS)
         healthy, observation = (select_frequencies(o, slice(count)) for o in (healthy, observation))
         pressure = _rounded(load_pressure_of(self.twin, observation))
