@@ -11,6 +11,7 @@ from case_folders import spoilt, told
 from rippletwin.case.band import FIRST_CROSS_MODE, plane_wave_limit
 from rippletwin.case.load import load_case
 from rippletwin.case.model import Fluid, Load, Rig, Segment
+from rippletwin.cli import main
 from rippletwin.errors import InputError
 from rippletwin.spectra.frequency_selection import check_sources, select_fitted_frequencies
 from rippletwin.spectra.observation import observe
@@ -69,6 +70,43 @@ def test_a_band_without_a_fitted_frequency_is_bad_input(tmp_path, keys):
     with pytest.raises(InputError) as caught:
         select_fitted_frequencies([observed], case.rig)
     told(caught.value, "healthy_0", "min_frequency_hz, max_frequency_hz", "piston frequency")
+
+
+def behind_a_table(folder, **keys):
+    """A case whose load was measured from 200 to 600 Hz; its recording has more keys."""
+
+    def spoil(content):
+        content["load"] = {"impedance": "load.csv"}
+        content["recordings"][0].update(keys)
+
+    spoilt(folder, spoil)
+    (folder / "load.csv").write_text("frequency_hz,re,im\n200,4e9,0\n600,4e9,1e9\n")
+    return folder
+
+
+@pytest.mark.parametrize("fit", ["calibrate", "explain", "check"])
+def test_a_load_that_was_not_measured_at_a_fitted_frequency_is_bad_input(
+    tmp_path, capsys, monkeypatch, fit
+):
+    """Multiples of 150 Hz beyond either end of the table had its end value without a word. Both
+    ranges and the keys that narrow the band are told, before anything is fitted."""
+    monkeypatch.setattr("rippletwin.calibration.frequency_continuation.choose_starts", None)
+    command = [fit, str(behind_a_table(tmp_path))]
+    assert main(command if fit == "check" else [*command, "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert "load.impedance, frequency_hz: the table reaches from 200 to 600 Hz" in said
+    assert "healthy_0 is fitted from 150" in said
+    assert "min_frequency_hz: 200 and max_frequency_hz: 600" in said
+    assert "--min-frequency, --max-frequency" in said
+
+
+def test_a_band_within_the_table_of_the_load_is_fitted(tmp_path):
+    """Shaft orders below the band are not fitted, and are no reason to refuse the table."""
+    case = load_case(behind_a_table(tmp_path, min_frequency_hz=200, max_frequency_hz=590))
+    observed = observe(case.recordings[0], case.rig)
+    assert observed.frequency_hz[0] < 20.0
+    (fitted,) = select_fitted_frequencies([observed], case.rig)
+    np.testing.assert_allclose(fitted.frequency_hz, [300, 450], rtol=2e-3)
 
 
 def test_a_table_may_begin_at_0_hz(tmp_path):

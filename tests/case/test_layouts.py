@@ -2,6 +2,7 @@
 are those that were written."""
 
 import shutil
+import struct
 import sys
 
 import h5py
@@ -16,6 +17,8 @@ from case_folders import RATE, refused, sheet, write_case
 from paths import MEASURED, ROOT
 from recorder_files import ALL, NUMBERED, OTHERS, PRESSURE, TIME, duct_like, hdf5, read, same
 from rippletwin.case.load import load_case
+from rippletwin.case.readers import wav
+from rippletwin.case.readers.layout import Layout
 
 
 def in_groups(file):
@@ -162,6 +165,19 @@ def test_tdms_channels_of_two_lengths_are_refused(tmp_path):
 COUNT = 600.0  # Pa
 
 
+def wav_bytes(data, channels, bits, valid_bits=None):
+    """A WAV file of whole numbers, of an extensible format where its valid bits are stated."""
+    rate, block = int(RATE), channels * bits // 8
+    head = struct.pack("<HHIIHH", 1, channels, rate, rate * block, block, bits)
+    if valid_bits is not None:
+        guid = bytes.fromhex("0100000000001000800000aa00389b71")
+        head = struct.pack("<H", 0xFFFE) + head[2:]
+        head += struct.pack("<HHI", 22, valid_bits, 0) + guid
+    body = b"WAVEfmt " + struct.pack("<I", len(head)) + head
+    body += b"data" + struct.pack("<I", len(data)) + data
+    return b"RIFF" + struct.pack("<I", len(body)) + body
+
+
 @pytest.mark.parametrize("bits", [16, 24, 32])
 def test_wav_of_counts(tmp_path, bits):
     """Whole numbers of 16 or 24 bits come in as counts, which `scale` makes a pressure; floating
@@ -176,15 +192,22 @@ def test_wav_of_counts(tmp_path, bits):
             wavfile.write(path, int(RATE), (counts.T * COUNT).astype(np.float32))
         else:
             packed = counts.T.astype("<i4").copy().view(np.uint8).reshape(-1, 4)[:, :3].tobytes()
-            rate, block = int(RATE), 4 * 3
-            head = np.array([16], "<u4").tobytes() + np.array([1, 4], "<u2").tobytes()
-            head += np.array([rate, rate * block], "<u4").tobytes()
-            head += np.array([block, 24], "<u2").tobytes()
-            size = [np.array([n], "<u4").tobytes() for n in (36 + len(packed), len(packed))]
-            path.write_bytes(b"RIFF" + size[0] + b"WAVEfmt " + head + b"data" + size[1] + packed)
+            path.write_bytes(wav_bytes(packed, channels=4, bits=24))
 
     scale = 1.0 if bits == 32 else COUNT
     same(read(tmp_path, "r.wav", write, scale=scale, **NUMBERED), relative=1e-4)
+
+
+@pytest.mark.parametrize(("valid_bits", "unused"), [(None, 1), (32, 1), (24, 256), (20, 4096)])
+def test_the_header_of_a_wav_says_the_size_of_its_counts(tmp_path, valid_bits, unused):
+    """Samples of 32 bits, all multiples of 256 and then not: the scale is that of the header's bits
+    in both files. Before, the values of the samples decided it."""
+    path = tmp_path / "r.wav"
+    for low_bits in (0, 1):
+        samples = (256 * np.arange(-50, 50, dtype="<i4") + low_bits).reshape(50, 2)
+        path.write_bytes(wav_bytes(samples.tobytes(), 2, 32, valid_bits))
+        found = wav.read(path, Layout(("p1", "p2")))
+        np.testing.assert_array_equal(found.pressure, samples.T / unused)
 
 
 def test_wav_of_counts_without_a_scale_is_told(tmp_path):

@@ -1,11 +1,11 @@
-"""rippletwin diagnose: the exit code that --fail-on asks for."""
+"""rippletwin diagnose: the exit code that --fail-on asks for, and what is refused at once."""
 
 import json
 from types import SimpleNamespace
 
 import pytest
 
-from case_folders import sheet, write_case
+from case_folders import ripple, sheet, write_case, write_hdf5
 from rippletwin.cli import main
 
 DONE, FOUND = 0, 3
@@ -40,3 +40,25 @@ def test_fail_on_a_fault_and_on_what_is_unlike_all(
     assert capsys.readouterr().out == f"It is {state}.\n"
     written = json.loads((tmp_path / "out/diagnosis.json").read_text())
     assert [each["state"] for each in written["recordings"]] == [state]
+
+
+def test_a_case_without_an_anchor_is_refused_before_anything_is_explained(
+    tmp_path, capsys, monkeypatch
+):
+    """The only healthy recording is of broadband excitation: `explain`, which takes minutes and
+    could use it, is not begun."""
+    content = sheet()
+    point = content["recordings"][0]
+    content["recordings"] = [
+        point | {"file": "now.h5", "state": "unknown"},
+        {"file": "noise.h5", "state": "healthy", "kind": "random"},
+    ]
+    write_case(tmp_path, content)
+    write_hdf5(tmp_path / "noise.h5", ripple())
+    begun = []
+    monkeypatch.setattr(
+        "rippletwin.explanation.explain.explain", lambda *arguments: begun.append(arguments)
+    )
+    assert main(["diagnose", str(tmp_path), "--out", str(tmp_path / "out")]) == 2
+    assert "no healthy periodic recording beside now" in capsys.readouterr().err
+    assert not begun

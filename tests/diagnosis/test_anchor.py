@@ -1,9 +1,15 @@
 """The healthy recording that a diagnosis is anchored to."""
 
+from itertools import permutations
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import leaking_pump
+from rippletwin.case.model import Case, Recording
 from rippletwin.diagnosis.anchor import correlate, distance, find_alignment, relative_misfit
+from rippletwin.diagnosis.diagnose import find_anchors
 
 
 def test_an_operating_point_set_twice_is_one():
@@ -16,6 +22,26 @@ def test_an_operating_point_set_twice_is_one():
 def test_a_pressure_that_is_not_known_is_no_distance():
     """A load that states no pressure is told apart by its speed alone."""
     assert distance(1000.0, 1000.0, None, 5e6) == 0.0
+
+
+def test_the_nearest_healthy_recording_is_the_anchor_in_any_order():
+    """Of recordings of one operating point the least different is the anchor, then the others by
+    how far they are and by label, however the sheet lists them. Before, the first listed was."""
+
+    def recording(label, speed_rpm, pressure=9.5e6, state="healthy"):
+        return Recording(Path(f"{label}.h5"), "periodic", state, label, speed_rpm, pressure)
+
+    unknown = recording("now", 1000.0, state="unknown")
+    healthy = [
+        recording("a", 1008.0),
+        recording("d", 1001.0),
+        recording("c", 1001.0),
+        recording("b", 1000.5),
+        recording("another point", 1200.0),
+    ]
+    for listed in permutations(healthy):
+        case = Case(Path("case"), leaking_pump.rig(), (*listed, unknown))
+        assert [r.label for r in find_anchors(case, unknown)] == ["b", "c", "d"]
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.31, 0.69])

@@ -10,6 +10,7 @@ import pytest
 from scipy.stats import kstest
 
 import leaking_pump
+from rippletwin.case.model import Load
 from rippletwin.diagnosis.diagnosed_numbers import gather
 from rippletwin.diagnosis.diagnoser import Diagnoser
 from rippletwin.diagnosis.diagnosis_file import diagnosis_dict
@@ -18,8 +19,10 @@ from rippletwin.diagnosis.faults.library import select_faults
 from rippletwin.diagnosis.hypothesis import Errors, Hypothesis
 from rippletwin.diagnosis.screening import Screen
 from rippletwin.diagnosis.unlike import combine, judge_residual
+from rippletwin.errors import InputError
 from rippletwin.figures import fault_posterior
 from rippletwin.pump.faults import Cylinder, Slipper
+from rippletwin.spectra.frequency_selection import select_frequencies
 from rippletwin.twin.twin import Twin
 
 DRIFTED = leaking_pump.WAVE_SPEED * 1.003
@@ -279,3 +282,27 @@ def test_both_pictures_of_every_state_are_written(diagnoses, tmp_path):
     written = fault_posterior.draw(numbers, tmp_path, [".svg"])
     assert len(written) == 2 * len(STATES) + 1
     assert all(path.stat().st_size > 1000 for path in written)
+
+
+@pytest.mark.parametrize("which", ["now", "anchor"])
+def test_a_band_below_the_pistons_is_refused(which):
+    """Eight orders of a pump of nine pistons, of the recording or of its anchor: the message names
+    it and the key, where a filter of size zero ended the diagnosis."""
+    records = {label: leaking_pump.record(label) for label in ("now", "anchor")}
+    twin = Twin(leaking_pump.rig(), [records["anchor"]])
+    records[which] = select_frequencies(records[which], slice(8))
+    with pytest.raises(InputError, match=rf"recording {which}: max_frequency_hz: .* 133.3 Hz") as e:
+        Diagnoser(twin, ()).make_model(records["now"], records["anchor"])
+    assert "150 Hz" in e.value.problem and e.value.remedy
+
+
+def test_a_load_that_was_not_measured_in_the_band_is_refused():
+    """A table to 2 kHz behind harmonics to 3 kHz, of which the upper third had its end value."""
+    table = np.array([50.0, 2000.0])
+    load = Load("impedance", frequency_hz=table, impedance=np.full(2, 4e9 + 0j))
+    anchor = leaking_pump.record("anchor")
+    diagnoser = Diagnoser(Twin(replace(leaking_pump.rig(), load=load), [anchor]), ())
+    with pytest.raises(InputError, match=r"to 2000 Hz, but anchor is fitted .* to 3000 Hz"):
+        diagnoser.make_model(anchor, anchor)
+    within = select_frequencies(anchor, slice(120))
+    assert len(diagnoser.make_model(within, within).anchor.orders) == 120

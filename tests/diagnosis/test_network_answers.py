@@ -1,5 +1,6 @@
 """Networks that the workflow keeps, and what they say of a recording."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from rippletwin.case.model import Recording
 from rippletwin.cli import main
 from rippletwin.diagnosis.network_answers import ask_networks, find_networks, judge_windows
 from rippletwin.errors import InputError
-from rippletwin.learning.kept_networks import load_networks
+from rippletwin.learning.kept_networks import KeptNetworks, load_networks
 
 RATE = 51200.0
 
@@ -71,6 +72,24 @@ def test_each_recording_is_asked_at_the_networks_operating_point(tmp_path):
     assert answers["here"]["cnn1d_341_100"]["state"] == "unlike"
 
 
+def test_windows_have_the_sensors_in_the_networks_order(tmp_path, monkeypatch):
+    """Networks that have learnt p2 before p1 are shown p2 first: each channel is what it was."""
+    saved(tmp_path, kept(channels=["p2", "p1"]))
+    rig = leaking_pump.rig()
+    taken = recording("here")
+    taken = replace(taken, pressure=taken.pressure * [[1.0], [3.0]])
+    shown = []
+
+    def answers(networks, windows):
+        shown.append(windows)
+        return np.zeros((1, len(windows)), int), np.ones((1, len(windows)))
+
+    monkeypatch.setattr(KeptNetworks, "answers", answers)
+    ask_networks(find_networks(tmp_path, rig), [taken], rig)
+    first, second = shown[0].std(axis=(0, 2))
+    assert first == pytest.approx(3.0 * second)
+
+
 def test_networks_of_several_datasets_are_called_after_both(tmp_path):
     """Otherwise one would hide the other."""
     saved(tmp_path, kept())
@@ -80,7 +99,8 @@ def test_networks_of_several_datasets_are_called_after_both(tmp_path):
 
 
 def test_folders_without_usable_networks_are_named(tmp_path):
-    """None at all, networks of flow only, of one sensor, and a file that is something else."""
+    """None at all, networks of flow only, of one sensor, of sensors with other names, and a file
+    that is something else."""
     rig = leaking_pump.rig()
     with pytest.raises(InputError, match="no networks that judge pressure"):
         find_networks(tmp_path, rig)
@@ -88,7 +108,10 @@ def test_folders_without_usable_networks_are_named(tmp_path):
     with pytest.raises(InputError, match="no networks that judge pressure"):
         find_networks(tmp_path, rig)
     saved(tmp_path, kept(channels=["p1"]))
-    with pytest.raises(InputError, match="from 1 sensors, and the case has 2"):
+    with pytest.raises(InputError, match="from the sensors p1, and the case has p1, p2"):
+        find_networks(tmp_path, rig)
+    saved(tmp_path, kept(channels=["p1", "outlet"]))
+    with pytest.raises(InputError, match="from the sensors p1, outlet, and the case has p1, p2"):
         find_networks(tmp_path, rig)
     torch.save({"weights": []}, path)
     with pytest.raises(InputError, match="holds no kept networks"):

@@ -1,11 +1,14 @@
 """Every kind of observation and of load, liquid and gas, from synthetic data to the verdict."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from case_folders import sheet, write_case
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor, Uncertainty
+from rippletwin.cli import main
 from rippletwin.explanation.explain import explain_observations
 from rippletwin.explanation.verdict.verdict_file import verdict_dict
 from rippletwin.figures import explained_numbers
@@ -104,3 +107,22 @@ def test_each_kind_is_explained_end_to_end(case, monkeypatch, tmp_path):
     numbers = explained_numbers.load(tmp_path)
     charts = [draw_chart(each) for each in chart_ripples(numbers) + chart_residuals(numbers)]
     assert len(charts) == len(numbers.points[0].measured) + 1
+
+
+def test_pressures_beside_an_input_impedance(tmp_path, capsys):
+    """explain and diagnose refuse them at once and name both, check reads them and says why it has
+    no outlook: they have different numbers of rows, and their errors different units."""
+    content = sheet()
+    content["recordings"] += [
+        {"file": "z.csv", "kind": "input_impedance", "state": "healthy"},
+        content["recordings"][0] | {"label": "now", "state": "unknown"},
+    ]
+    write_case(tmp_path, content)
+    (tmp_path / "z.csv").write_text("frequency_hz,re,im\n100,1e9,1e9\n200,1e9,2e9\n")
+    told = "explain takes either pressures (healthy_0) or input impedances (z)"
+    for command in ("explain", "diagnose"):
+        assert main([command, str(tmp_path), "--out", str(tmp_path / "out")]) == 2
+        assert told in capsys.readouterr().err
+    assert main(["check", str(tmp_path), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["effects"] == [] and any(told in each for each in found["advice"])

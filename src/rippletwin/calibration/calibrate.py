@@ -21,7 +21,7 @@ from rippletwin.calibration.laplace import UNCONVERGED_GAIN, Mode, approximate_p
 from rippletwin.calibration.likelihood import EVENNESS, Likelihood
 from rippletwin.calibration.misfit import Misfit, measure_misfit
 from rippletwin.calibration.shaft_angles import fit_shaft_angles
-from rippletwin.spectra.frequency_selection import check_sources
+from rippletwin.spectra.frequency_selection import check_load_table, check_sources
 from rippletwin.twin.twin import Twin
 from rippletwin.twin.unknown_load import LoadCurve, load_curve
 
@@ -94,12 +94,13 @@ def calibrate(
 
     progress   is called with a sentence after each frequency limit
 
-    Raises ValueError without observations, InputError as `check_sources`.
+    Raises ValueError without observations, InputError as `check_sources` and `check_load_table`.
     """
     if not observations:
         raise ValueError("calibration needs at least one observation")
     check_sources(observations)
     model = Likelihood(twin, observations, settings.max_frequency_hz, evenness=EVENNESS)
+    check_load_table(model.observations, twin.rig)
 
     def report(limit: float, fits: int, part: ErrorModel, theta: np.ndarray) -> None:
         best = measure_misfit(part, theta).relative

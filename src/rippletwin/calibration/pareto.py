@@ -26,7 +26,7 @@ from rippletwin.calibration.frequency_continuation import continuation_limits
 from rippletwin.calibration.likelihood import EVENNESS, Likelihood
 from rippletwin.calibration.misfit import with_likely_amplitude
 from rippletwin.calibration.shaft_angles import align_shaft_angles
-from rippletwin.spectra.frequency_selection import check_sources
+from rippletwin.spectra.frequency_selection import check_load_table, check_sources
 from rippletwin.twin.twin import Twin
 
 BOX = 3.0  # half the width of the box, prior standard deviations
@@ -61,7 +61,7 @@ def calibrate_pareto(
     generations   for each frequency limit
     progress      is called with a sentence after each limit
 
-    Raises ValueError without observations, InputError as `check_sources`.
+    Raises ValueError without observations, InputError as `check_sources` and `check_load_table`.
     """
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.problem import ElementwiseProblem
@@ -71,6 +71,7 @@ def calibrate_pareto(
         raise ValueError("calibration needs at least one observation")
     check_sources(observations)
     whole = Likelihood(twin, observations, settings.max_frequency_hz, evenness=EVENNESS)
+    check_load_table(whole.observations, twin.rig)
     limits = continuation_limits(whole.observations, settings.limits_hz)
     searched = np.array([not p.flat for p in twin.parameters])
 

@@ -132,12 +132,15 @@ def read_repeats(files: list[Path], sensors: list[str] | None) -> tuple[np.ndarr
     """Repeated spectra -> frequency_hz (F,), values (repeats, S, F) at the frequencies all share.
 
     `sensors` names the sensors of a multi-sensor spectrum (columns p1_re, p1_im, ...); None reads
-    an input impedance (columns re, im; S = 1).
+    an input impedance (columns re, im; S = 1). Raises InputError where a spectrum is zero at all
+    sensors, and where files share no frequency.
     """
     parts = ["re", "im"] if sensors is None else [f"{s}_{p}" for s in sensors for p in ("re", "im")]
     tables = [read_table(path, ["frequency_hz", *parts]) for path in files]
     for path, table in zip(files, tables):
         _ascending(path, "frequency_hz", table[0])
+        if sensors is not None:
+            _check_silence(path, parts, table)
     shared = np.round(tables[0][0], 6)
     for path, table in zip(files[1:], tables[1:]):
         shared = np.intersect1d(shared, np.round(table[0], 6))
@@ -153,6 +156,20 @@ def read_repeats(files: list[Path], sensors: list[str] | None) -> tuple[np.ndarr
         at_shared = table[1:, np.isin(np.round(table[0], 6), shared)]
         values.append(at_shared[0::2] + 1j * at_shared[1::2])
     return shared, np.array(values)
+
+
+def _check_silence(path: Path, parts: list[str], table: np.ndarray) -> None:
+    """Raise InputError where a spectrum, rows `parts` of a table (1 + 2 S, F) after the frequency,
+    has no power. Errors are relative to the power; a row at 0 Hz is not used."""
+    silent = np.flatnonzero((np.sum(table[1:] ** 2, axis=0) == 0.0) & (table[0] > 0.0))
+    if silent.size:
+        raise InputError(
+            path,
+            ", ".join(parts),
+            f"{silent.size} row(s) are zero at all sensors, the first is row {silent[0] + 1} at "
+            f"{table[0, silent[0]]:g} Hz",
+            "Remove these rows: nothing was measured there",
+        )
 
 
 def _ascending(path: Path, column: str, values: np.ndarray) -> None:

@@ -38,7 +38,7 @@ def command(case: Path, fail_on: tuple[str, ...], as_json: bool) -> int:
             healthy += [observation] * (recording.state == "healthy")
             if not as_json:
                 print("\n".join(case_summary.recording_in_words(found)), flush=True)
-        effects = _effects(read.rig, healthy, progress)
+        effects = _effects(read, healthy, summary["advice"], progress)
     summary["effects"] = [effect.as_dict() for effect in effects]
     if as_json:
         print(json.dumps(summary))
@@ -47,16 +47,21 @@ def command(case: Path, fail_on: tuple[str, ...], as_json: bool) -> int:
     return found_code(["warning"] if read.warnings else [], fail_on)
 
 
-def _effects(rig, healthy: list, progress) -> list:
-    """What the healthy recordings could tell of each effect of the library."""
+def _effects(case, healthy: list, advice: list[str], progress) -> list:
+    """What the healthy recordings could tell of each effect of the library; where explain cannot
+    take them together, nothing and a sentence more in `advice`."""
     from rippletwin.case.recording_advice import BAND_HZ
+    from rippletwin.explanation.stages.preparation import quantity_error
     from rippletwin.explanation.verdict.expected_confusion import expect_discriminations
     from rippletwin.spectra.frequency_selection import select_fitted_frequencies
 
     if not healthy:
         return []
-    fitted = select_fitted_frequencies(healthy, rig, BAND_HZ)
-    return list(expect_discriminations(rig, fitted, progress))
+    if error := quantity_error(case):
+        advice.append(f"{error.problem}. {error.remedy}.")
+        return []
+    fitted = select_fitted_frequencies(healthy, case.rig, BAND_HZ)
+    return list(expect_discriminations(case.rig, fitted, progress))
 
 
 def _print_outlook(effects: list, advice: list[str]) -> None:

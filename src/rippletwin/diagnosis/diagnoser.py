@@ -28,7 +28,8 @@ from rippletwin.diagnosis.pump_flow import (
     with_fitted_pump,
 )
 from rippletwin.diagnosis.unlike import judge_residual
-from rippletwin.spectra.frequency_selection import select_frequencies
+from rippletwin.errors import InputError
+from rippletwin.spectra.frequency_selection import check_load_table, select_frequencies
 from rippletwin.twin.twin import Twin
 
 MOST_REPEATS = 2  # healthy recordings beside the anchor whose scatter is looked at
@@ -81,7 +82,13 @@ class Diagnoser:
         self, observation, healthy, start: float = 0.0, repeats: Sequence[np.ndarray] = ()
     ) -> ObservationModel:
         """The observation model of an observation, anchored to a healthy one, at the orders that
-        both have, `ORDERS` at most. `start` and `repeats` as in `ObservationModel`."""
+        both have, `ORDERS` at most. `start` and `repeats` as in `ObservationModel`.
+
+        Raises InputError where none of them is the pistons', and as `check_load_table`.
+        """
+        for each in (observation, healthy):
+            _check_orders(each, self.twin.rig.pump["pistons"])
+        check_load_table([observation, healthy], self.twin.rig)
         count = min(len(healthy.orders), len(observation.orders), ORDERS)
         healthy, observation = (select_frequencies(o, slice(count)) for o in (healthy, observation))
         pressure = _rounded(load_pressure_of(self.twin, observation))
@@ -114,6 +121,18 @@ class Diagnoser:
         scatters = [scatter for scatter, _ in found]
         scatter = float(np.exp(np.mean(np.log([prior.scatter, *scatters]))))
         return replace(prior, scatter=scatter), [change for _, change in found]
+
+
+def _check_orders(observation, pistons: int) -> None:
+    """Raise InputError where a periodic observation ends below the first order of the pistons."""
+    if observation.orders[-1] < pistons:
+        raise InputError(
+            f"recording {observation.label}",
+            "max_frequency_hz",
+            f"the band ends at {observation.frequency_hz[-1]:.4g} Hz, below the piston frequency, "
+            f"{pistons * observation.speed_hz:.4g} Hz, which a diagnosis needs",
+            "Give a higher one, best several times the piston frequency, or leave it out",
+        )
 
 
 def _rounded(value: float) -> float:

@@ -25,7 +25,7 @@ def find_networks(results: str | Path, rig: Rig) -> dict[str, KeptNetworks]:
 
     They are called after their architecture; where several datasets have been learnt, after both,
     as in "cnn1d_341_100@CFD-MOC-PR". Raises InputError where there are none, and where they have
-    learnt from another number of sensors than the rig has.
+    learnt from other sensors than the rig has.
     """
     folder = Path(results) / "networks"
     found = read_networks(sorted(folder.glob("*/*.pt")), rig)
@@ -42,18 +42,19 @@ def find_networks(results: str | Path, rig: Rig) -> dict[str, KeptNetworks]:
 def read_networks(files: Sequence[str | Path], rig: Rig) -> dict[str, KeptNetworks]:
     """The networks that judge pressure among those in files, called as `find_networks` says.
 
-    Raises InputError where they have learnt from another number of sensors than the rig has.
+    Raises InputError where they have learnt from other sensors than the rig has.
     """
     read = [(path, load_networks(path)) for path in map(Path, files)]
     found = [(path, kept) for path, kept in read if kept.signal == "pressure"]
     for path, kept in found:
-        if len(kept.channels) != len(rig.sensors):
+        names = [sensor.name for sensor in rig.sensors]
+        if sorted(kept.channels) != sorted(names):
             raise InputError(
                 path,
                 "--networks",
-                f"they have learnt from {len(kept.channels)} sensors, and the case has "
-                f"{len(rig.sensors)}",
-                "Give the results of a workflow that ran on this rig",
+                f"they have learnt from the sensors {', '.join(kept.channels)}, and the case has "
+                f"{', '.join(names)}",
+                "Give the results of a workflow that ran on this rig, or call the sensors alike",
             )
     several = len({kept.dataset for _, kept in found}) > 1
     return {
@@ -73,7 +74,7 @@ def ask_networks(
         recording.label: {
             name: judge_windows(
                 kept.classes,
-                *kept.answers(cut_windows(recording, rig, kept.samples_per_revolution)),
+                *kept.answers(windows_for(kept, recording, rig)),
             )
             for name, kept in networks.items()
             if is_at_their_point(recording, kept)
@@ -93,6 +94,13 @@ def judge_windows(classes: Sequence[str], said: np.ndarray, p_values: np.ndarray
     if unlike > 0.5:
         state, share = "unlike", unlike
     return {"state": state, "share": share, "unlike": unlike}
+
+
+def windows_for(kept: KeptNetworks, recording: Recording, rig: Rig) -> np.ndarray:
+    """`cut_windows` with the sensors in the order in which networks have learnt them."""
+    names = [sensor.name for sensor in rig.sensors]
+    windows = cut_windows(recording, rig, kept.samples_per_revolution)
+    return windows[:, [names.index(channel) for channel in kept.channels]]
 
 
 def cut_windows(recording: Recording, rig: Rig, samples: int) -> np.ndarray:

@@ -72,7 +72,12 @@ from rippletwin.explanation.search.gas_rivals import fit_gas_rivals
 from rippletwin.explanation.search.neighbouring_lumps import merge_neighbours
 from rippletwin.explanation.search.passive_networks import accepted_network, fit_passive_networks
 from rippletwin.explanation.search.stepwise_search import Search
-from rippletwin.explanation.stages.preparation import HIGHEST_HZ, observe_all, select_fitted_as
+from rippletwin.explanation.stages.preparation import (
+    HIGHEST_HZ,
+    observe_all,
+    quantity_error,
+    select_fitted_as,
+)
 from rippletwin.explanation.stages.staged_search import (
     Progress,
     fit_base_only,
@@ -94,9 +99,12 @@ def explain(
     draws      recordings without an effect to draw for the threshold (`checks.bootstrap`); 0 for
                the default threshold
 
-    Raises InputError if no recording is healthy, ValueError for too few draws.
+    Raises InputError if no recording is healthy, and where the healthy ones are pressures and input
+    impedances; ValueError for too few draws.
     """
     check_draws(draws)
+    if error := quantity_error(case):
+        raise error
     if not case.healthy:
         raise InputError(
             case.folder / "rig.yaml",

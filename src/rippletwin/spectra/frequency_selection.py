@@ -19,7 +19,8 @@ def select_fitted_frequencies(observations: Sequence, rig, highest_hz: float | N
     Of a dense spectrum FREQUENCIES_PER_RESONANCE: the error of a model has the bandwidth of the
     line's resonances, so that closer points are no further evidence.
 
-    Raises InputError where nothing of an observation is left, and as `check_sources`.
+    Raises InputError where nothing of an observation is left, as `check_sources`, and as
+    `check_load_table`.
     """
     check_sources(observations)
     spacing = 1.0 / (2.0 * FREQUENCIES_PER_RESONANCE * rig.delay)
@@ -27,8 +28,7 @@ def select_fitted_frequencies(observations: Sequence, rig, highest_hz: float | N
     for o in observations:
         o = select_below(o, highest_hz)
         if o.orders is not None:
-            keep = np.asarray(o.orders) % rig.pump["pistons"] == 0
-            keep &= o.frequency_hz >= o.min_frequency_hz
+            keep = _own_harmonics(o, rig)
         else:
             keep = np.zeros(len(o.frequency_hz), bool)
             keep[
@@ -48,7 +48,36 @@ def select_fitted_frequencies(observations: Sequence, rig, highest_hz: float | N
                 "Give a wider band",
             )
         prepared.append(select_frequencies(o, keep))
+    check_load_table(prepared, rig)
     return prepared
+
+
+def _own_harmonics(observation, rig) -> np.ndarray:
+    """Mask (F,) of the multiples of the piston frequency in the band of a periodic observation."""
+    own = np.asarray(observation.orders) % rig.pump["pistons"] == 0
+    return own & (observation.frequency_hz >= observation.min_frequency_hz)
+
+
+def check_load_table(observations: Sequence, rig) -> None:
+    """Raise InputError where a load impedance was not measured at a frequency that is fitted: the
+    table's ends would stand for it. Of periodic observations the pistons' orders are fitted."""
+    table = rig.load.frequency_hz
+    for o in observations if table is not None else ():
+        fitted = o.frequency_hz if o.orders is None else o.frequency_hz[_own_harmonics(o, rig)]
+        low, high = np.min(fitted, initial=np.inf), np.max(fitted, initial=0.0)
+        ends = ("min", table[0], low < table[0]), ("max", table[-1], high > table[-1])
+        beyond = [(end, at) for end, at, is_passed in ends if is_passed]
+        if beyond:
+            keys = " and ".join(f"{end}_frequency_hz: {at:.6g}" for end, at in beyond)
+            options = ", ".join(f"--{end}-frequency" for end, _ in beyond)
+            raise InputError(
+                "rig.yaml",
+                "load.impedance, frequency_hz",
+                f"the table reaches from {table[0]:.6g} to {table[-1]:.6g} Hz, but {o.label} is "
+                f"fitted from {low:.6g} to {high:.6g} Hz",
+                f"Give this recording {keys} (calibrate and explain: {options}), or measure the "
+                "load over the whole band",
+            )
 
 
 def check_sources(observations: Sequence) -> None:

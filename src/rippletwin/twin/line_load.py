@@ -111,4 +111,6 @@ class LineLoad:
 
 def _interpolate(at: np.ndarray, frequency_hz: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Complex values (N,) at frequency_hz (N,), at the frequencies `at` (F,)."""
+    # What is fitted lies within the table (`check_load_table`). Harmonics that a nonlinear
+    # compliance adds above, and shaft orders between and below the pistons', keep its ends.
     return np.interp(at, frequency_hz, values.real) + 1j * np.interp(at, frequency_hz, values.imag)

@@ -1,14 +1,17 @@
 """WAV: channels in the order of the sensors, or by number; the sampling rate is in the file.
 
-Whole numbers are the recorder's raw counts, which `scale` in rig.yaml makes a pressure.
+Whole numbers are the recorder's raw counts, which `scale` in rig.yaml makes a pressure. A sample
+with fewer bits than its bytes hold has them in the upper part. Its header says how many they are,
+so that the size of a count does not depend on what was recorded.
 """
 
 from __future__ import annotations
 
+import struct
 import warnings
 from pathlib import Path
+from typing import BinaryIO
 
-import numpy as np
 from scipy.io import wavfile
 
 from rippletwin.case.readers.file_checks import BoundedFile, check_size, refuse_damaged
@@ -17,7 +20,8 @@ from rippletwin.case.readers.signals import Signals, numbers
 from rippletwin.errors import InputError
 
 BYTES_OF_24_BITS = 3
-LOW_BYTE = 256  # scipy puts 24 bits into the upper part of 32
+EXTENSIBLE = 0xFFFE  # the format with valid bits of its own
+FORMAT_HEAD, EXTENSION, RIFF_HEAD = 16, 4, 12  # bytes
 
 
 def read(path: Path, layout: Layout) -> Signals:
@@ -27,13 +31,31 @@ def read(path: Path, layout: Layout) -> Signals:
         warnings.simplefilter("ignore", wavfile.WavFileWarning)  # chunks of other programs
         with BoundedFile(path) as file:
             rate, values = wavfile.read(file)
+            bits = read_bits(file)
     if not values.size:
         raise InputError(path, "file", "no samples", "Copy it again from where it was recorded")
-    if values.dtype == np.int32 and not np.any(values % LOW_BYTE):
-        values = values // LOW_BYTE
+    unused = 8 * values.dtype.itemsize - bits if values.dtype.kind in "iu" else 0
     values = numbers(path, "channels", values)
+    if unused > 0:
+        values = values / 2**unused
     stated = Layout(layout.sensors, None, SAMPLES_BY_SENSORS, layout.channels)
     channels = values[:, None] if values.ndim == 1 else values
     return Signals(
         pressure=rows_of(path, "channels", channels, stated, None), sampling_rate_hz=float(rate)
     )
+
+
+def read_bits(file: BinaryIO) -> int:
+    """Bits of a sample that the header of a WAV file states; of an extensible format the valid
+    ones. Raises struct.error where there is no header."""
+    file.seek(0)
+    order = ">" if file.read(RIFF_HEAD).startswith(b"RIFX") else "<"
+    name, size = struct.unpack(f"{order}4sI", file.read(8))
+    while name != b"fmt ":
+        file.seek(size + size % 2, 1)
+        name, size = struct.unpack(f"{order}4sI", file.read(8))
+    tag, bits = struct.unpack(f"{order}H12xH", file.read(FORMAT_HEAD))
+    if tag == EXTENSIBLE and size >= FORMAT_HEAD + EXTENSION:
+        valid = struct.unpack(f"{order}2xH", file.read(EXTENSION))[0]
+        bits = min(valid, bits) or bits  # some programs state no valid bits
+    return bits

@@ -14,6 +14,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from rippletwin.case.model import Case, Recording, Rig
+from rippletwin.errors import InputError
 from rippletwin.explanation.fit_jobs import make_base
 from rippletwin.explanation.localise.phase_modulation import with_phase_modulation
 from rippletwin.explanation.localise.shaft_orders import ShaftOrders
@@ -24,6 +25,22 @@ from rippletwin.twin.twin import Twin
 
 HIGHEST_HZ = 4000.0  # of the harmonics that are fitted
 REVOLUTIONS_OF_HALVES = 8  # of the least recording of which halves are compared
+
+
+def quantity_error(case: Case) -> InputError | None:
+    """What is told of a case whose healthy recordings are of two quantities; None of others. The
+    error model of explaining has one size of the model error, relative to one quantity."""
+    impedances = [r.label for r in case.healthy if r.kind == "input_impedance"]
+    pressures = [r.label for r in case.healthy if r.kind != "input_impedance"]
+    if not impedances or not pressures:
+        return None
+    return InputError(
+        case.folder / "rig.yaml",
+        "recordings",
+        f"explain takes either pressures ({', '.join(pressures)}) or input impedances "
+        f"({', '.join(impedances)})",
+        "Give each a rig.yaml of its own; calibrate takes both in one",
+    )
 
 
 def observe_all(case: Case, processes: int) -> tuple[list, list, list]:
