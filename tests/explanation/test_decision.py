@@ -305,6 +305,7 @@ def test_the_scores_are_those_of_what_is_accepted(monkeypatch, alarms, wiring, v
     base, best = made_fit(0.0), made_fit(100.0, HOSE)
     search = Search(base, [best], best)
     sheet, point = (SimpleNamespace(rivals=True),), SimpleNamespace(label="point 1")
+    rig = SimpleNamespace(delay=0.01, load=SimpleNamespace(frequency_hz=None))
     stand_ins = {
         "prepare_stage": lambda *_: SimpleNamespace(base=None, observations=[point]),
         "search_in_stages": lambda stage, *_: (stage, search),
@@ -327,7 +328,7 @@ def test_the_scores_are_those_of_what_is_accepted(monkeypatch, alarms, wiring, v
     }
     for name, stand_in in stand_ins.items():
         monkeypatch.setattr(explain, name, stand_in)
-    found = explain.explain_observations(SimpleNamespace(delay=0.01), [point])
+    found = explain.explain_observations(rig, [point])
     assert found.decision.verdict == verdict
     assert found.validation.of is found.decision.accepted
     assert found.decision.accepted is (best if verdict == "unexplained" else base)
