@@ -79,8 +79,8 @@ def observe(
     progress : called with how many steps of a periodic recording's analysis are done, and of all.
 
     Frequencies outside the recording's own band are not kept; of a periodic recording those below
-    it are, unless `piston_harmonics_only`: its shaft orders are analysed together. Raises
-    InputError where nothing is left.
+    it are, unless `piston_harmonics_only`: its orders count from 1, and who uses them leaves out
+    those below `min_frequency_hz`. Raises InputError where nothing is left.
     """
     own = recording.max_frequency_hz
     if own is not None:
