@@ -373,7 +373,7 @@ def test_spectrum_out_of_order(tmp_path):
 
 
 def test_spectrum_that_is_zero_at_all_sensors(tmp_path):
-    """Errors are relative to the power of a row, which ended a fit with a division by zero. A row
+    """Errors are relative to the power of a row, by which a fit divides. A row
     at 0 Hz is not used, and one sensor may be zero alone."""
     spectrum_case(tmp_path, "0 0 0 0 0\n100 1 2 0 0\n200 0 0 0 0\n300 1 2 3 4\n")
     refused(tmp_path, "s.csv", "p1_re, p1_im, p2_re, p2_im", "1 row(s)", "row 3 at 200 Hz")

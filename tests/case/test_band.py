@@ -88,8 +88,8 @@ def behind_a_table(folder, **keys):
 def test_a_load_that_was_not_measured_at_a_fitted_frequency_is_bad_input(
     tmp_path, capsys, monkeypatch, fit
 ):
-    """Multiples of 150 Hz beyond either end of the table had its end value without a word. Both
-    ranges and the keys that narrow the band are told, before anything is fitted."""
+    """Multiples of 150 Hz lie beyond either end of the table. Both ranges and the keys that narrow
+    the band are told, before anything is fitted."""
     monkeypatch.setattr("rippletwin.calibration.frequency_continuation.choose_starts", None)
     command = [fit, str(behind_a_table(tmp_path))]
     assert main(command if fit == "check" else [*command, "--out", str(tmp_path / "out")]) == 2

@@ -201,7 +201,7 @@ def test_wav_of_counts(tmp_path, bits):
 @pytest.mark.parametrize(("valid_bits", "unused"), [(None, 1), (32, 1), (24, 256), (20, 4096)])
 def test_the_header_of_a_wav_says_the_size_of_its_counts(tmp_path, valid_bits, unused):
     """Samples of 32 bits, all multiples of 256 and then not: the scale is that of the header's bits
-    in both files. Before, the values of the samples decided it."""
+    in both files, whatever the values of the samples."""
     path = tmp_path / "r.wav"
     for low_bits in (0, 1):
         samples = (256 * np.arange(-50, 50, dtype="<i4") + low_bits).reshape(50, 2)

@@ -26,7 +26,7 @@ def test_a_pressure_that_is_not_known_is_no_distance():
 
 def test_the_nearest_healthy_recording_is_the_anchor_in_any_order():
     """Of recordings of one operating point the least different is the anchor, then the others by
-    how far they are and by label, however the sheet lists them. Before, the first listed was."""
+    how far they are and by label, however the sheet lists them."""
 
     def recording(label, speed_rpm, pressure=9.5e6, state="healthy"):
         return Recording(Path(f"{label}.h5"), "periodic", state, label, speed_rpm, pressure)

@@ -287,7 +287,7 @@ def test_both_pictures_of_every_state_are_written(diagnoses, tmp_path):
 @pytest.mark.parametrize("which", ["now", "anchor"])
 def test_a_band_below_the_pistons_is_refused(which):
     """Eight orders of a pump of nine pistons, of the recording or of its anchor: the message names
-    it and the key, where a filter of size zero ended the diagnosis."""
+    it and the key: a diagnosis smooths over a pitch of orders."""
     records = {label: leaking_pump.record(label) for label in ("now", "anchor")}
     twin = Twin(leaking_pump.rig(), [records["anchor"]])
     records[which] = select_frequencies(records[which], slice(8))
@@ -297,7 +297,7 @@ def test_a_band_below_the_pistons_is_refused(which):
 
 
 def test_a_load_that_was_not_measured_in_the_band_is_refused():
-    """A table to 2 kHz behind harmonics to 3 kHz, of which the upper third had its end value."""
+    """A table to 2 kHz behind harmonics to 3 kHz: of the upper third nothing is known."""
     table = np.array([50.0, 2000.0])
     load = Load("impedance", frequency_hz=table, impedance=np.full(2, 4e9 + 0j))
     anchor = leaking_pump.record("anchor")

@@ -46,8 +46,8 @@ def read_networks(files: Sequence[str | Path], rig: Rig) -> dict[str, KeptNetwor
     """
     read = [(path, load_networks(path)) for path in map(Path, files)]
     found = [(path, kept) for path, kept in read if kept.signal == "pressure"]
+    names = [sensor.name for sensor in rig.sensors]
     for path, kept in found:
-        names = [sensor.name for sensor in rig.sensors]
         if sorted(kept.channels) != sorted(names):
             raise InputError(
                 path,

@@ -15,7 +15,6 @@ from rippletwin.case.model import absolute
 LEAK_DISCHARGE = 0.7
 """Discharge coefficient of a leak where the data sheet gives none."""
 
-
 GROWS_WITH = {
     "dead_volume": "stroke_volume",
     "port_area": "piston_area",
@@ -27,9 +26,9 @@ GROWS_WITH = {
 @dataclass(frozen=True)
 class Geometry:
     """The keys of rig.yaml's `pump`, SI units; defaults describe a pump of 42 cm3/rev, see
-    docs/explanation/pump.md for their origin. `from_dict` scales those of GROWS_WITH to the
-    pistons of another pump. `leak_discharge` is no key: a leak has the discharge
-    coefficient that the data sheet states."""
+    docs/explanation/pump.md for their origin. `from_dict` scales those of GROWS_WITH to the pistons
+    of another pump. `leak_discharge` is no key: it is the `discharge_coefficient` that the data
+    sheet states, else LEAK_DISCHARGE."""
 
     pistons: int = 9
     piston_diameter: float = 0.017
@@ -57,9 +56,9 @@ class Geometry:
             raise ValueError(f"unknown pump keys {unknown}; known are {known}")
         stated = {key: value for key, value in pump.items() if value is not None}
         leak_discharge = stated.get("discharge_coefficient", LEAK_DISCHARGE)
-        geometry = cls(**stated, leak_discharge=leak_discharge)
+        geometry, default = cls(**stated, leak_discharge=leak_discharge), cls()
         scaled = {
-            name: getattr(cls, name) * getattr(geometry, size) / getattr(cls(), size)
+            name: getattr(default, name) * getattr(geometry, size) / getattr(default, size)
             for name, size in GROWS_WITH.items()
             if name not in stated
         }

@@ -126,8 +126,10 @@ def _load_pressure(rig: Rig, observation, flow: float) -> float | None:
     means = np.zeros(0) if observation.mean is None else np.atleast_1d(observation.mean)
     sensors = observation.sensors or rig.sensors
     if stated is None:
-        nearest = np.argmax([sensor.position for sensor in sensors[: len(means)]] or [0])
-        return float(means[nearest]) if len(means) else None
+        if not len(means):
+            return None
+        nearest = np.argmax([sensor.position for sensor in sensors[: len(means)]])
+        return float(means[nearest])
     if observation.kind == "input_impedance" or not len(means) or not stated > 0.0:
         return stated
     fall = np.array([pressure_fall(rig, sensor.position, flow) for sensor in sensors]) / stated
