@@ -283,3 +283,20 @@ def test_the_measured_cylinder_comes_in(tmp_path):
     size = np.sqrt(np.mean(np.abs(reflection) ** 2))
     assert np.sqrt(np.mean(deviation**2)) / size == pytest.approx(gap / 2, rel=0.15)
     assert seen.source == "known" and seen.normalised and case.rig.fluid.is_gas
+
+
+def test_a_flow_ripple_beside_a_spectrum_limits_nothing(tmp_path):
+    """A spectrum has no shaft speed, and its source is free: the key is read and not used."""
+    content = sheet()
+    content["recordings"] = [
+        {"file": "s.csv", "kind": "spectrum", "state": "healthy", "flow_ripple": "flow.csv"}
+    ]
+    write_case(tmp_path, content)
+    (tmp_path / "s.csv").write_text(
+        "frequency_hz,p1_re,p1_im,p2_re,p2_im\n100,1,2,3,4\n5000,1,2,3,4\n"
+    )
+    rows = "".join(f"{angle},{5e-4 + 1e-6 * (angle % 40)}\n" for angle in range(0, 360, 5))
+    (tmp_path / "flow.csv").write_text("angle_deg,flow_m3_s\n" + rows)
+    case = load_case(tmp_path)
+    assert case.recordings[0].max_frequency_hz is None
+    assert not any("flow_ripple" in warning for warning in case.warnings)

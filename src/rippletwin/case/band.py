@@ -44,9 +44,10 @@ def narrow_band(
 
 def limit_to_ripple(recording: Recording) -> tuple[Recording, list[str]]:
     """The recording up to the highest order that its stated flow ripple resolves, and a line that
-    says so where that is less than its band."""
+    says so where that is less than its band. Of another kind than `periodic` the ripple is not
+    used."""
     ripple = recording.flow_ripple
-    if ripple is None:
+    if ripple is None or recording.kind != "periodic":
         return recording, []
     limit = (ripple.highest_order + 0.5) * recording.speed_rpm / 60.0
     highest = _highest(recording)
