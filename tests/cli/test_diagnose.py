@@ -42,11 +42,22 @@ def test_fail_on_a_fault_and_on_what_is_unlike_all(
     assert [each["state"] for each in written["recordings"]] == [state]
 
 
-def test_a_case_without_an_anchor_is_refused_before_anything_is_explained(
-    tmp_path, capsys, monkeypatch
-):
-    """The only healthy recording is of broadband excitation: `explain`, which takes minutes and
-    could use it, is not begun."""
+@pytest.fixture
+def begun(monkeypatch):
+    """Every call of `explain`, which takes minutes and is a stub here."""
+    calls = []
+    monkeypatch.setattr(
+        "rippletwin.explanation.explain.explain", lambda *arguments: calls.append(arguments)
+    )
+    return calls
+
+
+def _diagnose(folder):
+    return main(["diagnose", str(folder), "--out", str(folder / "out")])
+
+
+def test_a_case_without_an_anchor_is_refused_before_anything_is_explained(tmp_path, capsys, begun):
+    """The only healthy recording is of broadband excitation, which `explain` could use."""
     content = sheet()
     point = content["recordings"][0]
     content["recordings"] = [
@@ -55,10 +66,22 @@ def test_a_case_without_an_anchor_is_refused_before_anything_is_explained(
     ]
     write_case(tmp_path, content)
     write_hdf5(tmp_path / "noise.h5", ripple())
-    begun = []
-    monkeypatch.setattr(
-        "rippletwin.explanation.explain.explain", lambda *arguments: begun.append(arguments)
-    )
-    assert main(["diagnose", str(tmp_path), "--out", str(tmp_path / "out")]) == 2
+    assert _diagnose(tmp_path) == 2
     assert "no healthy periodic recording beside now" in capsys.readouterr().err
+    assert not begun
+
+
+def test_a_recording_that_no_twin_can_diagnose_is_refused_before_anything_is_explained(
+    tmp_path, capsys, begun
+):
+    """Its band ends below the pistons' first order, that of the healthy recording does not."""
+    content = sheet()
+    point = content["recordings"][0]
+    content["recordings"].append(
+        point | {"file": "now.h5", "state": "unknown", "max_frequency_hz": 100.0}
+    )
+    write_case(tmp_path, content)
+    write_hdf5(tmp_path / "now.h5", ripple())
+    assert _diagnose(tmp_path) == 2
+    assert "recording now: max_frequency_hz: the band ends at 100 Hz" in capsys.readouterr().err
     assert not begun

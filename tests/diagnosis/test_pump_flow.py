@@ -26,6 +26,15 @@ def simulated(pump, fault=None):
     return peak_amplitudes(run.flow)[ORDERS]
 
 
+def test_what_is_uncertain_of_the_pump_leaves_the_size_of_a_leak_alone():
+    """At a constant pressure a leak's flow follows from its own area and discharge coefficient: a
+    pump moved by a standard deviation of any number loses as much mean flow to it, to 2 %."""
+    leak, area = simulate_leak_flow(PUMP, OIL, SPEED, PRESSURE, FAULTS["slipper"]), 4e-7
+    lost = -leak.harmonics(area)[0].real
+    assert lost > 0.0
+    assert np.all(np.abs(leak.pump_slopes(area)[:, 0].real) < 0.02 * lost)
+
+
 @pytest.mark.parametrize(("name", "fault"), [("slipper", Slipper), ("cylinder", Cylinder)])
 def test_areas_between_the_simulated_ones_are_right(name, fault):
     """Small, middling and large leaks that are no nodes: within 2 % of the change, half of
@@ -78,10 +87,14 @@ def _twin(pump):
 
 
 def test_a_pump_known_by_its_pistons_alone_delivers_the_ripple_s_mean_flow():
-    """The default pump scaled to twice its flow has twice its displacement."""
-    flow = 2.0 * Geometry.from_dict({"pistons": 9}).displacement * 20.0
-    pump = with_fitted_pump(_twin({"pistons": 9}), flow, 20.0).rig.pump
-    assert Geometry.from_dict(pump).displacement * 20.0 == pytest.approx(flow)
+    """Eight times the flow of the default pump: twice its lengths, so that areas grow fourfold and
+    volumes eightfold."""
+    default = Geometry.from_dict({"pistons": 9})
+    flow = 8.0 * default.displacement * 20.0
+    found = Geometry.from_dict(with_fitted_pump(_twin({"pistons": 9}), flow, 20.0).rig.pump)
+    assert found.displacement * 20.0 == pytest.approx(flow)
+    for name, growth in (("pitch_radius", 2), ("port_area", 4), ("dead_volume", 8)):
+        assert getattr(found, name) == pytest.approx(growth * getattr(default, name))
 
 
 def test_a_pump_of_known_geometry_is_left_as_it_is():

@@ -141,7 +141,8 @@ def test_fitted_numbers_of_the_pump_are_drawn_with_the_line():
 def test_the_pump_of_a_signal_is_drawn_once_for_its_classes(certain, monkeypatch):
     """Certain but for the pump: the healthy flow of every draw differs, a leak's flow less its
     change does not differ from it; an anchored healthy signal knows no pump of the twin."""
-    rng, drawn = np.random.default_rng(0), iter(np.random.default_rng(1).normal(size=(4, 7)))
+    rng = np.random.default_rng(0)
+    drawn = iter(np.random.default_rng(1).normal(size=(4, len(NUMBERS))))
     monkeypatch.setattr(certain, "_draw_twin", lambda rng: (certain._line.twin.theta, next(drawn)))
     tiny = {"S": (1e-12, 1.001e-12)}
     flow = certain.draw(tiny, ("H", "S"), 2, rng).flow

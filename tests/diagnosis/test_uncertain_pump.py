@@ -52,7 +52,7 @@ def moved_by(name, z):
     [
         ("dead_volume", -1.0),
         ("bulk_modulus", -1.0),
-        ("discharge_coefficient", -1.0),
+        ("port_area", -0.5),
         ("port_timing_deg", -1.0),
         ("port_opening_deg", 1.0),
     ],

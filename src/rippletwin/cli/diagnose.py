@@ -133,20 +133,18 @@ def _answers(networks: dict, recordings, case) -> dict:
 def _twin_of(twin_file: str | None, out: str, processes: int, case, recordings, progress):
     """The twin that the command line names, or the one that explains the healthy recordings.
 
-    Raises InputError where a recording has no healthy one to be compared with, before anything is
-    explained."""
+    Raises InputError as `check_recordings`, before anything is explained."""
     if twin_file is not None:
         from rippletwin.twin.twin_file import load_twin
 
         return load_twin(twin_file)
     from dataclasses import replace
 
-    from rippletwin.diagnosis.diagnose import find_anchors
+    from rippletwin.diagnosis.diagnose import check_recordings
     from rippletwin.explanation.explain import explain
     from rippletwin.explanation.verdict.verdict_file import write_verdict
 
-    for recording in recordings:
-        find_anchors(case, recording)
+    check_recordings(case, recordings)
     diagnosed = {recording.label for recording in recordings}
     known = tuple(r for r in case.recordings if r.label not in diagnosed)
     explanation = explain(replace(case, recordings=known), processes, progress)

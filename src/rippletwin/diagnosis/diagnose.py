@@ -12,7 +12,7 @@ from rippletwin.calibration.misfit import measure_misfit
 from rippletwin.calibration.shaft_angles import fit_shaft_angles
 from rippletwin.case.model import Case, Recording, Rig
 from rippletwin.diagnosis.anchor import differences, distance
-from rippletwin.diagnosis.diagnoser import MOST_REPEATS, Diagnoser
+from rippletwin.diagnosis.diagnoser import MOST_REPEATS, Diagnoser, check_observations
 from rippletwin.diagnosis.diagnosis import Diagnosis
 from rippletwin.diagnosis.faults.base import Fault
 from rippletwin.diagnosis.faults.library import select_faults
@@ -199,6 +199,15 @@ def find_anchors(case: Case, recording: Recording) -> list[Recording]:
     same = [r for r in healthy if apart[r.label] == nearest]
     same.sort(key=lambda r: (sum(differences(*points(r))), r.label))
     return same[: 1 + MOST_REPEATS]
+
+
+def check_recordings(case: Case, recordings: Sequence[Recording]) -> None:
+    """Raise InputError where one of them can be diagnosed by no twin: it has no healthy recording
+    to be compared with (`find_anchors`), or either is refused by `check_observations`."""
+    read = ReadOnce(case.rig)
+    for recording in recordings:
+        compared = [recording, *find_anchors(case, recording)]
+        check_observations([read(each)[0] for each in compared], case.rig)
 
 
 def check_twin(case: Case, twin: Twin) -> None:

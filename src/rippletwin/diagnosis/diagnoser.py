@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import logsumexp
 
+from rippletwin.case.model import Rig
 from rippletwin.diagnosis.anchor import (
     distance_between,
     even_flow,
@@ -84,11 +85,9 @@ class Diagnoser:
         """The observation model of an observation, anchored to a healthy one, at the orders that
         both have, `ORDERS` at most. `start` and `repeats` as in `ObservationModel`.
 
-        Raises InputError where none of them is the pistons', and as `check_load_table`.
+        Raises InputError as `check_observations`.
         """
-        for each in (observation, healthy):
-            _check_orders(each, self.twin.rig.pump["pistons"])
-        check_load_table([observation, healthy], self.twin.rig)
+        check_observations([observation, healthy], self.twin.rig)
         count = min(len(healthy.orders), len(observation.orders), ORDERS)
         healthy, observation = (select_frequencies(o, slice(count)) for o in (healthy, observation))
         pressure = _rounded(load_pressure_of(self.twin, observation))
@@ -123,16 +122,20 @@ class Diagnoser:
         return replace(prior, scatter=scatter), [change for _, change in found]
 
 
-def _check_orders(observation, pistons: int) -> None:
-    """Raise InputError where a periodic observation ends below the first order of the pistons."""
-    if observation.orders[-1] < pistons:
-        raise InputError(
-            f"recording {observation.label}",
-            "max_frequency_hz",
-            f"the band ends at {observation.frequency_hz[-1]:.4g} Hz, below the piston frequency, "
-            f"{pistons * observation.speed_hz:.4g} Hz, which a diagnosis needs",
-            "Give a higher one, best several times the piston frequency, or leave it out",
-        )
+def check_observations(observations: Sequence, rig: Rig) -> None:
+    """Raise InputError where a periodic observation ends below the first order of the pistons, and
+    as `check_load_table`: no twin can diagnose it."""
+    pistons = rig.pump["pistons"]
+    for each in observations:
+        if each.orders[-1] < pistons:
+            raise InputError(
+                f"recording {each.label}",
+                "max_frequency_hz",
+                f"the band ends at {each.frequency_hz[-1]:.4g} Hz, below the piston frequency, "
+                f"{pistons * each.speed_hz:.4g} Hz, which a diagnosis needs",
+                "Give a higher one, best several times the piston frequency, or leave it out",
+            )
+    check_load_table(observations, rig)
 
 
 def _rounded(value: float) -> float:

@@ -31,9 +31,8 @@ SLOPE_NODES = slice(2, None, 4)  # of these areas, at which slopes by the pump's
 UNCERTAIN = {
     "bulk_modulus": 0.08,
     "dead_volume": 0.15,
-    "port_area": 0.15,
+    "port_area": 0.17,  # and with it the ports' discharge coefficient; leaks have one of their own
     "port_opening_deg": 0.15,
-    "discharge_coefficient": 0.07,
     "air_fraction": 0.7,
 }
 """Relative standard deviations of the numbers of a pump about those of its data sheet."""
@@ -50,7 +49,7 @@ def with_fitted_pump(twin: Twin, mean_flow: float | None = None, speed_hz: float
     """
     pump = {key: value for key, value in twin.rig.pump.items() if value is not None}
     if set(pump) == {"pistons"} and mean_flow is not None:
-        pump = _scaled(Geometry.from_dict(pump), mean_flow / speed_hz)
+        pump = _default_pump(pump, mean_flow / speed_hz)
     own = {"viscosity_slope", *(p.name for p in twin.parameters if p.place == "pump")}
     own.update(f"{kind}[{label}]" for label in twin.labels for kind in ("angle", "state"))
     fitted = {key: value for key, value in twin.fitted_pump().items() if value is not None}
@@ -104,16 +103,13 @@ def load_pressure_of(twin: Twin, observation) -> float:
     return pressure
 
 
-def _scaled(pump: Geometry, displacement: float) -> dict:
-    """The pump, all its lengths changed alike, of another displacement, m3 a revolution."""
-    ratio = displacement / pump.displacement
-    return {
-        "pistons": pump.pistons,
-        "piston_diameter": pump.piston_diameter * ratio ** (1 / 3),
-        "pitch_radius": pump.pitch_radius * ratio ** (1 / 3),
-        "dead_volume": pump.dead_volume * ratio,
-        "port_area": pump.port_area * ratio,
-    }
+def _default_pump(pump: dict, displacement: float) -> dict:
+    """The default pump of as many pistons, its lengths changed alike so that it has this
+    displacement, m3 a revolution. Its other sizes grow with them (`geometry.GROWS_WITH`)."""
+    default = Geometry.from_dict(pump)
+    ratio = (displacement / default.displacement) ** (1 / 3)
+    lengths = {key: ratio * getattr(default, key) for key in ("piston_diameter", "pitch_radius")}
+    return pump | lengths
 
 
 @dataclass(frozen=True)
