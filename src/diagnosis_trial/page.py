@@ -1,5 +1,7 @@
 """The page that reports a diagnosis trial."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from concealed.page import drawn_from, span
@@ -126,15 +128,24 @@ def _smallest_of_column(rows: list[dict], rng: np.random.Generator) -> list[tupl
                 detection.smallest_found(severity, leaks.hit, rigs, probability, rng)
                 for probability in detection.FOUND
             ]
-            cells = [
-                "too few"
-                if f is None
-                else "{:.2g} ({:.2g} to {:.2g})".format(*(factor * x for x in f))
-                for f in found
-            ]
+            cells = [_found_text(each, severity, factor) for each in found]
             alarm = f"{threshold:.3g}", f"{false_alarms.hits} of {false_alarms.count}"
             lines.append((*alarm, state, unit, *cells))
     return lines
+
+
+def _found_text(
+    found: tuple[float, float, float] | None, severity: Sequence[float], factor: float
+) -> str:
+    """A smallest leak found with its interval; outside the severities that were recorded, on which
+    side of them it is, for a curve says nothing there."""
+    if found is None:
+        return "too few"
+    least, most = min(severity), max(severity)
+    if not least <= found[0] <= most:
+        side, end = ("below", least) if found[0] < least else ("above", most)
+        return f"{side} {factor * end:.2g}"
+    return "{:.2g} ({:.2g} to {:.2g})".format(*(factor * x for x in found))
 
 
 def _column(name: str, rows: list[dict]) -> list[str]:
