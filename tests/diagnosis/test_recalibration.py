@@ -11,10 +11,10 @@ import pytest
 import leaking_pump
 from rippletwin.calibration.laplace import UNCONVERGED_GAIN
 from rippletwin.diagnosis import pump_calibration
-from rippletwin.diagnosis.diagnose import healthy_misfit
+from rippletwin.diagnosis.diagnose import healthy_misfit, recalibrate_twin
 from rippletwin.diagnosis.line_calibration import calibrate_line
 from rippletwin.diagnosis.pump_calibration import calibrate_pump, one_each_point
-from rippletwin.diagnosis.pump_flow import simulate_healthy_pump
+from rippletwin.diagnosis.pump_flow import simulate_healthy_pump, with_fitted_pump
 from rippletwin.harmonics import peak_amplitudes
 from rippletwin.twin.twin import Twin
 
@@ -52,7 +52,7 @@ def test_the_pump_s_flow_comes_nearer_to_the_true_one(healthy):
     rig = replace(rig, pump=rig.pump | {"port_opening_deg": 10.0, "air_fraction": 1e-4})
     unstated = [replace(o, load_pressure=None) for o in healthy]
     line = calibrate_line(Twin(rig, unstated), unstated)
-    fitted = calibrate_pump(line, one_each_point(unstated)).twin.rig.pump
+    fitted = calibrate_pump(line, one_each_point(unstated), rig.pump).twin.rig.pump
     point = leaking_pump.OIL, leaking_pump.SPEED, leaking_pump.LOAD
     orders = leaking_pump.PISTONS * np.arange(1, 13)
     true, sheet, found = (
@@ -69,10 +69,25 @@ def test_a_fit_of_the_pump_that_is_cut_short_promises_more(healthy, monkeypatch)
     twin = Twin(replace(rig, pump=rig.pump | {"port_opening_deg": 10.0}), healthy)
     theta, k = twin.theta.copy(), twin.index["wave_speed[1]"]
     theta[k] = twin.parameters[k].prior.coordinate(0.98 * leaking_pump.WAVE_SPEED)
-    points = one_each_point(healthy)
-    assert calibrate_pump(twin.with_(theta=theta), points).expected_gain < UNCONVERGED_GAIN
+    fit = twin.with_(theta=theta), one_each_point(healthy), twin.rig.pump
+    assert calibrate_pump(*fit).expected_gain < UNCONVERGED_GAIN
     monkeypatch.setattr(pump_calibration, "EVALUATIONS", 1)
-    assert calibrate_pump(twin.with_(theta=theta), points).expected_gain > UNCONVERGED_GAIN
+    assert calibrate_pump(*fit).expected_gain > UNCONVERGED_GAIN
+
+
+def test_a_pump_that_the_twin_has_fitted_amiss_is_fitted_about_the_data_sheet(healthy):
+    """Port timing and overlap of the given twin are three and two of their tolerances off, as a fit
+    leaves them where its model error takes up the difference. The pump that a diagnosis takes has
+    the true timing to half a degree, its tolerance."""
+    twin = Twin(leaking_pump.rig(), healthy, uncertain_pump=True)
+    theta, k = twin.theta.copy(), twin.index["wave_speed[1]"]
+    theta[k] = twin.parameters[k].prior.coordinate(0.98 * leaking_pump.WAVE_SPEED)
+    theta[twin.index["port_timing"]], theta[twin.index["port_overlap"]] = 3.0, -2.0
+    amiss = twin.with_(theta=theta)
+    assert with_fitted_pump(amiss).rig.pump["port_timing_deg"] > 1.0
+    found = recalibrate_twin(amiss, healthy, lambda observation: (observation, 0.0))
+    timing = with_fitted_pump(found.twin).rig.pump["port_timing_deg"]
+    assert timing == pytest.approx(leaking_pump.TRUE["port_timing_deg"], abs=0.5)
 
 
 def test_an_operating_point_set_twice_is_fitted_once(healthy):

@@ -110,7 +110,8 @@ def recalibrate_twin(twin: Twin, healthy: Sequence[Recording], read: ReadOnce) -
     own = with_fitted_pump(twin)
     again = calibrate_line(twin, observations)
     lines = [own] if np.array_equal(own.theta, again.theta) else [own, again]
-    tried = [RecalibratedTwin(twin), *(calibrate_pump(line, points) for line in lines)]
+    fitted = (calibrate_pump(line, points, twin.rig.pump) for line in lines)
+    tried = [RecalibratedTwin(twin), *fitted]
     return min(tried, key=lambda each: healthy_misfit(each.twin, observations))
 
 

@@ -8,7 +8,7 @@ squares, its numbers about those of the data sheet (maximum a posteriori).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -70,21 +70,22 @@ class RecalibratedTwin(NamedTuple):
     expected_gain: float = 0.0
 
 
-def calibrate_pump(twin: Twin, healthy: Sequence) -> RecalibratedTwin:
-    """The twin with its pump fitted to the flow of healthy periodic observations.
+def calibrate_pump(twin: Twin, healthy: Sequence, sheet: Mapping) -> RecalibratedTwin:
+    """The twin with its pump fitted to the flow of healthy periodic observations, about the pump of
+    the data sheet. What the twin's own pump was fitted to does not count: effects and errors of the
+    line may have made up for it.
 
-    Its line must be known; the pump's numbers are no parameters (`with_fitted_pump`). It is
-    returned as it is where the data sheet has no geometry of the pump.
+    The line must be known; the pump's numbers are no parameters (`with_fitted_pump`). The twin is
+    returned with its own pump where the data sheet has no geometry.
     """
-    twin = with_fitted_pump(twin)
-    pump = dict(twin.rig.pump)
+    fitted, gain = with_fitted_pump(twin), 0.0
+    pump = {key: value for key, value in sheet.items() if value is not None}
     if set(pump) == {"pistons"}:
-        return RecalibratedTwin(twin)
-    fitted, gain = twin, 0.0
+        return RecalibratedTwin(fitted)
     for _ in range(ROUNDS):  # the flow is told beside the chambers of the pump that was fitted
         flows = [_measured_flow(fitted, observation) for observation in healthy]
-        numbers, gain = _fit_numbers(pump, twin.rig.fluid, flows)
-        fitted = rebuild(twin, replace(twin.rig, pump=pump | numbers), theta=twin.theta)
+        numbers, gain = _fit_numbers(pump, fitted.rig.fluid, flows)
+        fitted = rebuild(fitted, replace(fitted.rig, pump=pump | numbers), theta=fitted.theta)
     return RecalibratedTwin(fitted, gain)
 
 
