@@ -7,8 +7,10 @@ A signal is one revolution at the sensors, an inverse Fourier transform of
 whose line and pump are drawn from the twin's posterior, whose line drifts as between two
 recordings, whose leak is of a log-uniform area at a random piston, and whose error is a smooth
 random function of frequency, about each order as large as the twin's own misfit of the healthy
-ripple. An anchored signal has the measured healthy ripple in place of the twin's, so that pump and
-misfit concern the change alone.
+ripple. The twin's pistons are alike, those of a pump are not: between the pistons' orders the
+healthy flow is as large as the recording shows, and falls to the pistons at random. An anchored
+signal has the measured healthy ripple in place of the twin's, so that pump and misfit concern the
+change alone.
 """
 
 from __future__ import annotations
@@ -90,6 +92,8 @@ class SignalSource:
         self._healthy = observed.values
         anchor = make_anchor(fitted, observed, observed, self._line, *self._point)
         self._angle, self.misfit = anchor.angle, anchor.misfit
+        flow, _ = estimate_flow_at_pump(self._line.response(), self._healthy)
+        self._uneven = np.where(self.orders % self._pistons == 0, 0.0, flow)
         self._flows = UncertainPump(self._pump, self._fluid, *self._point, self.orders)
         self._waves = np.cos(
             np.pi * np.outer(np.arange(WAVES), observed.frequency_hz / WAVES_HZ)
@@ -133,13 +137,14 @@ class SignalSource:
         flow = np.empty((len(classes), count, 1, len(self.orders)), complex)
         for k in range(count):
             theta, numbers = self._draw_twin(rng)
+            healthy = self._flows.healthy(numbers) + self._draw_uneven(rng)
             known = None
             if anchored:
                 known = estimate_flow_at_pump(self._line.response(theta=theta), self._healthy)
             for c, name in enumerate(classes):
                 change, gained = self._leak(leaks.get(name), areas[c, k], numbers, rng)
                 moved = self._line.response(self._draw_drift(gained, rng), theta)
-                whole = self._flows.healthy(numbers) + change
+                whole = healthy + change
                 pressure[c, k] = (
                     self._smooth(self.misfit, sensors, rng) * moved * whole
                     if known is None
@@ -180,6 +185,12 @@ class SignalSource:
         if not self._numbers.any():
             numbers = rng.standard_normal(len(NUMBERS))
         return theta + moved[self._kept], numbers
+
+    def _draw_uneven(self, rng) -> np.ndarray:
+        """Flow (F,) of unequal pistons between the pistons' orders: of the measured spectrum, each
+        piston's share of it a normal number."""
+        shares = np.fft.fft(rng.standard_normal(self._pistons)) / np.sqrt(self._pistons)
+        return shares[self.orders % self._pistons] * self._uneven
 
     def _draw_drift(self, gained: float, rng) -> np.ndarray:
         """Drift (D,) of the line; an orifice is set anew, so that the load pressure is held."""
