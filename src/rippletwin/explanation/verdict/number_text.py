@@ -50,7 +50,8 @@ def disagreement_sentences(
 
 
 def pump_sentences(parameters: dict) -> list[str]:
-    """The pump's parameters whose intervals exclude the data sheet's value, in the same units."""
+    """The pump's parameters whose intervals exclude the data sheet's value, in the same units. The
+    intervals hold for a pump of the model's form, which a real one need not have."""
     off = []
     for name, p in parameters.items():
         if not p["ci95"][0] <= p["sheet"] <= p["ci95"][1]:
@@ -58,11 +59,15 @@ def pump_sentences(parameters: dict) -> list[str]:
             value = write_value(p["value"], unit, tuple(p["ci95"]))
             sheet = write_stated(p["sheet"], unit)
             off.append(f"{name_parameter(name)} {value} (data sheet {sheet})")
-    return (
-        [plain(f"By its ripple the pump differs from the data sheet: {join_words(off)}.")]
-        if off
-        else []
-    )
+    if not off:
+        return []
+    return [
+        plain(
+            "The pump model fits the ripple with other numbers than the data sheet's: "
+            f"{join_words(off)}."
+        ),
+        "They are the pump's own only if its ports open as those of the model.",
+    ]
 
 
 def load_sentences(load: dict | None) -> list[str]:
