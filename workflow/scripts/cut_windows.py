@@ -43,6 +43,10 @@ store.save(
         coords={
             "state": ("window", np.repeat([r.state_code or UNKNOWN for r in chosen], counts)),
             "recording": ("window", np.repeat(range(len(chosen)), counts)),
+            "window_speed_hz": (
+                "window",
+                np.concatenate([r.speed_hz[: params.windows] for r in cut]),
+            ),
             "channel": [sensor.name for sensor in case.rig.sensors],
         },
         attrs={

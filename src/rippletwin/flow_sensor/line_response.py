@@ -70,7 +70,8 @@ def line_factory(twin: Twin, load_pressure: float, ripple: FlowRipple | None = N
     """Networks of a calibrated twin at one operating point, the load linearised there.
 
     `load_pressure` in Pa. The mean of `ripple` (m3/s) determines an orifice whose coefficient the
-    rig does not give, and the ripple's admittance is the source's. None is the lumped pump's.
+    rig does not give, and the ripple's admittance is the source's. None is that of the lumped pump
+    with its fitted numbers.
     """
 
     def line_at(speed_hz: float, orders: np.ndarray) -> FrequencyDomainLine:
@@ -80,7 +81,7 @@ def line_factory(twin: Twin, load_pressure: float, ripple: FlowRipple | None = N
             from rippletwin.pump.simulation import simulate
 
             outlet = ConstantPressure(load_pressure)
-            ripple = simulate(twin.rig.pump, twin.rig.fluid, 60 * speed_hz, outlet)
+            ripple = simulate(twin.fitted_pump(), twin.rig.fluid, 60 * speed_hz, outlet)
         # A free source has no ripple to balance an orifice with: the load stays linear.
         condition = OperatingCondition.at_orders(
             orders, speed_hz, load_pressure, ripple, source="free"

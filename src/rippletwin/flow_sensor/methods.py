@@ -20,7 +20,7 @@ UNCONVERGED_GAIN = 0.2  # share of the loss
 def estimate_flow_by(
     method: str,
     windows: np.ndarray,
-    speed_hz: float,
+    speed_hz: np.ndarray,
     line_at: LineFactory,
     noise: np.ndarray,
     bandwidth_hz: float,
@@ -32,7 +32,8 @@ def estimate_flow_by(
 ) -> FlowEstimate:
     """Outlet flow of each one-revolution window, by one of `METHODS`.
 
-    windows : (n, S, M) pressure, Pa; noise : (S,) standard deviation of a sample, Pa. `width`
+    windows : (n, S, M) pressure, Pa; speed_hz : (n,) speed of each, rev/s, of which "pinn" takes
+    the mean; noise : (S,) standard deviation of a sample, Pa. `width`
     (neurons of a hidden layer), `steps` (of the optimiser) and `threads` are for "pinn" alone: a
     network is trained once for the line, then solved a window at a time. progress(text) is called
     on the way. Raises ValueError for another method.
@@ -52,16 +53,16 @@ def estimate_flow_by(
         if step % STEPS_BETWEEN_REPORTS == 0:
             progress(f"step {step}: loss {loss:.2g}")
 
-    settings = pinn.Settings(width=width, steps=steps)
-    trunk, losses = pinn.train(line_at, speed_hz, bandwidth_hz, settings, report)
+    settings, mean_speed_hz = pinn.Settings(width=width, steps=steps), float(np.mean(speed_hz))
+    trunk, losses = pinn.train(line_at, mean_speed_hz, bandwidth_hz, settings, report)
     progress(f"equations hold to {float(trunk.residual):.2g} of the waves")
     gain = last_gain(losses)
     if not gain <= UNCONVERGED_GAIN:
         progress(
             f"warning: not converged: the last {LAST_SHARE:.0%} of the training lowered its loss "
-            f"by {gain:.0%}; raise flow_sensor.steps"
+            f"by {gain:.0%}; raise flow_sensor.pinn.steps"
         )
-    return pinn.estimate_flow(windows, speed_hz, line_at, trunk, noise, bandwidth_hz)
+    return pinn.estimate_flow(windows, mean_speed_hz, line_at, trunk, noise, bandwidth_hz)
 
 
 def last_gain(losses: np.ndarray) -> float:

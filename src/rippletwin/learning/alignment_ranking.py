@@ -46,9 +46,10 @@ def alignment_table(shares: pd.DataFrame, results: pd.DataFrame) -> pd.DataFrame
     ].mean()
     cells = seeds.groupby([*keys, "domain"], sort=False)
     table = cells.mean()
-    table["alignment_std"] = cells["alignment"].std()
+    table["alignment_std"] = cells["alignment"].std().fillna(0.0)  # of a single seed
     right = results.groupby(keys)[list(SCORES)].agg(["mean", "std"])
     right.columns = [name if kind == "mean" else f"{name}_std" for name, kind in right.columns]
+    right = right.fillna({f"{name}_std": 0.0 for name in SCORES})
     return table.reset_index().merge(right, on=keys, how="left", validate="one_to_one")
 
 

@@ -2,7 +2,8 @@
 
 A claim about accuracy is a list of comparisons: one network against another on one dataset. Each is
 a difference of mean accuracies with its 95 % interval: it *supports* the claim where the interval
-lies above zero, *opposes* it where it lies below, and is *open* otherwise. Accuracy has several
+lies above zero, *opposes* it where it lies below, and is *open* otherwise. One without an interval,
+of a single seed or too few recordings, decides nothing and does not count. Accuracy has several
 scores. With the *recording* as the unit the two are compared on each recording, seeds averaged, and
 the interval is over recordings: it says what holds for other recordings. In the paper's protocol
 three recordings are given, and the interval is over seeds (Welch's t): it says what holds for other
@@ -13,7 +14,7 @@ A claim is
 * **reproduced** where more than half of its comparisons support it and none opposes it,
 * **partly** reproduced where some support it, but not so,
 * **not** reproduced where none supports it,
-* **untested** where no comparison could be made.
+* **untested** where no comparison with an interval could be made.
 
 The same rule is applied to the paper's own table, which shows how demanding it is.
 """
@@ -117,12 +118,16 @@ def difference_over_recordings(better, worse) -> tuple[float, float, float]:
 
 
 def verdict_of_difference(low: float, high: float) -> str:
-    """What one comparison says of its claim: "supports", "opposes" or "open"."""
+    """What one comparison says of its claim: "supports", "opposes" or "open"; "no interval" where
+    too few seeds or recordings give none."""
+    if not low <= high:
+        return "no interval"
     return "supports" if low > 0 else "opposes" if high < 0 else "open"
 
 
 def judge_claim(verdicts: list[str]) -> str:
     """The claim's verdict by the rule at the head of this module."""
+    verdicts = [each for each in verdicts if each != "no interval"]
     supporting = verdicts.count("supports")
     if not verdicts:
         return "untested"
