@@ -80,6 +80,13 @@ def test_tables_by_hand():
     assert np.isnan(either.rho) and either["mean"] == 90
 
 
+def test_a_single_seed_has_no_spread():
+    """A run of one seed: its page says 0, not "nan", beside every mean."""
+    shares, results = (table[table.seed == 0] for table in rows())
+    table = alignment_table(shares, results)
+    assert (table[["alignment_std", "accuracy_std", "accuracy_either_std"]] == 0.0).all(axis=None)
+
+
 def test_inputs_without_attention_do_not_count():
     """A fault that a seed has no evidence for leaves that seed's mean to the other fault."""
     shares, results = rows()

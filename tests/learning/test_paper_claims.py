@@ -44,7 +44,7 @@ def test_no_spread_and_one_seed():
     """Ten equal runs on either side leave no doubt; one run leaves nothing but doubt."""
     assert paired_difference((100, 0, 10), (90, 0, 10)) == (10, 10, 10)
     assert np.isnan(paired_difference((100, 0, 1), (90, 0, 10))[1:]).all()
-    assert paper_claims.verdict_of_difference(np.nan, np.nan) == "open"
+    assert paper_claims.verdict_of_difference(np.nan, np.nan) == "no interval"
 
 
 @pytest.mark.parametrize(
@@ -55,11 +55,14 @@ def test_no_spread_and_one_seed():
         ("sssx", "partly"),
         ("oox", "not"),
         ("", "untested"),
+        ("nn", "untested"),
+        ("sn", "reproduced"),
     ],
 )
 def test_rule(found, expected):
-    """The rule's four outcomes: half is no majority, one opposition spoils."""
-    words = {"s": "supports", "o": "open", "x": "opposes"}
+    """The rule's four outcomes: half is no majority, one opposition spoils, and a comparison that
+    could not be decided says nothing against a claim."""
+    words = {"s": "supports", "o": "open", "x": "opposes", "n": "no interval"}
     assert judge_claim([words[letter] for letter in found]) == expected
 
 
@@ -145,12 +148,12 @@ def test_recordings_are_the_unit():
     assert judged[paper_claims.KERNELS_IN_TIME.text, paper_claims.RECORDINGS] == "partly"
 
 
-def test_three_recordings_leave_everything_open():
+def test_three_recordings_give_no_interval():
     """Networks that differ in all windows of all three recordings: no interval, no verdict, though
     seeds agree to the last window."""
     mean, low, high = difference_over_recordings([100.0] * 3, [0.0] * 3)
     assert mean == 100 and np.isnan([low, high]).all()
-    assert paper_claims.verdict_of_difference(low, high) == "open"
+    assert paper_claims.verdict_of_difference(low, high) == "no interval"
 
 
 def test_only_recordings_that_both_have_are_compared():

@@ -144,7 +144,7 @@ def plot_claims(groups: Mapping[str, tuple[Sequence[str], np.ndarray]]) -> Figur
         for mask, colour, marker, name in (
             (supports, style.CALIBRATED, "o", "supports"),
             (opposes, style.ALARM, "s", "opposes"),
-            (~supports & ~opposes, style.NEUTRAL, "D", "open"),
+            (~supports & ~opposes, style.NEUTRAL, "D", "open, or no interval"),
         ):
             ax.plot(values[mask, 0], rows[mask], marker, ms=4, color=colour, label=name)
             ax.hlines(rows[mask], values[mask, 1], values[mask, 2], color=colour, lw=1.2)

@@ -188,7 +188,8 @@ def judge_claims(compared: pd.DataFrame, cells: pd.DataFrame, period: float) -> 
                 open_ended = int((~found.converged.astype(bool)).sum())
                 evidence = (
                     f"{len(found)} comparisons: {counts.get('supports', 0)} support, "
-                    f"{counts.get('opposes', 0)} oppose; differences {found.difference.min():+.1f} "
+                    f"{counts.get('opposes', 0)} oppose, {counts.get('no interval', 0)} without an "
+                    f"interval; differences {found.difference.min():+.1f} "
                     f"to {found.difference.max():+.1f}, median {found.difference.median():+.1f}"
                 )
                 if open_ended:
@@ -214,11 +215,12 @@ Accuracies on recordings, per cent of the windows. Each comparison is a differen
 means with its 95 % interval: it supports a claim where that lies above zero, opposes it
 where it lies below, and is open otherwise. A claim is reproduced where more than half of
 its comparisons support it and none opposes it, partly where some support it but not so,
-not where none does; untested where nothing could be compared.
+not where none does; untested where nothing could be compared. Comparisons without an
+interval do not count.
 
 *{RECORDINGS}*: the recording is the unit. Both networks are compared on each recording,
 either severity being right and seeds averaged, and the interval is over recordings
-(Hartigan); five or less leave everything open. The other scores are the paper's
+(Hartigan); five or less give none. The other scores are the paper's
 protocol: one recording a state, and an interval over seeds (Welch), which says nothing
 of other recordings. The rule is laid on the paper's own table too. Nothing corrects for
 the number of comparisons: one in forty would support a claim by chance.
@@ -230,7 +232,7 @@ the number of comparisons: one in forty would support a claim by chance.
             (
                 *(r.score, r.dataset, r.better, r.worse),
                 mark_unconverged(f"{r.difference:+.1f}", r.converged),
-                f"{r.low:+.1f} to {r.high:+.1f}",
+                f"{r.low:+.1f} to {r.high:+.1f}" if r.low <= r.high else "",
                 r.verdict,
             )
             for r in rows.itertuples()
