@@ -6,6 +6,7 @@ import pytest
 from rippletwin.errors import InputError
 from rippletwin.learning.dataset import UNKNOWN
 from rippletwin.learning.windows import (
+    check_window_counts,
     early_healthy,
     early_known,
     first_of_each_state,
@@ -13,6 +14,17 @@ from rippletwin.learning.windows import (
     pair_windows,
     spread_windows,
 )
+
+
+@pytest.mark.parametrize(("count", "enough"), [(1, False), (3, False), (4, True), (100, True)])
+def test_a_recording_that_is_too_short_to_learn_from_is_named(count, enough):
+    """Of four windows three are early, one of which is held out, and one is late; of three windows
+    two are early, of which no fifth can be held out."""
+    if enough:
+        return check_window_counts({"a": 100, "b": count}, 0.8, 0.2)
+    with pytest.raises(InputError, match=f"recording b: file: makes {count} windows") as e:
+        check_window_counts({"a": 100, "b": count}, 0.8, 0.2)
+    assert "experimental" in e.value.remedy
 
 
 def test_pairs_are_consecutive_and_of_one_recording():

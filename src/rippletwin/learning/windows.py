@@ -2,10 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from rippletwin.errors import InputError
 from rippletwin.learning.dataset import UNKNOWN, remove_mean, split_by_time
+
+
+def check_window_counts(counts: Mapping[str, int], share: float, validation: float) -> None:
+    """Raise InputError where a recording, by its label, has too few windows to learn from the early
+    `share`, of which a share of `validation` is held out, and to test the rest."""
+    for label, count in counts.items():
+        early = round(share * count)
+        if not (early < count and 0 < round(validation * early) < early):
+            raise InputError(
+                f"recording {label}",
+                "file",
+                f"makes {count} windows, too few to learn from the early ones, hold some of them "
+                "out and test the rest",
+                "Record ten revolutions or more, or leave the dataset experimental out",
+            )
 
 
 def pair_windows(recording: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
