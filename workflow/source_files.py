@@ -22,12 +22,19 @@ PLUGIN_FOLDERS = {
 }
 """Modules that import by a computed name -> the folder whose modules they import."""
 
+DATA_FILES = {
+    "src/rippletwin/report/page.py": "src/rippletwin/report/templates/*",
+    "src/rippletwin/case/schema_errors.py": "src/rippletwin/case/rig.schema.yaml",
+}
+"""Modules that read files of their package -> which."""
+
 SUFFIXES = {".py", ".yaml"}  # code and data of a package
 BLOCKS = ("body", "orelse", "handlers", "finalbody", "cases")  # statements of a statement
 
 
 def source_files_of(path: Path | str) -> list[Path]:
-    """Source files that running `path` imports, directly or not, late imports included; sorted.
+    """Source files that running `path` imports, directly or not, late imports included, and the
+    data files that these read; sorted.
 
     path : a script or a module, anywhere; relative paths are below this repository. It is in the
         result only where another file imports it.
@@ -48,12 +55,17 @@ def package_files(name: str) -> list[Path]:
 
 @cache
 def _imported_files(file: Path) -> frozenset[Path]:
-    """Source files that `file` itself imports; a file is parsed once a process."""
+    """Source files that `file` itself imports, and data that it reads; a file is parsed once a
+    process."""
+    if file.suffix != ".py":
+        return frozenset()
     found = {path for name in _imported_names(file) for path in _files_run_by(name)}
     if file.is_relative_to(ROOT):
-        folder = PLUGIN_FOLDERS.get(file.relative_to(ROOT).as_posix())
-        if folder:
-            found |= set((ROOT / folder).glob("*.py"))
+        name = file.relative_to(ROOT).as_posix()
+        if name in PLUGIN_FOLDERS:
+            found |= set((ROOT / PLUGIN_FOLDERS[name]).glob("*.py"))
+        if name in DATA_FILES:
+            found |= set(ROOT.glob(DATA_FILES[name]))
     return frozenset(found)
 
 

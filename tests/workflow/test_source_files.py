@@ -163,6 +163,20 @@ def test_whoever_imports_by_a_computed_name_is_declared():
     assert all((ROOT / folder).is_dir() for folder in PLUGIN_FOLDERS.values())
 
 
+def test_data_of_a_package_count_where_they_are_read():
+    """The report's templates and the schema of rig.yaml; whoever reads a file of its package has to
+    be added to DATA_FILES, or an edit of it would rerun nothing."""
+    page = source_files_of("workflow/scripts/report_page.py")
+    assert {"page.html", "page.css", "page.js", "rig.schema.yaml"} <= {file.name for file in page}
+    reads = re.compile(r"\bfiles\(\"rippletwin")
+    found = {
+        file.relative_to(ROOT).as_posix()
+        for file in (ROOT / "src/rippletwin").rglob("*.py")
+        if reads.search(file.read_text())
+    }
+    assert found == set(source_files.DATA_FILES)
+
+
 def test_another_program_counts_with_its_data():
     """The virtual rig is run as a command: all its code, and the sheets that it draws from."""
     names = {file.name for file in package_files("virtualrig")}
