@@ -22,7 +22,6 @@ case = load_case(rig.parent, labels=labels)
 chosen = case.recordings
 cut = [revolutions_of(r, case.rig, params.samples) for r in chosen]
 windows = [revolutions.windows[: params.windows] for revolutions in cut]
-speeds = [revolutions.speed_hz[: params.windows] for revolutions in cut]
 counts = [len(w) for w in windows]
 healthy = [k for k, r in enumerate(chosen) if r.state == "healthy"] or range(len(chosen))
 noise = np.mean([noise_mad(chosen[k].pressure) for k in healthy], axis=0)
@@ -44,7 +43,7 @@ store.save(
         coords={
             "state": ("window", np.repeat([r.state_code or UNKNOWN for r in chosen], counts)),
             "recording": ("window", np.repeat(range(len(chosen)), counts)),
-            "window_speed_hz": ("window", np.concatenate(speeds)),
+            "window_speed_hz": ("window", np.hstack([r.speed_hz[:n] for r, n in zip(cut, counts)])),
             "channel": [sensor.name for sensor in case.rig.sensors],
         },
         attrs={
