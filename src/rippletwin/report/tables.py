@@ -77,7 +77,7 @@ def tolerance_note(twin: Twin) -> str:
     scale, tolerance, widened = twin.rig.tolerance_scale, "tolerance", ""
     if scale != 1.0:
         tolerance = "widened tolerance"
-        widened = f"The twin was fitted with {write_number(scale)} times the sheet's tolerances. "
+        widened = f"The twin was fitted with {scale:.2g} times the sheet's tolerances. "
     return (
         "A tolerance is a standard deviation that rig.yaml states; the shaded band is two of them "
         f"to either side. {widened}* The recordings do not determine this value: they hardly add "
