@@ -242,6 +242,26 @@ def test_check_ends_with_2_on_bad_input(tmp_path, capsys):
     assert "rig.yaml" in told.err and told.out == ""
 
 
+@pytest.mark.parametrize("command", ["check", "export"])
+def test_recordings_of_a_pump_that_stands_still_are_refused(tmp_path, capsys, command):
+    """Recordings without a ripple that repeats with the shaft are told with their files; check
+    tells all of them at once, and still shows what it can read."""
+    content = sheet()
+    for k in (1, 2):
+        still = content["recordings"][0] | {"file": f"still_{k}.h5", "state": "unknown"}
+        content["recordings"].append(still)
+        noise = np.random.default_rng(k).normal(scale=1e3, size=(2, int(RATE)))
+        write_hdf5(tmp_path / f"still_{k}.h5", 9.5e6 + noise)
+    write_case(tmp_path, content)
+    out = ["--out", str(tmp_path / "out")] if command == "export" else []
+    assert main([command, str(tmp_path), *out]) == 2
+    told = capsys.readouterr()
+    said = "speed_rpm: no ripple repeats with the shaft at 1000 r/min"
+    assert told.err.count(said) == (2 if command == "check" else 1)
+    assert "still_1.h5" in told.err and "Traceback" not in told.err
+    assert command == "export" or "5 of 33 piston harmonics" in told.out
+
+
 @pytest.mark.skipif(not CYLINDER.is_dir(), reason="the measured cylinder is not on this machine")
 def test_the_measured_cylinder_comes_in(tmp_path):
     """Two runs of a real tube's input impedance, bare columns, at the frequencies both have.

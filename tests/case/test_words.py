@@ -9,6 +9,7 @@ from rippletwin.case.words import (
     name_element,
     name_hypothesis,
     name_parameter,
+    name_place,
 )
 from rippletwin.twin.effects.library import EFFECTS, candidates
 from rippletwin.twin.twin import Twin
@@ -76,3 +77,19 @@ def test_effects_of_one_name_are_told_together():
         name_effects([("leak", "position"), ("entrained_air", "line")]) == "leak and entrained air"
     )
     assert name_effects([]) == ""
+
+
+def test_a_sensor_may_be_called_position():
+    """Only the element that is any position is told as one place; a name that holds the word stays
+    as the user gave it."""
+    assert name_element("position") == "one place"
+    assert name_element("position, shunt") == "one place (shunt)"
+    assert name_place("position") == "at one place"
+    assert name_element("sensor position_1") == "sensor position_1"
+    assert name_element("between pump and position 2") == "between the pump and position 2"
+
+
+def test_the_load_s_factor_is_no_resistance():
+    """It multiplies the coefficient of an orifice, whose resistance it divides, and the impedance
+    of a load that has one: the words name both."""
+    assert name_parameter("load") == "factor on the load's coefficient or impedance"

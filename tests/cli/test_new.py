@@ -104,6 +104,17 @@ def test_questions_ask_for_what_is_missing(tmp_path):
     assert asked == given
 
 
+def test_oil_of_zero_degrees_is_asked_about_at_zero_degrees(tmp_path):
+    """0 °C is a temperature that was given: the question about the viscosity names it."""
+    options = flags()
+    del options[options.index("--viscosity") : options.index("--viscosity") + 2]
+    options[options.index("--temperature") + 1] = "0"
+    run = CliRunner().invoke(
+        command, [str(tmp_path / "case"), "--ask", *options], input="\n" * 5 + "300\n" + "\n" * 5
+    )
+    assert "Viscosity at 0 °C" in run.output and "at 50 °C" not in run.output, run.output
+
+
 def test_what_is_missing_is_told_at_once(tmp_path, capsys):
     """Where nobody can be asked, every missing option is in one message and nothing is written."""
     assert main(["new", str(tmp_path / "case"), "--no-ask"]) == 2

@@ -307,7 +307,8 @@ def test_a_rival_of_the_data_sheet_is_told_in_words():
     said = explained()[-1]
     assert "speaks for volume at the pump: " in said
     assert "would fit to 0.30 % if the length of segment 2 were 1.60 m instead of 1.8 m." in said
-    assert "if the relative resistance of the load were 39.5 % instead of 100 %." in said
+    factor = "factor on the load's coefficient or impedance"
+    assert f"if the {factor} were 39.5 % instead of 100 %." in said
 
 
 def test_what_cannot_be_told_apart_comes_second_with_the_next_recording():

@@ -62,6 +62,7 @@ DRAWN = {
         }
     ),
     "ripple": lambda: plot_ripple(made_numbers()),
+    "ripple, mixed kinds": lambda: plot_ripple(mixed_numbers()),
     "ripple, nothing found": lambda: plot_ripple(made_numbers(found=False)),
     "residuals": lambda: plot_residuals(made_numbers()),
     "evidence": lambda: plot_evidence(made_numbers()),
@@ -237,3 +238,35 @@ def test_figures_without_a_search_or_sensors_are_left_out():
     assert plot_evidence(replace(numbers, candidates=())) is None
     assert plot_place(replace(numbers, places=replace(numbers.places, sensors=()))) is None
     assert plot_immittance(replace(numbers, missing=())) is None
+
+
+def mixed_numbers():
+    """Two operating points with the spectra of a broadband source between and after them."""
+    numbers = made_numbers()
+    (periodic,) = numbers.points
+    spectrum = replace(
+        periodic,
+        label="shaker",
+        kind="random",
+        orders=None,
+        speed_rpm=None,
+        load_pressure=None,
+        measured=1e-3 * periodic.measured,
+        calibrated=1e-3 * periodic.calibrated,
+        corrected=1e-3 * periodic.corrected,
+    )
+    return replace(numbers, points=(periodic, spectrum, periodic, spectrum))
+
+
+def test_ripples_of_a_mixed_case_keep_a_scale_and_a_unit_of_their_own():
+    """Ripples in bar pass zero and are drawn on a linear axis beside spectra on a logarithmic one;
+    panels of one kind share their axis, and the first of each kind names its unit."""
+    figure = plot_ripple(mixed_numbers())
+    figure.draw_without_rendering()
+    rows = np.reshape(figure.axes, (2, 4))
+    for row in rows:
+        assert [ax.get_yscale() for ax in row] == ["linear", "log", "linear", "log"]
+        assert row[0].get_ylim() == row[2].get_ylim() != row[1].get_ylim() == row[3].get_ylim()
+        units = [ax.get_ylabel() for ax in row]
+        assert "ripple / bar" in units[0] and "amplitude / Pa" in units[1] and not any(units[2:])
+        assert row[0].get_ylim()[0] < 0.0 < row[1].get_ylim()[0]

@@ -11,12 +11,19 @@ import h5py
 import numpy as np
 import pytest
 
-from made_results import AMPLITUDES, GEOMETRY, HOSTILE, ORDERS, write_results
+from made_results import (
+    AMPLITUDES,
+    DIAGNOSIS,
+    GEOMETRY,
+    HOSTILE,
+    ORDERS,
+    write_results,
+)
 from rippletwin.case.load import load_case
 from rippletwin.cli import main
 from rippletwin.errors import InputError
 from rippletwin.report.content import WorkflowPart, make_page
-from rippletwin.report.page import render, write_report
+from rippletwin.report.page import render, report_case, write_report
 from rippletwin.report.results import read_results
 from rippletwin.report.tables import Cell, Table
 from rippletwin.report.verdict_words import remaining_sentences
@@ -373,3 +380,101 @@ def test_an_effect_of_a_user_s_file_needs_no_file(tmp_path):
     results = read_results(folder)
     assert len(results.twin.parameters) == count == len(results.covariance)
     assert make_page(results).parameters.rows
+
+
+def widened(folder, scale):
+    """Results of a case whose twin was fitted with `scale` times the sheet's tolerances."""
+    write_results(folder)
+    path = folder / "explained" / "twin.json"
+    data = json.loads(path.read_text())
+    data["rig"]["tolerance_scale"] = scale
+    data["rig"]["uncertainty"] = {
+        name: value if name == "sensor_gain" else scale * value
+        for name, value in data["rig"]["uncertainty"].items()
+    }
+    path.write_text(json.dumps(data))
+    return read_results(folder)
+
+
+def test_tolerances_are_those_of_the_sheet_where_explain_widened_them(tmp_path):
+    """One widened tolerance of the wave speed is three that rig.yaml states: the table and its band
+    say three, and the note says what the * compares with."""
+    page = make_page(widened(tmp_path, 3.0))
+    row = next(r for r in page.parameters.rows if r[0].text == "wave speed of segment 1")
+    assert row[-1] == Cell("−3.0", -3.0, -3.0)
+    assert "3 times the sheet's tolerances" in page.tolerance
+    assert "its widened tolerance" in Parsed(render(page)).words
+
+
+def test_tolerances_that_nothing_widened_need_no_word(folder):
+    """One tolerance is one, and the note speaks of no other."""
+    page = make_page(read_results(folder))
+    row = next(r for r in page.parameters.rows if r[0].text == "wave speed of segment 1")
+    assert row[-1].pull == -1.0 and "widened" not in page.tolerance
+
+
+def test_a_diagnosis_of_nothing_that_was_tried_is_no_fault(tmp_path):
+    """A change that is like no fault counts as neither healthy nor faulty, on the tile and on its
+    card; a fault beside it counts."""
+    folder = write_results(tmp_path)
+    path = folder / "diagnosed" / "diagnosis.json"
+    unlike = DIAGNOSIS | {"state": "unlike", "severity": {}}
+    path.write_text(json.dumps({"recordings": [unlike, DIAGNOSIS]}))
+    page = make_page(read_results(folder))
+    tile = next(t for t in page.tiles if t.name == "Diagnosed as faulty")
+    assert tile.value == "1 of 2" and "unlike everything that was tried" in tile.note
+    cards = [a["class"] for tag, a in Parsed(render(page)).tags if tag == "article"]
+    assert cards == ["card unlike", "card faulty"]
+
+
+def test_the_verdict_is_that_of_the_folder_explained(tmp_path):
+    """diagnose without a twin writes a verdict too: the report takes it where there is no other."""
+    folder = write_results(tmp_path)
+    other = (folder / "explained" / "verdict.json").read_text().replace("named", "unexplained")
+    (folder / "diagnosed" / "verdict.json").write_text(other)
+    assert read_results(folder).verdict["verdict"] == "named"
+    (folder / "explained").rename(folder / "elsewhere")
+    assert read_results(folder).verdict["verdict"] == "unexplained"
+
+
+def still_pump(folder):
+    """Results of a case whose unknown recording is noise about the mean pressure."""
+    write_results(folder)
+    with h5py.File(folder / "unknown.h5", "a") as file:
+        shape = file["pressure"].shape
+        file["pressure"][...] = 9.5e6 + np.random.default_rng(1).normal(scale=1e3, size=shape)
+    return folder
+
+
+def test_a_recording_of_a_pump_that_stands_still_has_no_chart(tmp_path, capsys):
+    """No ripple repeats with the shaft: the page is written without that order spectrum, with the
+    other one, and says why."""
+    folder = still_pump(tmp_path)
+    assert main(["report", str(folder), "--out", str(folder / "report.html")]) == 0
+    said = "no ripple repeats with the shaft at 1000 r/min. Correct speed_rpm or pump.pistons"
+    assert said in capsys.readouterr().err
+    parsed = Parsed((folder / "report.html").read_text())
+    charts = [json.loads(a["data-chart"]) for tag, a in parsed.tags if "data-chart" in a]
+    assert sum(chart["yLabel"] == "amplitude / bar" for chart in charts) == 2
+    assert f"There is no order spectrum of {HOSTILE}: {said}" in parsed.words
+
+
+def test_only_results_are_called_foreign(folder, monkeypatch):
+    """What fails on a recording is no fault of the results: it stays the error that it is."""
+
+    def fail(*arguments):
+        raise ValueError("of the recording")
+
+    monkeypatch.setattr("rippletwin.report.charts.order_spectrum", fail)
+    with pytest.raises(ValueError, match=r"^of the recording$"):
+        report_case(folder, folder / "report.html")
+
+
+@pytest.mark.parametrize("name", ["twin.json", "verdict.json"])
+def test_results_that_no_command_wrote_are_refused(tmp_path, name):
+    """A twin that fails as it is read, and a verdict that fails as it is shown."""
+    folder = write_results(tmp_path, effects=[3] if name == "verdict.json" else [])
+    if name == "twin.json":
+        (folder / "explained" / name).write_text("{}")
+    with pytest.raises(InputError, match="are not as the commands write them"):
+        report_case(folder, folder / "report.html")

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
+from case_folders import ripple as steady_ripple
 from rippletwin.case.model import Fluid, Load, Recording, Rig, Segment, Sensor
+from rippletwin.errors import InputError
 from rippletwin.spectra.angular_resampling import cut_revolutions, interpolate
 from rippletwin.spectra.interpolation_kernel import sum_taps
 from rippletwin.spectra.noise import noise_cycle_scatter, noise_mad
@@ -273,3 +275,22 @@ def test_one_spectrum_has_the_stated_relative_error():
         expected = (relative * 5 / np.sqrt(2)) ** 2
         np.testing.assert_allclose(seen.covariance[0], expected * np.eye(2))
         assert seen.source == "free"
+
+
+@pytest.mark.parametrize(
+    ("pressure", "speed_rpm"),
+    [
+        (9.5e6 + np.random.default_rng(1).normal(scale=1e3, size=(2, int(RATE))), 1000.0),
+        (steady_ripple(seconds=3.0), 800.0),
+    ],
+    ids=["still", "another speed"],
+)
+def test_a_ripple_that_does_not_repeat_with_the_shaft_is_bad_input(pressure, speed_rpm):
+    """Noise of a pump that stands still, and a speed that is 20 % wrong: the recording's file and
+    its speed are named, with a remedy."""
+    with pytest.raises(InputError) as caught:
+        observe(recording(pressure, speed_rpm=speed_rpm), RIG)
+    error = caught.value
+    assert (error.file, error.field) == ("synthetic", "speed_rpm")
+    assert error.problem == f"no ripple repeats with the shaft at {speed_rpm:g} r/min"
+    assert "pump.pistons" in error.remedy

@@ -38,7 +38,7 @@ IMPLIED_PLACES = ("line", "position", "load", "source")
 PLACES = ("between ", "in ", "at ")  # beginnings of what says a place already
 
 PARAMETERS = {
-    "load": "relative resistance of the load",
+    "load": "factor on the load's coefficient or impedance",
     "position": "distance from the pump",
     "compliance_ratio": "additional compliance of the wall",
     "retardation_time": "retardation time of the wall",
@@ -50,6 +50,12 @@ PARAMETERS = {
     "viscosity_slope": "relative change of the viscosity over that of the wave speeds",
     "port_timing": "lag of the port timing",
     "end_correction": "end correction in radii",
+}
+ELEMENTS = {
+    "source": "the pump",
+    "load": "the load",
+    "line": "the whole line",
+    "position": "one place",
 }
 STATES = {
     "healthy": "healthy",
@@ -141,8 +147,7 @@ def name_parameter(name: str) -> str:
 def name_element(element: str) -> str:
     """An element of the rig in words, "the pump", "segment 2", "sensor p1"."""
     stem, _, kind = element.partition(", ")
-    words = {"source": "the pump", "load": "the load", "line": "the whole line"}.get(stem, stem)
-    words = words.replace("position", "one place")
+    words = ELEMENTS.get(stem, stem)
     if words.startswith("between "):
         words = re.sub(r"\b(pump|load)$|(?<=^between )pump\b", r"the \g<0>", words)
     return f"{words} ({kind})" if kind else words

@@ -21,6 +21,7 @@ def command(case: Path, fail_on: tuple[str, ...], as_json: bool) -> int:
     from threadpoolctl import threadpool_limits
 
     from rippletwin.case.load import load_case
+    from rippletwin.errors import InputError, raise_any
     from rippletwin.spectra import case_summary
 
     with progress_bars(as_json, passing=True) as progress:
@@ -29,15 +30,20 @@ def command(case: Path, fail_on: tuple[str, ...], as_json: bool) -> int:
     summary = case_summary.summarise_rig(read)
     if not as_json:
         print("\n".join(case_summary.rig_in_words(summary)), flush=True)
-    summary["recordings"], healthy = [], []
+    summary["recordings"], healthy, errors = [], [], []
     # one thread: the matrices are small, and threads only wait for each other
     with threadpool_limits(1), progress_bars(as_json, passing=True) as progress:
         for recording in read.recordings:
-            found, observation = case_summary.summarise_recording(recording, read.rig, progress)
+            try:
+                found, observation = case_summary.summarise_recording(recording, read.rig, progress)
+            except InputError as error:
+                errors.append(error)  # of every recording, as `load_case` tells them
+                continue
             summary["recordings"].append(found)
             healthy += [observation] * (recording.state == "healthy")
             if not as_json:
                 print("\n".join(case_summary.recording_in_words(found)), flush=True)
+        raise_any(errors)
         effects = _effects(read, healthy, summary["advice"], progress)
     summary["effects"] = [effect.as_dict() for effect in effects]
     if as_json:

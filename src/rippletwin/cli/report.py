@@ -18,7 +18,8 @@ from rippletwin.cli.progress import warn
 @click.option(
     "--explained",
     metavar="DIR",
-    help="The folder that explain wrote; by default CASE/explained.",
+    help="The folder that explain wrote; by default CASE/explained, or the folder of the diagnosis "
+    "where only that holds a verdict.",
 )
 @click.option(
     "--diagnosed",
@@ -26,7 +27,9 @@ from rippletwin.cli.progress import warn
     help="The folder that diagnose wrote; by default CASE/diagnosed.",
 )
 @options.json_output
-@options.fail_on(("missing",), "The verdict, the ripples or the diagnosis are not there.")
+@options.fail_on(
+    ("missing",), "The verdict, the ripples, the diagnosis or an order spectrum is not there."
+)
 def command(
     case: Path,
     out: str,
@@ -40,11 +43,10 @@ def command(
     Nothing is calculated again: what is not there, the page says, with the command that makes it.
     """
     from rippletwin.report.page import write_report
-    from rippletwin.report.results import read_results, refuse_foreign
+    from rippletwin.report.results import read_results
 
-    with refuse_foreign(case):
-        results = read_results(case, explained, diagnosed)
-        path = write_report(results, out)
+    results = read_results(case, explained, diagnosed)
+    path = write_report(results, out)
     warn([*results.case.warnings, *results.missing])
     print(json.dumps({"report": str(path), "missing": list(results.missing)}) if as_json else path)
     return found_code(["missing"] if results.missing else [], fail_on)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from rippletwin.case.quantities import write_share
 from rippletwin.figures import style
@@ -19,6 +22,7 @@ LOOKS = {
 }
 """The thin lines show on the wide one, also where all three agree."""
 RESIDUAL_LIMITS = 0.1, 100.0
+LABELLED = 1.0, 3.0  # times powers of ten, on a logarithmic axis
 LEAST_HEIGHT = 2.6  # inches, of a figure of one row
 
 
@@ -64,7 +68,8 @@ def plot_ripple(numbers: ExplainedNumbers) -> Figure:
     shown, names = numbers.points[:MAX_COLUMNS], curves_of(numbers)
     rows = max(len(p.measured) for p in shown)
     height = max(1.75, LEAST_HEIGHT / rows)
-    fig, axes = style.figure(rows, len(shown), height=height, sharex="col", sharey="row")
+    fig, axes = style.figure(rows, len(shown), height=height, sharex="col")
+    first_of = _share_y_by_kind(axes, shown)
     for k, (column, point) in enumerate(zip(axes.T, shown)):
         for ax in column[len(point.measured) :]:
             ax.set_visible(False)
@@ -76,7 +81,9 @@ def plot_ripple(numbers: ExplainedNumbers) -> Figure:
                 ax.set_ylim(0.0, 1.1)  # the reflection of a passive line is at most 1
             elif point.orders is None:
                 ax.set_yscale("log")
-            if k == 0:
+                ax.yaxis.set_major_locator(LogLocator(subs=LABELLED))
+                ax.yaxis.set_minor_formatter(NullFormatter())
+            if first_of[point.kind] == k:
                 ax.set_ylabel(y_label, fontsize=8)
             errors = [write_share(point.misfit(getattr(point, n), s)) for n in names[1:]]
             head = f"{style.plain(title_of(point))}\n" if s == 0 else ""
@@ -88,6 +95,20 @@ def plot_ripple(numbers: ExplainedNumbers) -> Figure:
         fig.suptitle("Does the calibrated twin follow the recording?")
     style.legend_below(fig, axes[0, 0])
     return fig
+
+
+def _share_y_by_kind(axes: np.ndarray, points: Sequence[Point]) -> dict[str, int]:
+    """Share the y axis of each row among the columns of one kind, which alone have one unit and
+    scale. Returns the first column of each kind; the others show no numbers."""
+    first_of: dict[str, int] = {}
+    for k, point in enumerate(points):
+        first = first_of.setdefault(point.kind, k)
+        if first == k:
+            continue
+        for ax, of_kind in zip(axes[:, k], axes[:, first]):
+            ax.sharey(of_kind)
+            ax.tick_params(axis="y", which="both", labelleft=False)
+    return first_of
 
 
 def plot_residuals(numbers: ExplainedNumbers) -> Figure:

@@ -34,11 +34,11 @@ class OrderSpectrum:
     amplitude: np.ndarray
 
 
-def order_spectrum(recording: Recording, rig: Rig) -> OrderSpectrum | None:
-    """The spectrum of a periodic recording averaged over the revolutions of its first minute; None
-    for other kinds."""
-    if recording.kind != "periodic":
-        return None
+def order_spectrum(recording: Recording, rig: Rig) -> OrderSpectrum:
+    """The spectrum of a periodic recording averaged over the revolutions of its first minute.
+
+    Raises InputError where no ripple repeats with the shaft.
+    """
     few = recording.pressure[:, : int(SECONDS_OF_SPECTRUM * recording.sampling_rate_hz)]
     revolutions = revolutions_of(replace(recording, pressure=few), rig)
     pistons = rig.pump["pistons"]

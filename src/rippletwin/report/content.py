@@ -26,6 +26,7 @@ from rippletwin.report.tables import (
     parameter_table,
     recording_table,
     severity_words,
+    tolerance_note,
 )
 
 WIDE, NARROW = 960.0, 358.0  # widths of the line's drawing, on a desk and on a phone
@@ -54,11 +55,12 @@ class Tile:
 
 @dataclass(frozen=True)
 class DiagnosisCard:
-    """One recording's diagnosis; `bars` are (state, probability as text, width in per cent)."""
+    """One recording's diagnosis: `kind` is "healthy", "faulty" or "unlike", neither of them; `bars`
+    are (state, probability as text, width in per cent)."""
 
     label: str
     state: str
-    is_healthy: bool
+    kind: str
     facts: Sequence[str]
     bars: Sequence[tuple[str, str, float]]
     networks: Sequence[str]
@@ -116,6 +118,7 @@ class Page:
     following: Sequence[str]
     diagnoses: Sequence[DiagnosisCard]
     parameters: Table | None
+    tolerance: str
     recordings: Table
     orders: Sequence[Figure]
     full_sentence: str
@@ -127,8 +130,7 @@ def make_page(results: Results, workflow: WorkflowPart | None = None) -> Page:
     """The page's content."""
     case, verdict, numbers = results.case, results.verdict, results.explained
     places, marked = _places(results)
-    spectra = [charts.order_spectrum(recording, case.rig) for recording in case.recordings]
-    orders = [chart for each in spectra if each for chart in charts.chart_orders(each)]
+    orders = [chart for each in results.spectra for chart in charts.chart_orders(each)]
     kind = "unknown" if verdict is None else verdict["verdict"]
     return Page(
         title=case.folder.resolve().name,
@@ -152,6 +154,7 @@ def make_page(results: Results, workflow: WorkflowPart | None = None) -> Page:
         parameters=None
         if results.twin is None
         else parameter_table(results.twin, results.covariance),
+        tolerance="" if results.twin is None else tolerance_note(results.twin),
         recordings=recording_table(case),
         orders=draw_figures(orders),
         full_sentence="" if verdict is None else verdict.get("sentence", ""),
@@ -227,10 +230,15 @@ def _tiles(results: Results) -> list[Tile]:
     tiles.append(Tile("Recordings", str(len(results.case.recordings)), note))
     if results.diagnosis:
         states = [name_state(each["state"]) for each in results.diagnosis]
-        faulty = sum(each["state"] != "healthy" for each in results.diagnosis)
+        faulty = sum(_kind(each) == "faulty" for each in results.diagnosis)
         value = f"{faulty} of {len(states)}"
         tiles.append(Tile("Diagnosed as faulty", value, ", ".join(dict.fromkeys(states))))
     return tiles
+
+
+def _kind(entry: Mapping) -> str:
+    """What a diagnosis says: that the pump is healthy, that it is faulty, or neither."""
+    return entry["state"] if entry["state"] in ("healthy", "unlike") else "faulty"
 
 
 def _diagnosis(entry: Mapping, results: Results) -> DiagnosisCard:
@@ -257,7 +265,7 @@ def _diagnosis(entry: Mapping, results: Results) -> DiagnosisCard:
     return DiagnosisCard(
         entry["label"],
         name_state(entry["state"]),
-        entry["state"] == "healthy",
+        _kind(entry),
         facts,
         [
             (name_state(state), write_certainty(p), 100 * p)

@@ -49,10 +49,14 @@ def report_case(
     diagnosed: str | Path | None = None,
 ) -> Path:
     """Write the report of the case and the results in its folders, as `read_results` finds them."""
-    with refuse_foreign(case_folder):
-        return write_report(read_results(case_folder, explained, diagnosed), path)
+    return write_report(read_results(case_folder, explained, diagnosed), path)
 
 
 def write_report(results: Results, path: str | Path, workflow: WorkflowPart | None = None) -> Path:
-    """Write the report of results to a file, whole or not at all; returns its path."""
-    return store.write_text(path, render(make_page(results, workflow)))
+    """Write the report of results to a file, whole or not at all; returns its path.
+
+    Raises InputError where a result is not as the commands write it.
+    """
+    with refuse_foreign(results.case.folder):
+        page = render(make_page(results, workflow))
+    return store.write_text(path, page)

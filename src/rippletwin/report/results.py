@@ -6,7 +6,7 @@ import json
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,8 @@ from rippletwin.diagnosis.diagnosed_numbers import DiagnosedNumbers
 from rippletwin.errors import InputError
 from rippletwin.figures import explained_numbers
 from rippletwin.figures.explained_numbers import ExplainedNumbers
+from rippletwin.report import charts
+from rippletwin.report.charts import OrderSpectrum
 from rippletwin.twin.twin import Twin
 from rippletwin.twin.twin_file import from_dict
 
@@ -29,12 +31,14 @@ class Results:
     """A case and what is known of it; what is not there is None or empty, and `missing` says so.
 
     verdict, diagnosis   as in verdict.json and in the list of diagnosis.json
+    spectra              order spectra of the periodic recordings
     twin, covariance     the twin without its effects, and the covariance (P, P) of its theta
     explained, diagnosed the numbers behind the figures
-    missing              what the report lacks and the command that makes it, a sentence each
+    missing              what the report lacks and what makes it, a sentence each
     """
 
     case: Case
+    spectra: Sequence[OrderSpectrum] = ()
     verdict: Mapping | None = None
     twin: Twin | None = None
     covariance: np.ndarray | None = None
@@ -52,15 +56,45 @@ def read_results(
     """The case and its results.
 
     explained, diagnosed : folders that `explain` and `diagnose` wrote; by default the folders
-        `explained` and `diagnosed` of the case, where they exist.
+        `explained` and `diagnosed` of the case, where they exist. Where `explained` holds no
+        verdict, that of `diagnosed` is taken.
 
-    Raises InputError where the case is wrong, or a folder that is named holds no result.
+    Raises InputError where the case is wrong, a folder that is named holds no result, or a result
+    is not as the commands write it.
     """
     case = load_case(case_folder)
+    spectra, without_spectrum = _order_spectra(case)
+    with refuse_foreign(case_folder):
+        results = _read_folders(case, explained, diagnosed)
+    return replace(results, spectra=spectra, missing=(*results.missing, *without_spectrum))
+
+
+def _order_spectra(case: Case) -> tuple[list[OrderSpectrum], list[str]]:
+    """The order spectra of the case, and a sentence for each recording that has none."""
+    spectra, missing = [], []
+    for recording in case.recordings:
+        if recording.kind != "periodic":
+            continue
+        try:
+            spectra.append(charts.order_spectrum(recording, case.rig))
+        except InputError as error:
+            missing.append(
+                f"There is no order spectrum of {recording.label}: {error.problem}. {error.remedy}"
+            )
+    return spectra, missing
+
+
+def _read_folders(
+    case: Case, explained: str | Path | None, diagnosed: str | Path | None
+) -> Results:
+    """What `explain` and `diagnose` wrote of the case, as `read_results` takes it."""
     missing = []
     diagnosis_folder = _folder(diagnosed, case.folder / DIAGNOSED, "diagnosis.json", "--diagnosed")
-    inside = diagnosis_folder if (diagnosis_folder / "verdict.json").exists() else None
-    folder = _folder(explained, inside or case.folder / EXPLAINED, "verdict.json", "--explained")
+    usual = case.folder / EXPLAINED
+    by_default = next(
+        (each for each in (usual, diagnosis_folder) if (each / "verdict.json").is_file()), usual
+    )
+    folder = _folder(explained, by_default, "verdict.json", "--explained")
     verdict, numbers, twin, covariance = _read_json(folder / "verdict.json"), None, None, None
     if verdict is None:
         missing.append(f"There is no verdict: {_command('explain', case, EXPLAINED)}")

@@ -56,7 +56,7 @@ def parameter_table(twin: Twin, covariance: np.ndarray | None) -> Table:
         if p.flat:
             continue
         sd = None if covariance is None else float(np.sqrt(max(covariance[k][k], 0.0)))
-        rows.append(_parameter_row(p, float(twin.theta[k]), sd))
+        rows.append(_parameter_row(p, float(twin.theta[k]), sd, twin.rig.tolerance_scale))
     return Table(
         "Line, fluid, load and pump: the twin's values beside the data sheet",
         (
@@ -72,7 +72,21 @@ def parameter_table(twin: Twin, covariance: np.ndarray | None) -> Table:
     )
 
 
-def _parameter_row(p: Parameter, u: float, sd: float | None) -> list[Cell]:
+def tolerance_note(twin: Twin) -> str:
+    """What `parameter_table` means by a tolerance, and by its *."""
+    scale, tolerance, widened = twin.rig.tolerance_scale, "tolerance", ""
+    if scale != 1.0:
+        tolerance = "widened tolerance"
+        widened = f"The twin was fitted with {scale:.2g} times the sheet's tolerances. "
+    return (
+        "A tolerance is a standard deviation that rig.yaml states; the shaded band is two of them "
+        f"to either side. {widened}* The recordings do not determine this value: they hardly add "
+        f"to what its {tolerance} says."
+    )
+
+
+def _parameter_row(p: Parameter, u: float, sd: float | None, tolerance_scale: float) -> list[Cell]:
+    """`sd` is that of the coordinate u, of a prior with `tolerance_scale` times the tolerances."""
     unit = unit_of(p.unit, p.name)
     value, nominal = float(p.value(u)), p.nominal
     ends = None
@@ -83,7 +97,7 @@ def _parameter_row(p: Parameter, u: float, sd: float | None) -> list[Cell]:
     if sd is not None and sd > UNDETERMINED_SD:
         interval += " *"
     relative = p.name.partition("[")[0] not in ("position", "port_timing") and nominal
-    difference = value - nominal
+    difference, pull = value - nominal, p.stated_pull(u, tolerance_scale)
     if relative:
         percent = 100 * difference / nominal
         said = Cell(f"{_signed(percent)} %", percent)
@@ -96,7 +110,7 @@ def _parameter_row(p: Parameter, u: float, sd: float | None) -> list[Cell]:
         Cell(write_value(value, unit, ends), value),
         Cell(interval, 0.0 if ends is None else abs(ends[1] - ends[0])),
         said,
-        Cell(_signed(u), u, u),
+        Cell(_signed(pull), pull, pull),
     ]
 
 

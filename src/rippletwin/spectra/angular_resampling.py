@@ -32,6 +32,10 @@ SIGNIFICANT_POWER = 10.0  # of a mean order over its scatter's, to be tracked
 WINDOWS_AT_ONCE = 256  # transformed together, so that memory does not grow with the recording
 
 
+class NoShaftRippleError(ValueError):
+    """No order of the ripple repeats with the shaft, so that nothing tells the shaft's angle."""
+
+
 @dataclass(frozen=True)
 class Revolutions:
     """Whole revolutions at equal shaft angles.
@@ -59,7 +63,8 @@ def cut_revolutions(
     The shaft angle of the first sample is unknown. Half a revolution is lost at either end, one
     and a half where there are more than twenty.
     `samples_per_revolution` None keeps the recording's own rate, rounded up to an even number.
-    Raises ValueError for fewer than two revolutions left.
+    Raises ValueError for fewer than two revolutions left, NoShaftRippleError where no ripple
+    repeats with the shaft.
     """
     speed_hz = speed_rpm / 60
     own = 2 * int(np.ceil(sampling_rate_hz / speed_hz / 2))
@@ -179,7 +184,10 @@ def _from_increments(orders: np.ndarray, pistons: int) -> np.ndarray:
 
 
 def _from_mean_orders(orders: np.ndarray, limit: int) -> np.ndarray:
-    """Lead of the shaft against the mean orders 1 to `limit` that exceed their scatter."""
+    """Lead of the shaft against the mean orders 1 to `limit` that exceed their scatter.
+
+    Raises NoShaftRippleError where there is none.
+    """
     some = orders[:, :, 1 : limit + 1]
     k = np.arange(1, some.shape[2] + 1)
     mean = some.mean(0)
@@ -188,6 +196,8 @@ def _from_mean_orders(orders: np.ndarray, limit: int) -> np.ndarray:
     weight = np.where(
         np.abs(mean) ** 2 > SIGNIFICANT_POWER * floor / len(some) * KNOTS_PER_REVOLUTION, 1.0, 0.0
     )
+    if not np.any(weight):
+        raise NoShaftRippleError(f"none of the shaft orders up to {limit} repeats")
     # An order whose phase a resonance changes with the speed is no measure of the angle.
     weight = weight / np.maximum(scatter, floor)
     turn = np.einsum("rsk,sk,k->r", some, weight * mean.conj(), k).imag

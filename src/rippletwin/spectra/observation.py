@@ -12,7 +12,11 @@ from rippletwin.case.band import DEFAULT_MAX_HZ
 from rippletwin.case.model import FlowRipple, Recording, Rig, Sensor
 from rippletwin.errors import InputError
 from rippletwin.harmonics import peak_amplitudes
-from rippletwin.spectra.angular_resampling import Revolutions, cut_revolutions
+from rippletwin.spectra.angular_resampling import (
+    NoShaftRippleError,
+    Revolutions,
+    cut_revolutions,
+)
 from rippletwin.spectra.corrected_ripple import CorrectedRipple
 from rippletwin.spectra.frequency_selection import select_frequencies
 from rippletwin.spectra.speed_regression import mean_speed, regress_to_mean_speed
@@ -80,7 +84,8 @@ def observe(
 
     Frequencies outside the recording's own band are not kept; of a periodic recording those below
     it are, unless `piston_harmonics_only`: its orders count from 1, and who uses them leaves out
-    those below `min_frequency_hz`. Raises InputError where nothing is left.
+    those below `min_frequency_hz`. Raises InputError where nothing is left, and where no ripple of
+    a periodic recording repeats with the shaft.
     """
     own = recording.max_frequency_hz
     if own is not None:
@@ -106,14 +111,26 @@ def observe(
 def revolutions_of(
     recording: Recording, rig: Rig, samples_per_revolution: int | None = None
 ) -> Revolutions:
-    """The whole revolutions of a periodic recording."""
-    return cut_revolutions(
-        recording.pressure,
-        recording.sampling_rate_hz,
-        rig.pump["pistons"],
-        recording.speed_rpm,
-        samples_per_revolution,
-    )
+    """The whole revolutions of a periodic recording.
+
+    Raises InputError where no ripple repeats with the shaft: the pump stands still, or the speed is
+    another one.
+    """
+    try:
+        return cut_revolutions(
+            recording.pressure,
+            recording.sampling_rate_hz,
+            rig.pump["pistons"],
+            recording.speed_rpm,
+            samples_per_revolution,
+        )
+    except NoShaftRippleError:
+        raise InputError(
+            recording.file,
+            "speed_rpm",
+            f"no ripple repeats with the shaft at {recording.speed_rpm:g} r/min",
+            "Correct speed_rpm or pump.pistons, or leave the recording out",
+        ) from None
 
 
 def _observe_periodic(

@@ -53,6 +53,11 @@ class Parameter:
         """Whether the data sheet states its tolerance."""
         return self.name.partition("[")[0] in SHEET_NUMBERS
 
+    def stated_pull(self, u: float, tolerance_scale: float) -> float:
+        """Distance from the data sheet in standard deviations as stated, of a coordinate of a prior
+        that has `tolerance_scale` times the sheet's tolerances."""
+        return u * tolerance_scale if self.is_sheet_number else u
+
     def value_sd(self, u: float, u_sd: float) -> float:
         """Standard deviation in `unit` of a coordinate known as u +- u_sd (first order)."""
         h = 1e-4

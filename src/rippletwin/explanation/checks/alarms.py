@@ -101,7 +101,7 @@ def largest_pull(fit: Fit) -> tuple[float, str]:
     scale = fit.twin.rig.tolerance_scale
     effects = {f"{effect.name}@{place}" for effect, place in fit.twin.effects}
     pulls = [
-        (abs(float(u)) * (scale if p.is_sheet_number else 1.0), p.name)
+        (abs(p.stated_pull(float(u), scale)), p.name)
         for p, u in zip(fit.twin.parameters, fit.twin.theta)
         if p.stated and not p.flat and p.place not in effects
     ]
