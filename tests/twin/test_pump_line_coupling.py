@@ -75,8 +75,8 @@ def test_a_turned_shaft_changes_nothing():
 
 def test_a_slow_shaft_is_coupled_as_far_as_the_ripple_resolves():
     """At 300 r/min harmonics to 4 kHz are shaft orders to 792. Twice that is more than the 1535
-    orders of a ripple of 3072 samples: the coupled ripple is that of harmonics to order 765, whose
-    double is resolved, but for what their difference in width changes."""
+    orders of a ripple of 3072 samples. The coupled ripple is within 0.1 % of its range that of
+    harmonics to order 765, whose double is resolved."""
     rig, o = coupled()
 
     def source(highest):
