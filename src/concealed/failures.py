@@ -6,8 +6,9 @@ from concealed.summary import data_support_effects, predicts_like_truth
 def failure(row: dict) -> str | None:
     """In what a case falls short, in words; None where it does not.
 
-    A tool that ended with an error falls short in every case. An effect that is not plain may be missed. A plain effect outside the library must raise the
-    alarm. Nothing may be established that is not there.
+    A tool that ended with an error falls short in every case. An effect that is not plain may be
+    missed. A plain effect outside the library must raise the alarm. Nothing may be established that
+    is not there.
     """
     if row["verdict"] == "crashed":
         return "crashed"

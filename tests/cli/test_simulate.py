@@ -57,7 +57,7 @@ def test_healthy_is_what_the_twin_responds(tmp_path, twin_file):
 
 def test_the_corrected_ripple_drives_healthy_and_faulty_pump_alike(tmp_path, capsys, twin_file):
     """A corrected ripple of 1.3 times the nominal one at every order: harmonics of the healthy pump
-    are 1.3 times those of the twin without it, to 2 % of the ripple, and the change by a leak is the
+    are 1.3 times those of the twin without it, to 2 % of the ripple. The change by a leak is the
     same, to 2 % of the change."""
     ripple = CorrectedRipple({"a": ORDERS}, {"a": np.full(len(ORDERS), 1.3 + 0j)}, {"a": 0.0})
     corrected = tmp_path / "twin.json"

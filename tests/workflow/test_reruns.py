@@ -1,9 +1,10 @@
 """What runs again after an edit: dry runs over Snakemake's real records of a finished run."""
 
+import os
 import re
 from pathlib import Path
 
-from workflow_copy import planned, snakemake
+from workflow_copy import make, planned, snakemake
 
 TESTED_AGAIN = {
     "evaluate",
@@ -193,3 +194,20 @@ def test_a_range_of_severities_reruns_no_dataset_of_one_severity(workflow):
     edit(workflow / "config/config.yaml", "severity_limit: 3.464e-7", "severity_limit: 4.0e-7")
     edit(workflow / "config/config.yaml", "draws: 400", "draws: 200")
     assert planned(workflow)[0] == {"report_page"}
+
+
+def test_an_edited_file_of_operating_points_records_again(tmp_path):
+    """A file as `virtualrig.points` is an input of the recordings: one that is older than they are
+    reruns nothing, and one that was written since makes them anew."""
+    folder = tmp_path / "workflow"
+    make(folder)
+    edit(folder / "overlay.yaml", "case: case", "case: virtualrig\nvirtualrig: {points: mine.yaml}")
+    points = folder / "mine.yaml"
+    points.write_text("points: []\n")
+    (folder / "out/case/recordings").mkdir(parents=True)
+    (folder / "out/case/rig.yaml").touch()
+    for newer, answer in ((-60, "Nothing to be done"), (60, "rule record:")):
+        time = (folder / "out/case/rig.yaml").stat().st_mtime + newer
+        os.utime(points, (time, time))
+        result = snakemake(folder, "--dry-run", "out/case/rig.yaml")
+        assert answer in result.stdout + result.stderr
