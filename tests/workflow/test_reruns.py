@@ -162,8 +162,9 @@ def test_a_row_of_datasets_reruns_its_dataset(workflow):
 
 
 def test_a_share_of_recordings_reruns_no_simulated_dataset(workflow):
-    """How much of a recording networks learn from concerns the dataset `experimental` alone, which
-    is not configured here. The page states the configuration, so it alone is written anew."""
+    """How much of a recording networks learn from concerns `experimental` and randomised datasets,
+    of which none is configured here. The page states the configuration, so it alone is written
+    anew."""
     edit(workflow / "config/config.yaml", "training_share: 0.8", "training_share: 0.7")
     assert planned(workflow)[0] == {"report_page"}
 
