@@ -131,12 +131,14 @@ def test_method_of_the_flow_sensor_reruns_the_flow_columns_only(workflow):
 
 
 def test_a_compound_fault_adds_jobs_of_its_own(workflow):
-    """Another pair of faults is simulated, propagated and shown; nothing is trained again but
-    what temporary files ask for."""
+    """Another pair of faults is simulated, propagated and shown. Every simulated dataset is trained
+    again, whose temporary weights are asked, and no single fault is simulated again."""
     edit(workflow / "overlay.yaml", "[[S, C1]]", "[[S, C1], [S, C2]]")
     rules, text = planned(workflow)
     wanted = "simulate_fault propagate seed_signal evaluate_compound report_compound".split()
     assert set(wanted) <= rules
+    for dataset in ("CFD-P", "CFD-MOC-P", "CFD-MOC-P+", "CFD-Q+"):
+        assert f"output: out/models/{dataset}/" in text
     assert "output: out/faults/S+C2.zarr" in text and "output: out/faults/S.zarr" not in text
 
 
