@@ -6,12 +6,15 @@ from concealed.summary import data_support_effects, predicts_like_truth
 def failure(row: dict) -> str | None:
     """In what a case falls short, in words; None where it does not.
 
-    An effect that is not plain may be missed. A plain effect outside the library must raise the
-    alarm. Nothing may be established that is not there.
+    A tool that ended with an error falls short in every case. An effect that is not plain may be
+    missed. A plain effect outside the library must raise the alarm. Nothing may be established that
+    is not there.
     """
+    if row["verdict"] == "crashed":
+        return "crashed"
     kind = row["kind"]
     if kind in ("none", "off"):
-        return "false alarm" if row["wrong"] or row["verdict"] == "crashed" else None
+        return "false alarm" if row["wrong"] else None
     if kind == "outside":
         if row["wrong"]:
             return "misnamed"

@@ -14,6 +14,7 @@ from rippletwin.harmonics import peak_amplitudes
 from rippletwin.pump.faults import Slipper
 from rippletwin.pump.outlets import ConstantPressure, Pipe
 from rippletwin.pump.simulation import simulate
+from rippletwin.spectra.corrected_ripple import CorrectedRipple
 from rippletwin.twin.twin import Twin
 from rippletwin.twin.twin_file import to_dict
 
@@ -52,6 +53,26 @@ def test_healthy_is_what_the_twin_responds(tmp_path, twin_file):
                          (ripple, 0.03)):  # fmt: skip
         expected = Twin(rig()).respond(source, SPEED / 60.0, LOAD, ORDERS)
         assert np.linalg.norm(found - expected) < most * np.linalg.norm(expected)
+
+
+def test_the_corrected_ripple_drives_healthy_and_faulty_pump_alike(tmp_path, capsys, twin_file):
+    """A corrected ripple of 1.3 times the nominal one at every order: harmonics of the healthy pump
+    are 1.3 times those of the twin without it, to 2 % of the ripple. The change by a leak is the
+    same, to 2 % of the change."""
+    ripple = CorrectedRipple({"a": ORDERS}, {"a": np.full(len(ORDERS), 1.3 + 0j)}, {"a": 0.0})
+    corrected = tmp_path / "twin.json"
+    corrected.write_text(json.dumps(to_dict(Twin(rig(), ripple=ripple))))
+
+    def harmonics(twin, *fault):
+        assert main(["simulate", *fault, "--twin", str(twin), *POINT, "--json"]) == 0
+        (run,) = json.loads(capsys.readouterr().out)["severities"]
+        return peak_amplitudes(np.array(list(run["pressure_pa"].values())))[:, 1:181]
+
+    leak = "slipper", "--severity", "0.5mm2"
+    nominal, healthy = harmonics(twin_file, "healthy"), harmonics(corrected, "healthy")
+    assert np.linalg.norm(healthy - 1.3 * nominal) < 0.02 * np.linalg.norm(nominal)
+    change, expected = harmonics(corrected, *leak) - healthy, harmonics(twin_file, *leak) - nominal
+    assert np.linalg.norm(change - expected) < 0.02 * np.linalg.norm(expected)
 
 
 @dataclass(frozen=True)

@@ -145,12 +145,14 @@ def test_an_effect_without_a_stated_probability_is_scored():
     assert row["wrong"] == "piston_spread" and row["probabilities"] == [(0.9, True)]
 
 
-def test_a_tool_that_ended_with_an_error_is_scored():
-    """It has named nothing and raised the alarm, and is a failure. What the tool's process writes
-    then is all that scoring asks for."""
-    row = score_case(truth(), crash_verdict(ValueError("no")), NO_BASELINES | {"seconds": 1.0})
-    assert row["verdict"] == "crashed" and not row["right"] and row["alarm"]
-    assert failure(row) == "not named"
+@pytest.mark.parametrize("kind", ["none", "off", "single", "pair", "outside", "indistinguishable"])
+def test_a_tool_that_ended_with_an_error_is_a_failure_of_every_kind(kind):
+    """It has named nothing and raised no alarm, also where an effect that is not plain may be
+    missed. What the tool's process writes then is all that scoring asks for."""
+    case = truth(kind=kind, change=0.01)
+    row = score_case(case, crash_verdict(ValueError("no")), NO_BASELINES | {"seconds": 1.0})
+    assert row["verdict"] == "crashed" and not row["right"] and not row["alarm"]
+    assert failure(row) == "crashed"
 
 
 def test_an_own_name_comes_before_an_equivalent_one():

@@ -26,10 +26,21 @@ def test_pairs_carry_the_recordings_name():
     fault of unknown severity; nobody recorded S."""
     windows = np.arange(7.0)[:, None, None] * np.ones((1, 1, 4))
     state = np.array(["H"] * 5 + ["C"] * 2)
-    pairs = recorded_pairs(windows, state, ["H", "S", "C2"], count=1)
+    recording = np.array([0] * 5 + [1] * 2)
+    pairs = recorded_pairs(windows, state, recording, ["H", "S", "C2"], count=1)
     assert {key: name for key, (name, _) in pairs.items()} == {"H": "H", "C2": "C"}
     assert pairs["H"][1].tolist() == [[[0, 0, 0, 0, 1, 1, 1, 1]]]
     assert pairs["C2"][1].tolist() == [[[5, 5, 5, 5, 6, 6, 6, 6]]]
+
+
+def test_no_pair_joins_two_recordings():
+    """Two recordings of H with three windows each: the third of the first has no partner. A state
+    whose recordings have one window each has no pair."""
+    windows = np.arange(8.0)[:, None, None] * np.ones((1, 1, 2))
+    state, recording = np.array(["H"] * 6 + ["S"] * 2), np.array([0, 0, 0, 1, 1, 1, 2, 3])
+    pairs = recorded_pairs(windows, state, recording, ["H", "S"], count=8)
+    assert list(pairs) == ["H"]
+    assert pairs["H"][1].tolist() == [[[0, 0, 1, 1]], [[3, 3, 4, 4]]]
 
 
 def test_two_revolutions_repeat_without_their_mean():

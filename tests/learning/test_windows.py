@@ -52,10 +52,12 @@ def test_probes_begin_evenly_over_the_revolution():
             np.testing.assert_allclose(probes[4 * state + turn, 0], expected)
 
 
-def test_windows_are_spread_over_their_state():
-    """Of ten windows three: the first, the middle, the last; of two all, none of them twice."""
-    state = np.array(["H"] * 10 + ["S"] * 2)
-    chosen = spread_windows(state, 3)
+def test_windows_are_spread_over_the_first_recording_of_their_state():
+    """Of ten windows three: the first, the middle, the last; of two all, none of them twice. Those
+    of a second slipper, whose leak may be another, are left out."""
+    state = np.array(["H"] * 10 + ["S"] * 7)
+    recording = np.array([0] * 10 + [1] * 2 + [2] * 5)
+    chosen = spread_windows(state, recording, 3)
     assert chosen["H"].tolist() == [0, 4, 9] and chosen["S"].tolist() == [10, 11]
 
 

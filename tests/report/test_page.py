@@ -317,6 +317,16 @@ def test_a_dataset_is_named_in_words():
     assert describe_dataset("mine", datasets) == "mine"
 
 
+def test_a_dataset_of_the_pump_alone_names_no_twin_for_its_samples():
+    """The twin of CFD-Q serves the flow of the recordings; networks learn from the lumped pump."""
+    row = {"signal": "flow", "line": "pipe", "twin": "calibrated", "randomised": "no"}
+    row |= {"anchored": "no"}
+    datasets = {"CFD-Q": row, "CFD-P": row | {"signal": "pressure", "twin": "none"}}
+    said = "flow of the pump alone, recordings through the line of the calibrated twin (CFD-Q)"
+    assert describe_dataset("CFD-Q", datasets) == said
+    assert describe_dataset("CFD-P", datasets) == "pressure of the pump alone, on a pipe (CFD-P)"
+
+
 def test_what_networks_say_is_told_in_words():
     """Not in the identifiers of networks.json."""
     said = {"share": 0.9, "unlike": 0.1}

@@ -41,7 +41,10 @@ def cells(tmp_path):
     store.save(
         xr.Dataset(
             {"signal": (("window", "channel", "time"), windows)},
-            coords={"state": ("window", np.repeat(["H", "S", "C"], 4))},
+            coords={
+                "state": ("window", np.repeat(["H", "S", "C"], 4)),
+                "recording": ("window", np.repeat(np.arange(3), 4)),
+            },
         ),
         tmp_path / "recorded.zarr",
     )

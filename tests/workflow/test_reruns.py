@@ -1,9 +1,10 @@
 """What runs again after an edit: dry runs over Snakemake's real records of a finished run."""
 
+import os
 import re
 from pathlib import Path
 
-from workflow_copy import planned, snakemake
+from workflow_copy import make, planned, snakemake
 
 TESTED_AGAIN = {
     "evaluate",
@@ -130,12 +131,14 @@ def test_method_of_the_flow_sensor_reruns_the_flow_columns_only(workflow):
 
 
 def test_a_compound_fault_adds_jobs_of_its_own(workflow):
-    """Another pair of faults is simulated, propagated and shown; nothing is trained again but
-    what temporary files ask for."""
+    """Another pair of faults is simulated, propagated and shown. Every simulated dataset is trained
+    again, whose temporary weights are asked, and no single fault is simulated again."""
     edit(workflow / "overlay.yaml", "[[S, C1]]", "[[S, C1], [S, C2]]")
     rules, text = planned(workflow)
     wanted = "simulate_fault propagate seed_signal evaluate_compound report_compound".split()
     assert set(wanted) <= rules
+    for dataset in ("CFD-P", "CFD-MOC-P", "CFD-MOC-P+", "CFD-Q+"):
+        assert f"output: out/models/{dataset}/" in text
     assert "output: out/faults/S+C2.zarr" in text and "output: out/faults/S.zarr" not in text
 
 
@@ -161,8 +164,9 @@ def test_a_row_of_datasets_reruns_its_dataset(workflow):
 
 
 def test_a_share_of_recordings_reruns_no_simulated_dataset(workflow):
-    """How much of a recording networks learn from concerns the dataset `experimental` alone, which
-    is not configured here. The page states the configuration, so it alone is written anew."""
+    """How much of a recording networks learn from concerns `experimental` and randomised datasets,
+    of which none is configured here. The page states the configuration, so it alone is written
+    anew."""
     edit(workflow / "config/config.yaml", "training_share: 0.8", "training_share: 0.7")
     assert planned(workflow)[0] == {"report_page"}
 
@@ -193,3 +197,20 @@ def test_a_range_of_severities_reruns_no_dataset_of_one_severity(workflow):
     edit(workflow / "config/config.yaml", "severity_limit: 3.464e-7", "severity_limit: 4.0e-7")
     edit(workflow / "config/config.yaml", "draws: 400", "draws: 200")
     assert planned(workflow)[0] == {"report_page"}
+
+
+def test_an_edited_file_of_operating_points_records_again(tmp_path):
+    """A file as `virtualrig.points` is an input of the recordings: one that is older than they are
+    reruns nothing, and one that was written since makes them anew."""
+    folder = tmp_path / "workflow"
+    make(folder)
+    edit(folder / "overlay.yaml", "case: case", "case: virtualrig\nvirtualrig: {points: mine.yaml}")
+    points = folder / "mine.yaml"
+    points.write_text("points: []\n")
+    (folder / "out/case/recordings").mkdir(parents=True)
+    (folder / "out/case/rig.yaml").touch()
+    for newer, answer in ((-60, "Nothing to be done"), (60, "rule record:")):
+        time = (folder / "out/case/rig.yaml").stat().st_mtime + newer
+        os.utime(points, (time, time))
+        result = snakemake(folder, "--dry-run", "out/case/rig.yaml")
+        assert answer in result.stdout + result.stderr

@@ -297,3 +297,33 @@ def test_compound_ripples_stand_below_their_parts(tmp_path):
         assert [line.strip() for line in svg.splitlines() if line.strip() in TITLES] == [
             f"<!-- {title} -->" for title in titles
         ]
+
+
+def test_images_name_the_recording_that_scales_them(tmp_path):
+    """No healthy recording is there: the scale of the colours is that of the first state that was
+    recorded, and the picture says so."""
+    angle = 2 * np.pi * np.arange(SAMPLES) / SAMPLES
+    signal = np.sin(9 * angle) + np.arange(4)[:, None, None] * np.sin(angle)
+    state = {"state": ["H", "S", "C1", "C2"]}
+    dims = ("state", "channel", "time")
+    store.save(xr.Dataset({"signal": (dims, signal)}, coords=state), tmp_path / "seeds.zarr")
+    store.save(
+        xr.Dataset(
+            {"signal": (("window", "channel", "time"), np.repeat(signal[1:2], 4, axis=0))},
+            coords={"state": ("window", ["S"] * 4), "recording": ("window", [0] * 4)},
+            attrs={"speed_hz": SPEED},
+        ),
+        tmp_path / "recorded.zarr",
+    )
+    output = {name: tmp_path / f"o.{name}" for name in ("png", "svg")}
+    run_script(
+        "compare_sst",
+        tmp_path,
+        output | {"table": tmp_path / "o.csv"},
+        {},
+        {"titles": ["calibrated"], "sst": SST},
+        rig=sheet(tmp_path),
+        recorded=tmp_path / "recorded.zarr",
+        seeds=[tmp_path / "seeds.zarr"],
+    )
+    assert "<!-- amplitude over the largest of S: recorded -->" in output["svg"].read_text()

@@ -168,10 +168,11 @@ def priority_of(wildcards):
 
 
 def learnt_share_of(wildcards):
-    """Early share of every recording that is not tested, as a network learns from such recordings,
-    or from the healthy one: 0 where simulations do without."""
+    """Early share of every recording that is not tested. Of this share networks learn from
+    recordings, and randomised signals have the pistons and the model error of the healthy one; 0
+    where simulations do without."""
     dataset = DATASETS[wildcards.dataset]
-    from_recordings = dataset.line == "rig" or dataset.anchored == "yes"
+    from_recordings = dataset.line == "rig" or dataset.randomised == "yes"
     return config["experimental"]["training_share"] if from_recordings else 0.0
 
 

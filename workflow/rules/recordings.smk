@@ -1,8 +1,11 @@
 # Recordings -> windows of one revolution at the diagnosed operating point, with the sensors' noise.
 if RECORDED_HERE:
+    POINTS = config["virtualrig"]["points"]
 
     rule record:
         input:
+            # a user's own file, unless it is a name
+            points=local([] if POINTS in ("full", "smoke") else [POINTS]),
             source=relative(package_files("virtualrig")),
         output:
             rig=RIG,
@@ -16,7 +19,7 @@ if RECORDED_HERE:
             mem_mb=2000,
         params:
             case=subpath(output.rig, parent=True),
-            points=config["virtualrig"]["points"],
+            points=POINTS,
             seed=config["virtualrig"]["seed"],
         shell:
             "virtualrig record --out {params.case:q} --points {params.points:q} --seed {params.seed:q}"

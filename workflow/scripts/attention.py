@@ -13,7 +13,7 @@ from rippletwin.learning.grad_cam import attention_density, attention_map, fault
 from rippletwin.learning.networks import restore_networks
 from rippletwin.learning.windows import spread_windows
 
-WINDOWS = 16  # of each recorded state, for the mean heat
+WINDOWS = 16  # of the first recording of each state, for the mean heat
 
 report_progress = open_log(snakemake)
 torch.set_num_threads(snakemake.threads)
@@ -21,7 +21,7 @@ probes, recorded = store.load(snakemake.input.probes), store.load(snakemake.inpu
 x = {name: probes.signal.values[probes.state.values == name] for name in CLASSES}
 faults, first_turn = CLASSES[1:], np.stack([x[name][0] for name in CLASSES])
 regions = np.array([fault_region(x["H"], x[fault]) for fault in faults])
-spread = spread_windows(recorded.state.values, WINDOWS)
+spread = spread_windows(recorded.state.values, recorded.recording.values, WINDOWS)
 windows = [recorded.signal.values[at] for at in spread.values()]
 trained = torch.load(snakemake.input.weights, weights_only=True)
 network = snakemake.wildcards.architecture, first_turn.shape[1]

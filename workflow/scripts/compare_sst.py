@@ -30,7 +30,8 @@ seeds = {
     for title, path in zip(snakemake.params.titles, snakemake.input.seeds, strict=True)
 }
 states = next(iter(seeds.values())).state.values.tolist()
-pairs = recorded_pairs(recorded.signal.values, recorded.state.values, states, WINDOWS)
+of_window = recorded.state.values, recorded.recording.values
+pairs = recorded_pairs(recorded.signal.values, *of_window, states, WINDOWS)
 windows = {state: pair for state, (_, pair) in pairs.items()}
 simulated = {
     title: {state: two_revolutions(signal.sel(state=state).values) for state in pairs}
@@ -52,7 +53,7 @@ for state, (name, pair) in pairs.items():
         signals[f"{state}: {source}, {alike[state, source]:.2f}"] = of_states[state][:, :1]
 images = {title: np.log(sst_images(x, rate, large)[0, 0]) / large.k for title, x in signals.items()}
 axis = image_axes(large, 2 / recorded.speed_hz)[0], recorded.speed_hz, pistons
-label = "amplitude over the largest of the healthy recording"
+label = f"amplitude over the largest of {next(iter(images))}"
 figure = diagnosis.plot_sst(images, *axis, columns=1 + len(simulated), label=label, top=1.0)
 save(figure, snakemake.output.png, snakemake.output.svg)
 report_progress(f"similarity {table.groupby('source').similarity.mean().round(2).to_dict()}")

@@ -1,4 +1,4 @@
-"""One network trained on every seed's samples; of recordings, the early windows of each first."""
+"""One network trained on every seed's samples, or on early windows of each state's recording."""
 
 import json
 from collections import Counter

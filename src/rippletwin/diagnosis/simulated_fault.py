@@ -1,7 +1,8 @@
 """What the sensors of a twin's rig would read while its pump has a fault of a known leak area.
 
 The lumped pump delivers into a constant pressure, healthy and faulty. Its flow, with the chambers'
-capacitance beside it, drives the twin's line in the time domain. The faulty pump meets the load
+capacitance beside it, drives the twin's line in the time domain. What the twin's corrected ripple
+adds to the healthy flow is added to that of the faulty pump too. The faulty pump meets the load
 that holds the healthy one at the load pressure, so that a leak lowers the mean pressure too.
 """
 
@@ -57,7 +58,8 @@ def simulate_fault(
     """
     fault = find_fault(fault) if isinstance(fault, str) else fault
     warnings: list[str] = []
-    twin = _with_pump(twin, speed_rpm / 60.0, load_pressure, warnings)
+    # A diagnosis, for which `with_fitted_pump` is, has no use for the corrected ripple.
+    twin = _with_pump(twin, speed_rpm / 60.0, load_pressure, warnings).with_(ripple=twin.ripple)
     pump, fluid = twin.rig.pump, twin.rig.fluid
     point = pump, fluid, speed_rpm, load_pressure
     try:

@@ -9,28 +9,33 @@ import pandas as pd
 
 from rippletwin.learning.dataset import remove_mean
 from rippletwin.learning.synchrosqueezing import SstSettings, image_similarity, sst_images
+from rippletwin.learning.windows import pair_windows
 
 RECORDED = "recorded"  # source of the row that compares a recording with itself
 SILENCE = 1.0  # of a pixel without energy, exp(0)
 
 
 def recorded_pairs(
-    windows: np.ndarray, state: np.ndarray, simulated: Sequence[str], count: int
+    windows: np.ndarray,
+    state: np.ndarray,
+    recording: np.ndarray,
+    simulated: Sequence[str],
+    count: int,
 ) -> dict[str, tuple[str, np.ndarray]]:
     """Simulated state -> the recordings' name of it, and windows of two revolutions.
 
-    windows : (n, channels, M) recorded, one revolution each; state : (n,). At most `count` windows
-    (n, channels, 2 M) a state; a state that nobody recorded is left out. The name is C where the
-    recordings' cylinder fault has no severity.
+    windows : (n, channels, M) recorded, one revolution each; state, recording : (n,) of each.
+    At most `count` windows (n, channels, 2 M) a state, each of one recording; a state that nobody
+    recorded is left out. The name is C where the recordings' cylinder fault has no severity.
     """
+    first, second = pair_windows(recording)
     pairs = {}
     for wanted in simulated:
         name = wanted if wanted in state else wanted[0]
-        of_state = windows[state == name]
-        used = 2 * min(len(of_state) // 2, count)
-        if used:
-            both = np.concatenate([of_state[0:used:2], of_state[1:used:2]], axis=-1)
-            pairs[wanted] = name, both
+        of_state = np.flatnonzero(state[first] == name)[:count]
+        if len(of_state):
+            halves = windows[first[of_state]], windows[second[of_state]]
+            pairs[wanted] = name, np.concatenate(halves, axis=-1)
     return pairs
 
 

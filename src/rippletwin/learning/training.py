@@ -1,11 +1,10 @@
 """Training to a stated convergence rule, and prediction.
 
-A training stops when the loss on its validation split (samples of the same simulation, never a
-recording) has either stayed below ``target_loss`` for ``patience`` epochs in a row ("target"), or
-not fallen by ``min_improvement`` (relative) for ``plateau`` epochs ("plateau"), or after
-``max_epochs``. It has **converged** in the first case, and in the second if its lowest loss is
-below half of that of guessing. The weights of the epoch with the
-lowest validation loss are kept.
+A training stops when the loss on its validation split (a random part of the samples it is given)
+has either stayed below ``target_loss`` for ``patience`` epochs in a row ("target"), or not fallen
+by ``min_improvement`` (relative) for ``plateau`` epochs ("plateau"), or after ``max_epochs``. It
+has **converged** in the first case, and in the second if its lowest loss is below half of that of
+guessing. The weights of the epoch with the lowest validation loss are kept.
 """
 
 from __future__ import annotations

@@ -94,13 +94,14 @@ def early_healthy(state: np.ndarray, recording: np.ndarray, share: float) -> np.
     return healthy[: max(1, round(share * len(healthy)))]
 
 
-def spread_windows(state: np.ndarray, count: int) -> dict[str, np.ndarray]:
-    """State -> indices of at most `count` of its windows, evenly from the first to the last.
+def spread_windows(state: np.ndarray, recording: np.ndarray, count: int) -> dict[str, np.ndarray]:
+    """State -> indices of at most `count` windows of its first recording, evenly from the first to
+    the last.
 
-    state : (n,) state of each window, whose recordings may be many.
+    state, recording : (n,) of each window.
     """
-    chosen = {}
+    chosen, is_first = {}, first_of_each_state(state, recording)
     for name in dict.fromkeys(np.asarray(state).tolist()):
-        at = np.flatnonzero(state == name)
+        at = np.flatnonzero((state == name) & is_first)
         chosen[name] = at[np.unique(np.linspace(0, len(at) - 1, count).round().astype(int))]
     return chosen

@@ -56,8 +56,11 @@ def describe_dataset(name: str, datasets: Mapping[str, Mapping[str, str]]) -> st
         return name
     if row["line"] == "rig":
         return f"recordings of all states ({name})"
-    made = f"{row['twin']} twin" if row["twin"] != "none" else "pump alone, on a pipe"
-    words = [f"{row['signal']} of the {made}"]
+    twin, alone = f"{row['twin']} twin", row["line"] == "pipe"
+    words = [f"{row['signal']} of the {'pump alone' if alone else twin}"]
+    if alone:
+        is_flow = row["signal"] == "flow"  # the pump's, whatever the pipe
+        words.append(f"recordings through the line of the {twin}" if is_flow else "on a pipe")
     if row["randomised"] == "yes":
         words.append("range of severities")
     if row["anchored"] == "yes":

@@ -51,7 +51,7 @@ def _couple(twin: Twin, observation):
     if given is not None and not (isinstance(given, PumpRipple) and given.orifice is None):
         return observation
     ripple = twin.operating_point(replace(observation, modulation=0.0)).ripple
-    even = _wide(observation)
+    even = _wide(observation, ripple.highest_order)
     forward = ForwardModel(twin, [even])
     orders, count = even.orders, len(ripple.flow)
     pump, turned = _pump(twin)
@@ -68,12 +68,14 @@ def _couple(twin: Twin, observation):
     return replace(observation, flow_ripple=replace(run, flow=flow))
 
 
-def _wide(observation):
-    """The observation with harmonics above those observed, up to BAND times the highest, and
-    without modulation: the twin modulates the ripple that is found."""
+def _wide(observation, resolved: int):
+    """The observation with harmonics above those observed, up to BAND times the highest, but none
+    above the order `resolved` of the ripple, and without modulation: the twin modulates the ripple
+    that is found."""
     orders = np.asarray(observation.orders, int)
     step = np.gcd.reduce(orders)
     orders = np.append(orders, np.arange(orders[-1] + step, int(BAND * orders[-1]), step))
+    orders = orders[orders <= resolved]
     return replace(
         observation, orders=orders, frequency_hz=orders * observation.speed_hz, modulation=0.0
     )
