@@ -71,7 +71,7 @@ def discretise(line: TimeDomainLine, dt: float) -> tuple[list[Pipe], list[float]
     stops = np.array(sorted(set(edges) | cuts))
     at = [int(np.argmin(np.abs(stops - i.position))) for i in line.inserts]
     pipes, starts = [], []
-    joints: list[list[Element | Storage | Branch]] = [[*line.source]]
+    joints: list[list[Element | Storage | Branch]] = [[*line.source, *line.passage]]
     for n, x in enumerate(stops):
         if n > 0:
             before = stops[n - 1]
