@@ -58,6 +58,7 @@ def lumped(speed_hz, orders):
             ]
         ),
         source_admittance=1e-14 * s,
+        source_impedance=1e6 * s,
         load=("impedance", np.full(len(s), 3e10 + 0j)),
         inserts=[
             (0.0, "shunt", 2e-14 * s),

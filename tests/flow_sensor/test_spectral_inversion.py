@@ -24,9 +24,10 @@ def test_waves_reproduce_the_network():
     network = line(THREE, own=1e-14)(SPEED, orders)
     network.inserts.append((0.0, "shunt", 3e-14 * network.s))
     network.sensor_factor = np.array([[1.0], [1.05], [0.9]])
-    network.source_flow = np.exp(1j * orders)
+    network.source_flow, network.source_impedance = np.exp(1j * orders), 1e6 * network.s
+    network.sensor_positions = [0.0, *network.sensor_positions[1:]]
     response = line_response(network)
-    p = network.pressure_at([0.0])[0]
+    p = network.pump_pressure()
     q = network.flow_at([0.0])[0]
     zc = np.abs(np.sqrt(network.series[0] / network.shunt[0]))
     waves = np.stack([(p + zc * q) / 2, (p - zc * q) / 2], axis=-1)[..., None]

@@ -216,6 +216,21 @@ def test_wrong_use_is_refused():
         ).pressure_at([0.0])
 
 
+def test_the_line_begins_behind_the_pump_s_passage():
+    """Of a lossless closed pipe, Zin = -j Zc cot(k l), the equations of the source give by hand
+    Q = q(0) + Y p_pump and p_pump = p(0) + s I q(0): the sensor at 0 m reads p(0), and only the
+    source's admittance sees p_pump."""
+    impedance, admittance = 2e6 * S, 3e-10 + 1e-14 * S
+    net = network(S, PIPES[:1], "none", source_admittance=admittance, source_flow=1e-5)
+    net.source_impedance, net.sensor_positions = impedance, [0.0]
+    gamma, zc = np.sqrt(net.series[0] * net.shunt[0]), np.sqrt(net.series[0] / net.shunt[0])
+    zin = zc / np.tanh(gamma * net.length)
+    flow = 1e-5 / (1.0 + admittance * (zin + impedance))
+    assert np.allclose(net.readings()[0], zin * flow, rtol=1e-9)
+    assert np.allclose(net.flow_at([0.0])[0], flow, rtol=1e-9)
+    assert np.allclose(net.pump_pressure(), (zin + impedance) * flow, rtol=1e-9)
+
+
 def test_flow_beyond_the_load_ratio_is_kirchhoffs():
     """At the load q = Y p + n with the flow n that was asked for, and the source's flow arrives:
     the state is that which `load_relation`, the line's own equation at the load, gives."""
@@ -233,7 +248,7 @@ def test_some_frequencies_are_columns_of_all():
     """A line with everything in it, at two of its four frequencies."""
     line = network(S, inserts=with_inserts(S), load=("state", (1.0, 1e-10 + 2e-15 * S)))
     line.source_flow = 1e-5 * np.arange(1.0, 5.0)
-    line.source_admittance = 1e-13 * S
+    line.source_admittance, line.source_impedance = 1e-13 * S, 2e6 * S
     line.load_outflow = 1e-6 * np.arange(4.0)
     line.outflows = np.array([1.0, 4.0]), 1e-6 * np.ones((2, 4), complex)
     line.sensor_positions = SENSORS

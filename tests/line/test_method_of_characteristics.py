@@ -25,6 +25,7 @@ from rippletwin.line.time_domain.line_elements import (
     TimeDomainLine,
 )
 from rippletwin.line.time_domain.method_of_characteristics import simulate, steps_a_period
+from rippletwin.line.time_domain.places import locate
 
 OIL = {"density": DENSITY, "viscosity": VISCOSITY}
 ORIFICE = End("orifice", 0.0, COEFFICIENT)
@@ -102,7 +103,7 @@ def test_a_period_may_have_an_odd_number_of_steps(friction):
             PIPES, flow, period, ORIFICE, friction=friction, positions=positions, **OIL
         )
         grid = Grid(line)
-        nodes = np.array([grid.locate(x)[1] for x in positions])
+        nodes = np.array([locate(grid, x).node for x in positions])
         return [grid.advance(nodes) for _ in range(periods)], grid
 
     (_, second), short = run(flow, PERIOD, 2)

@@ -9,7 +9,7 @@ from rippletwin.case.model import Load
 from rippletwin.twin.forward_jacobian import DifferentiableForward
 from rippletwin.twin.forward_model import ForwardModel
 from rippletwin.twin.twin import Twin
-from synthetic_effects import AIR, GAIN, HOSE, MUCH_AIR, TRUTH, VOLUME
+from synthetic_effects import AIR, GAIN, HOSE, MUCH_AIR, PASSAGE, TRUTH, VOLUME
 from synthetic_observations import make
 
 
@@ -23,7 +23,7 @@ def difference_quotients(twin, observations, theta, step):
     return np.array(slopes)
 
 
-@pytest.mark.parametrize("hypothesis", [(), VOLUME, HOSE, GAIN, AIR])
+@pytest.mark.parametrize("hypothesis", [(), VOLUME, HOSE, GAIN, AIR, PASSAGE])
 def test_derivatives_equal_difference_quotients(hypothesis):
     """All columns of one sweep agree with central differences of the nonlinear model to 2 %, which
     is what freezing the nonlinear remainder of the orifice costs."""

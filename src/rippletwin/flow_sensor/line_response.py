@@ -38,7 +38,8 @@ def line_response(line: FrequencyDomainLine, of: str = "source") -> LineResponse
 
     `of` is the flow wanted: that of the ideal "source", or Q(0) at the "outlet", which is less by
     the flow into the source's admittance; ValueError for another.
-    Upstream of a sensor [p, q](0) = T [p, q](x) with det T = 1, so p(x) = T22 p(0) - T12 q(0).
+    The waves are the source's, before the line's `source_impedance` Z: p(0) = p - Z q. Upstream of
+    a sensor [p, q](0) = T [p, q](x) with det T = 1, so p(x) = T22 p(0) - T12 q(0).
     """
     zc = np.abs(np.sqrt(line.series[0] / line.shunt[0]))
     size = len(line.s)
@@ -46,7 +47,8 @@ def line_response(line: FrequencyDomainLine, of: str = "source") -> LineResponse
     rows = []
     for x, k in zip(line.sensor_positions, factor):
         matrix = line.transfer(0.0, x)
-        from_p, from_q = k * matrix[:, 1, 1], -k * matrix[:, 0, 1] / zc
+        drop = matrix[:, 0, 1] + matrix[:, 1, 1] * line.source_impedance
+        from_p, from_q = k * matrix[:, 1, 1], -k * drop / zc
         rows.append(np.stack([from_p + from_q, from_p - from_q], axis=-1))
     own = own_admittance(line, of)
     z = line.input_impedance()

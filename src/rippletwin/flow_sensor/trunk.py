@@ -136,9 +136,10 @@ def equations(trunk: Trunk, line: FrequencyDomainLine, places: np.ndarray) -> Eq
     p, r = last[-1][:, 0], _row(zc[-1]) * last[-1][:, 1]
     load = ((r_load * p - p_load * r) / scale)[:, None]
 
-    # waves on the source's side of the elements at x = 0, as in LineResponse
+    # waves at the source, before its passage and the elements at x = 0, as in LineResponse
     source = _joint(line, 0.0) @ first[0]
-    p, r = source[:, 0], _row(zc[0]) * source[:, 1]
+    p = source[:, 0] + _row(_whole(line.source_impedance, len(omega))) * source[:, 1]
+    r = _row(zc[0]) * source[:, 1]
     waves = torch.stack([p + r, p - r], dim=1) / 2
 
     positions = np.asarray(line.sensor_positions)
@@ -172,8 +173,13 @@ def _joint(line: FrequencyDomainLine, x: float) -> torch.Tensor:
 
 def _state(state, size: int) -> torch.Tensor:
     """The load's (p, q) as (F, 2, 1)."""
-    p, q = (np.broadcast_to(np.asarray(value, complex), (size,)) for value in state)
+    p, q = (_whole(value, size) for value in state)
     return torch.as_tensor(np.stack([p, q], axis=1)[..., None])
+
+
+def _whole(value, size: int) -> np.ndarray:
+    """A scalar or (F,) as (F,)."""
+    return np.array(np.broadcast_to(np.asarray(value, complex), (size,)))
 
 
 def _pressure_and_flow(shapes, impedance: np.ndarray) -> list[torch.Tensor]:

@@ -138,7 +138,7 @@ class DifferentiableForward(ForwardModel):
         base = self.network(theta)
         at = (*base.sensor_positions, 0.0)
         pressure, flow, transfer = base.respond_with_transfer(at)
-        at_pump = pressure[-1]
+        at_pump = pressure[-1] + base.source_impedance * flow[-1]
         pressure, flow, transfer = pressure[:-1], flow[:-1], transfer[:-1]
         factor = np.broadcast_to(base.sensor_factor, pressure.shape)
         readings = pressure * factor
@@ -294,6 +294,7 @@ class DifferentiableForward(ForwardModel):
             shunt=network.shunt.reshape(n, -1),
             source_flow=flat(base.source_flow),
             source_admittance=flat(network.source_admittance),
+            source_impedance=flat(network.source_impedance),
             inserts=[(x, kind, flat(y)) for x, kind, y in network.inserts],
             sensor_positions=v.positions,
         )

@@ -58,7 +58,7 @@ def _couple(twin: Twin, observation):
     # In the frame of the port plate, which the twin turns with the shaft (`ripple_sensitivity`).
     plate = np.exp(1j * orders * turned)
     turn = forward.source.turn(twin.theta) * plate
-    outlet = forward.network(twin.theta).pressure_at([0.0])[0] / turn
+    outlet = forward.network(twin.theta).pump_pressure() / turn
     point = twin.operating_point(even)
     mean = point.load_pressure + pressure_fall(twin.calibrated_rig(), 0.0, point.mean_flow)
     wave = PressureWave(mean + one_period(outlet, count, orders))

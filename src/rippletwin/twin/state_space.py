@@ -15,8 +15,9 @@ POINTS_PER_MODE = 24  # between neighbouring resonances of the line
 
 
 def line_response(twin: Twin, condition, frequency_hz: np.ndarray) -> np.ndarray:
-    """Pressure (1 + S, F), Pa, at the pump outlet and as the sensors read it, for a flow ripple of
-    1 m3/s at `frequency_hz` (F,) that is so small that load and line are linear.
+    """Pressure (1 + S, F), Pa, at the pump and as the sensors read it, for a flow ripple of 1 m3/s
+    at `frequency_hz` (F,) that is so small that load and line are linear. The pump's own passage,
+    as far as the twin has one, is behind the first of them.
 
     condition : an observation, or an `OperatingCondition` with the mean pressure and, of a pump,
         the speed. The flow is that of the ideal source; the compliance of the pump's chambers
@@ -45,7 +46,7 @@ def line_response(twin: Twin, condition, frequency_hz: np.ndarray) -> np.ndarray
                 moved = twin.theta[k] - change.centre
                 chambers = chambers + moved * change.source_admittance(line.s)
         line.source_admittance = line.source_admittance + chambers
-    return np.vstack([line.pressure_at([0.0]), line.readings()])
+    return np.vstack([line.pump_pressure(), line.readings()])
 
 
 def twin_state_space(twin: Twin, condition, lowest_hz: float, highest_hz: float) -> StateSpace:

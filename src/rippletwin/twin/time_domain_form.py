@@ -49,6 +49,8 @@ def apply_in_time(
     line.source += _elements(
         effect, 0.0, "shunt", s, _whole(after.source_admittance - before.source_admittance, s)
     )
+    added = after.source_impedance - before.source_impedance
+    line.passage += _elements(effect, 0.0, "series", s, _whole(added, s))
     _change_walls(effect, line, s, after.shunt / before.shunt)
     _change_load(effect, line, s, before.load, after.load)
     if after.sensor_factor is not before.sensor_factor:

@@ -210,6 +210,7 @@ def _interpolate_networks(
         series=mix(without.series, changed.series),
         shunt=mix(without.shunt, changed.shunt),
         source_admittance=mix(without.source_admittance, changed.source_admittance),
+        source_impedance=mix(without.source_impedance, changed.source_impedance),
         sensor_factor=mix(without.sensor_factor, changed.sensor_factor),
         inserts=[inserted(i) for i in changed.inserts],
         load=load,

@@ -62,6 +62,8 @@ class FrequencyDomainLine:
     series, shunt      (n, F) Z' in Pa s/m4 and Y' in m2/(Pa s) of each segment
     source_flow        (F,) or scalar, m3/s, of the ideal flow source at x = 0
     source_admittance  (F,) or scalar, m3/(Pa s), parallel to that source
+    source_impedance   (F,) or scalar, Pa s/m3, in series between the two and x = 0: the pump's own
+                       passage, behind which the line begins
     load               ("open" | "closed" | "anechoic", None), ("impedance", Z), ("admittance", Y)
                        or ("state", (p, q)): the ratio p:q at the load, in any scale
     inserts            list of Insert or of like tuples; those at one position follow each other in
@@ -83,6 +85,7 @@ class FrequencyDomainLine:
     shunt: np.ndarray
     source_flow: np.ndarray | complex = 1.0
     source_admittance: np.ndarray | complex = 0.0
+    source_impedance: np.ndarray | complex = 0.0
     load: tuple = ("closed", None)
     inserts: list = field(default_factory=list)
     sensor_positions: np.ndarray | Sequence[float] = ()
@@ -105,6 +108,7 @@ class FrequencyDomainLine:
             shunt=np.array(self.shunt),
             source_flow=np.array(self.source_flow),
             source_admittance=np.array(self.source_admittance),
+            source_impedance=np.array(self.source_impedance),
             inserts=list(self.inserts),
             sensor_factor=np.array(self.sensor_factor),
             nonlinear_compliances=list(self.nonlinear_compliances),
@@ -125,6 +129,7 @@ class FrequencyDomainLine:
             shunt=self.shunt[:, which],
             source_flow=at(self.source_flow),
             source_admittance=at(self.source_admittance),
+            source_impedance=at(self.source_impedance),
             load=(kind, tuple(map(at, load)) if kind == "state" else at(load)),
             inserts=[Insert(x, form, at(value)) for x, form, value in self.inserts],
             sensor_factor=at(self.sensor_factor),
@@ -149,8 +154,15 @@ class FrequencyDomainLine:
         side."""
         return self.respond(positions)[1]
 
+    def pump_pressure(self) -> np.ndarray:
+        """Pressure at the source, (F,) Pa, from which its admittance takes its flow: that at x = 0
+        and what falls over `source_impedance`."""
+        pressure, flow = self.respond([0.0])
+        return pressure[0] + self.source_impedance * flow[0]
+
     def input_impedance(self) -> np.ndarray:
-        """p/q at x = 0 looking at the line, (F,) Pa s/m3, inserts at x = 0 included."""
+        """p/q of the source looking at the line, (F,) Pa s/m3; `source_impedance` and inserts at
+        x = 0 are included."""
         entry = self.sweep([self.load_state()])[2]
         return entry[0, 0] / entry[0, 1]
 
@@ -181,7 +193,8 @@ class FrequencyDomainLine:
         return self._relate_load(*self.sweep([(1.0, 0.0), (0.0, 1.0)])[2:])
 
     def _relate_load(self, entry, decay):
-        """`load_relation` from what `sweep` gives at x = 0 for the load states (1, 0), (0, 1)."""
+        """`load_relation` from what `sweep` gives at the source for the load states (1, 0) and
+        (0, 1)."""
         a, b, *forced = entry[:, 1] + self.source_admittance * entry[:, 0]
         return a, b, self.source_flow * decay - sum(forced)
 
@@ -258,8 +271,8 @@ class FrequencyDomainLine:
     def sweep(
         self, states: list, positions: np.ndarray | Sequence[float] = ()
     ) -> tuple[np.ndarray, ...]:
-        """Propagate m load states (p, q) to x = 0: pressure and flow (S, m, F) at the positions,
-        the pairs (m, 2, F) at x = 0, and the decay (F,) of the line.
+        """Propagate m load states (p, q) to the source: pressure and flow (S, m, F) at the
+        positions, the pairs (m, 2, F) at the source, and the decay (F,) of the line.
 
         Divided by the decay of the whole line, all are in the scale of `states`. Where there are
         outflows, one more state follows: their response with zero pressure and flow at the load.
@@ -269,9 +282,10 @@ class FrequencyDomainLine:
         load = np.zeros((len(states) + (self.outflows is not None), 2, count), complex)
         for given, (p, q) in zip(load, states):
             given[0], given[1] = p, q
-        values = np.empty((len(self.inserts), count), complex)
+        values = np.empty((len(self.inserts) + 1, count), complex)
         for row, (_, _, value) in zip(values, self.inserts):
             row[:] = value
+        values[-1] = self.source_impedance
         return sweep_line(
             np.ascontiguousarray(self.series, complex),
             np.ascontiguousarray(self.shunt, complex),
@@ -283,7 +297,7 @@ class FrequencyDomainLine:
         )
 
     def _plan(self, positions, outflows) -> np.ndarray:
-        """Steps (N, 3) from the load to x = 0, for `sweep_line`: what, index, distance."""
+        """Steps (N, 3) from the load to the source, for `sweep_line`: what, index, distance."""
         inserts = self.inserts[::-1]  # at one place the last comes first, before the positions
         for _, kind, _ in inserts:
             if kind not in INSERTS:
@@ -296,4 +310,6 @@ class FrequencyDomainLine:
         plan = order_steps(lengths, at, np.array(what, np.int64), np.array(index, np.int64))
         if not len(plan):
             raise ValueError(f"a position lies outside the line of {self.length} m")
+        if np.any(self.source_impedance):  # last, so that whatever is at x = 0 is behind it
+            plan = np.vstack([plan, [SERIES, len(inserts), 0.0]])
         return plan

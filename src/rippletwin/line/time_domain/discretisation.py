@@ -9,6 +9,7 @@ short the mass that moves is a third of its inertance.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +25,15 @@ from rippletwin.line.time_domain.line_elements import (
 MIN_CELLS = 3  # of a pipe; a shorter piece becomes a pi section
 MAX_PREWARPED = 0.5  # rad a half step: a faster resonance is hardly resolved
 SAME_POSITION = 1e-9  # m: positions closer than this are the same
+
+
+class Piece(NamedTuple):
+    """A piece between elements, from `start`, m: `number` k of a pipe with cells, or ~r of one that
+    is too short for them, whose pi section begins with rung r of all junctions in a row."""
+
+    start: float
+    pipe: Pipe
+    number: int
 
 
 def discretise_element(element: Element, dt: float) -> np.ndarray:
@@ -58,11 +68,12 @@ def cells_of(pipe: Pipe, dt: float) -> float:
     return round(cells) if abs(cells - round(cells)) < 1e-9 * max(cells, 1) else cells
 
 
-def discretise(line: TimeDomainLine, dt: float) -> tuple[list[Pipe], list[float], list[list]]:
+def discretise(line: TimeDomainLine, dt: float) -> tuple[list[Piece], list[list]]:
     """Divide the segments at the elements, for steps of `dt`, s.
 
-    Returns the pipes, their starts, m, and the rungs of each junction. Raises ValueError for an
-    element outside the line, and where pieces would be shorter than three steps.
+    Returns the pieces, pump first, and the rungs of each junction between those that are pipes.
+    Raises ValueError for an element outside the line, and where all pieces would be shorter than
+    three steps.
     """
     edges = np.concatenate([[0.0], np.cumsum([p.length for p in line.pipes])])
     if any(not 0.0 <= i.position <= edges[-1] * (1 + 1e-12) for i in line.inserts):
@@ -70,8 +81,8 @@ def discretise(line: TimeDomainLine, dt: float) -> tuple[list[Pipe], list[float]
     cuts = {i.position for i in line.inserts if np.min(np.abs(edges - i.position)) > SAME_POSITION}
     stops = np.array(sorted(set(edges) | cuts))
     at = [int(np.argmin(np.abs(stops - i.position))) for i in line.inserts]
-    pipes, starts = [], []
-    joints: list[list[Element | Storage | Branch]] = [[*line.source]]
+    pieces, count = [], 0
+    joints: list[list[Element | Storage | Branch]] = [[*line.source, *line.passage]]
     for n, x in enumerate(stops):
         if n > 0:
             before = stops[n - 1]
@@ -79,16 +90,17 @@ def discretise(line: TimeDomainLine, dt: float) -> tuple[list[Pipe], list[float]
             whole = abs((x - before) - parent.length) < 1e-12 * parent.length
             piece = parent if whole else replace(parent, length=float(x - before))
             if cells_of(piece, dt) >= MIN_CELLS:
-                pipes.append(piece)
-                starts.append(float(before))
+                pieces.append(Piece(float(before), piece, count))
                 joints.append([])
+                count += 1
             else:
+                pieces.append(Piece(float(before), piece, ~sum(map(len, joints))))
                 joints[-1] += _pi_section(piece, line)
         joints[-1] += [_rung(insert, line, dt) for insert, k in zip(line.inserts, at) if k == n]
     joints[-1] += line.load
-    if not pipes:
+    if not count:
         raise ValueError("the line is cut into pieces shorter than three steps")
-    return pipes, starts, joints
+    return pieces, joints
 
 
 def _rung(

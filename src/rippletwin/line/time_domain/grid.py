@@ -7,10 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rippletwin.line.frequency_domain.pipe_immittance import series_impedance, shunt_admittance
 from rippletwin.line.time_domain import moc_kernel, weighting_functions
 from rippletwin.line.time_domain.discretisation import (
-    SAME_POSITION,
     cells_of,
     discretise,
     discretise_element,
@@ -28,8 +26,13 @@ class Grid:
     def __init__(self, line: TimeDomainLine):
         self.line, self.dt = line, line.period / len(line.flow)
         self.mean = float(np.mean(line.flow))
-        self.pipes, self.starts, joints = discretise(line, self.dt)
+        self.pieces, joints = discretise(line, self.dt)
+        whole = [(start, pipe) for start, pipe, k in self.pieces if k >= 0]
+        self.starts, self.pipes = map(list, zip(*whole))
         self.main = len(self.pipes)
+        # The first rung behind the source's own: its pump's side is the outlet, x = 0.
+        own = len(line.source) + len(line.passage)
+        self.outlet = own if len(joints[0]) > own else None
         self.viscosity_ratios = [1.0] * self.main
         self._number_rungs(joints)
         self._lay_nodes()
@@ -220,7 +223,8 @@ class Grid:
         moc_kernel.linearise_storage(law, self.filters[r], u, self.filter_states[r])
 
     def advance(self, nodes):
-        """One period: pressure, Pa, and flow, m3/s, (N, M) at `nodes` (N,); updates the state."""
+        """One period: pressure, Pa, and flow, m3/s, (N, M) at `nodes` (N,), see `Place`; updates
+        the state."""
         flow = np.asarray(self.line.flow, dtype=float)
         return moc_kernel.advance(
             flow,
@@ -233,34 +237,3 @@ class Grid:
     def _arrays(self, kind):
         """The attributes of the grid that a tuple of `kernel_arrays` wants."""
         return kind(*(getattr(self, name) for name in kind._fields))
-
-    def locate(self, x):
-        """(pipe, nearest node, distance from it to x, m, towards the load). Raises ValueError for x
-        outside the line."""
-        if not -1e-12 <= x <= self.line.length * (1 + 1e-12):
-            raise ValueError(f"position {x} m lies outside the line of {self.line.length} m")
-        starts = np.array(self.starts[: self.main])
-        ends = starts + [pipe.length for pipe in self.pipes[: self.main]]
-        # On an edge take the pipe on the pump's side: its flow has not passed the element there.
-        away = np.maximum(np.maximum(starts - x, x - ends), SAME_POSITION)
-        k = int(np.argmin(away))
-        nodes = np.arange(self.offsets[k], self.offsets[k + 1])
-        node = int(nodes[np.argmin(np.abs(self.x[nodes] - x))])
-        offset = x - self.x[node]
-        return k, node, 0.0 if abs(offset) < SAME_POSITION else float(offset)
-
-    def shift(self, k, offset, pressure, flow):
-        """Periodic pressure, Pa, and flow, m3/s, (M,) in pipe k, by `offset`, m, further on: a
-        fraction of a cell, by the exact line."""
-        line, pipe = self.line, self.pipes[k].linear(self.line.density)
-        p, q = np.fft.rfft(pressure), np.fft.rfft(flow)
-        s = 2j * np.pi * np.arange(1, len(p)) / line.period
-        fluid = {"density": line.density, "diameter": pipe.diameter}
-        z = series_impedance(s, viscosity=line.viscosity, friction=line.friction, **fluid)
-        y = shunt_admittance(s, wave_speed=pipe.wave_speed, **fluid) * pipe.yielding(s)
-        gamma, zc = np.sqrt(z * y), np.sqrt(z / y)
-        c, d = np.cosh(gamma * offset), np.sinh(gamma * offset)
-        resistance = 2.0 * self.parameters[k, 1] / (pipe.wave_speed * self.dt)
-        p[0] -= resistance * offset * q[0]
-        p[1:], q[1:] = c * p[1:] - zc * d * q[1:], c * q[1:] - d / zc * p[1:]
-        return np.fft.irfft(p, len(pressure)), np.fft.irfft(q, len(flow))

@@ -117,9 +117,10 @@ class TimeDomainLine:
     flow       (M,) m3/s of the pump at M even steps of a `period` (s)
     end        the load
     density, kinematic viscosity, friction   as in `pipe_immittance.series_impedance`
-    positions  (S,) m where pressure and flow are wanted (flow beside an element: pump's side)
+    positions  (S,) m where pressure and flow are wanted; beside an element, on the pump's side
     mean_flow  m3/s of the steady state from which elements measure; that of `flow` by default
     source     shunt elements parallel to the pump; their position does not matter
+    passage    series elements between these and x = 0; their position does not matter
     inserts    elements, storages and branches on the line, those at one position in order from the
                pump
     load       elements right before the end, in order; their position does not matter
@@ -137,6 +138,7 @@ class TimeDomainLine:
     positions: Sequence[float] = ()
     mean_flow: float | None = None
     source: list[Element] = field(default_factory=list)
+    passage: list[Element] = field(default_factory=list)
     inserts: list[Element | Storage | Branch] = field(default_factory=list)
     load: list[Element] = field(default_factory=list)
     sensors: list[tuple[int, Callable[[np.ndarray], np.ndarray]]] = field(default_factory=list)

@@ -26,6 +26,7 @@ from rippletwin.harmonics import peak_amplitudes
 from rippletwin.line.frequency_domain.pipe_immittance import FRICTION_LAWS
 from rippletwin.line.time_domain.grid import Grid
 from rippletwin.line.time_domain.line_elements import Pipe, TimeDomainLine
+from rippletwin.line.time_domain.places import locate, shift
 
 
 @dataclass(frozen=True)
@@ -74,8 +75,8 @@ def simulate(line: TimeDomainLine, periods: int = 60, tolerance: float = 1e-6) -
     if line.friction not in FRICTION_LAWS:
         raise ValueError(f"friction must be one of {FRICTION_LAWS}, not {line.friction!r}")
     grid = Grid(line)
-    places = [grid.locate(x) for x in line.positions]
-    nodes = np.array([node for _, node, _ in places] + [0, grid.load_node], dtype=np.int64)
+    places = [locate(grid, x) for x in line.positions]
+    nodes = np.array([place.node for place in places] + [0, grid.load_node], dtype=np.int64)
 
     before = grid.pressure.copy()
     done, change, worst = 0, np.inf, 0
@@ -88,9 +89,9 @@ def simulate(line: TimeDomainLine, periods: int = 60, tolerance: float = 1e-6) -
         change = difference[worst] / ripple if ripple > 0 else difference[worst]
         before = grid.pressure.copy()
 
-    for k, (pipe, _, offset) in enumerate(places):
-        if offset != 0.0:
-            pressure[k], rate[k] = grid.shift(pipe, offset, pressure[k], rate[k])
+    for k, place in enumerate(places):
+        if place.offset != 0.0:
+            pressure[k], rate[k] = shift(line, place, pressure[k], rate[k])
     for k, factor in line.sensors:
         pressure[k] = _apply_filter(factor, pressure[k], line.period)
     dt = line.period / len(line.flow)

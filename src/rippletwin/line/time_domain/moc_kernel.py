@@ -204,7 +204,8 @@ def _solve_junction(supply, slope, first, stop, junctions, state, ends, kept, jo
     element a pressure b0 u + z, u being the deviation from `references`; so each rung transforms
     the pair into that of its far side. There it meets supply[1] - slope[1] p from the load's side.
     On the way back every rung's filter is updated. `ends` (2, pipes, 2) holds supply and slope of
-    the branches, which get their pressure in `joint` (pipes, 2).
+    the branches, which get their pressure in `joint` (pipes, 2). `kept` (rungs, 3) has supply,
+    slope and pressure on the pump's side of each rung.
     Returns the pressures on the pump's and the load's side.
     """
     kinds, filters, references = junctions.kinds, junctions.filters, junctions.references
@@ -240,7 +241,7 @@ def _solve_junction(supply, slope, first, stop, junctions, state, ends, kept, jo
     for r in range(stop - 1, first - 1, -1):
         kind, b0 = kinds[r, 0], filters[r, 0]
         if kind == BRANCH:
-            joint[kinds[r, 1], 0] = p
+            joint[kinds[r, 1], 0] = kept[r, 2] = p
             continue
         u = p - references[r]
         if kind == SERIES:
@@ -248,6 +249,7 @@ def _solve_junction(supply, slope, first, stop, junctions, state, ends, kept, jo
             q = (kept[r, 0] - kept[r, 1] * (p + past)) / (1.0 + kept[r, 1] * b0)
             p += b0 * q + past
             u = q - references[r]
+        kept[r, 2] = p
         if kind == STORAGE:
             state[r, 1] += filters[r, 1] * (b0 * u + state[r, 0])
             linearise_storage(junctions.storages[kinds[r, 1]], filters[r], u, state[r])
@@ -363,7 +365,7 @@ def advance(source, nodes, pipes, junctions, state):
     """One period of the flow `source` (M,), m3/s, at the pump; `state` is changed in place.
 
     `pipes`, `junctions` and `state` are the tuples of `kernel_arrays`. Returns pressure and flow
-    (len(nodes), M) at `nodes`.
+    (len(nodes), M) at `nodes`, of which ~r is the pump's side of rung r.
     """
     count, size = len(pipes.thetas), len(state.pressure)
     seen = np.empty((2, len(nodes), len(source)))
@@ -381,7 +383,7 @@ def advance(source, nodes, pipes, junctions, state):
     leaving = np.empty_like(state.forward), np.empty_like(state.backward)
     _take_steps(
         source, nodes, homes, pipes, junctions, state, leaving, known, lag, give, ends, carried,
-        np.empty((count, 2)), np.empty((2, 2)), np.empty((len(junctions.kinds), 2)), seen,
+        np.empty((count, 2)), np.empty((2, 2)), np.empty((len(junctions.kinds), 3)), seen,
     )  # fmt: skip
     if len(source) % 2:  # the waves that left last are not in the state's arrays
         state.forward[:], state.backward[:] = leaving
@@ -433,6 +435,10 @@ def _take_steps(
         waves, leaving = leaving, waves
         for j in range(len(nodes)):
             i, k = nodes[j], homes[j]
+            if i < 0:
+                supplied, sloping, pressure = kept[~i]
+                seen[0, j, n], seen[1, j, n] = pressure, supplied - sloping * pressure
+                continue
             seen[0, j, n], seen[1, j, n] = state.pressure[i], state.flow[i]
             if carried[k] > 0.0:
                 seen[0, j, n] = 0.5 * (waves[0][i] + waves[1][i])

@@ -56,7 +56,12 @@ def _try_at(effect: Effect, rig, place: Place, values: dict) -> None:
     line, state = _lossless_line(rig, effect.element == "load")
     _run(effect, "apply", effect.apply, line, state, values, place)
     impedance = _run(effect, "apply", line.input_impedance)
-    changed = line.sensor_factor, line.source_flow, line.source_admittance
+    changed = (
+        line.sensor_factor,
+        line.source_flow,
+        line.source_admittance,
+        line.source_impedance,
+    )
     if not all(np.all(np.isfinite(np.asarray(x))) for x in (impedance, *changed)):
         raise _fault(effect, "apply", f"is not finite at {values}", "Correct the equation")
     if effect.element not in ("source", "sensor"):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from rippletwin.line.frequency_domain.line_network import Insert
 from rippletwin.line.time_domain.line_elements import Element, inertance
 from rippletwin.twin.effects.base import Effect, Place, characteristic_admittance
 from rippletwin.twin.effects.lumped_elements import volume_compliance
@@ -33,9 +32,7 @@ def _apply(network, state, values, place):
     admittance = values["conductance"] + network.s * _compliance(state, values, place)
     network.source_admittance = network.source_admittance + admittance
     if place.form == "volume and passage":
-        impedance = network.s * values["inertance"]
-        # First of the list at x = 0: nearest to the pump.
-        network.inserts.insert(0, Insert(0.0 * network.length, "series", impedance))
+        network.source_impedance = network.source_impedance + network.s * values["inertance"]
 
 
 def _compliance(state, values, place):
@@ -69,7 +66,7 @@ def _apply_in_time(line, state, values, place):
     compliance = _compliance(state, values, place)
     line.source.append(Element(0.0, "shunt", (compliance, values["conductance"])))
     if place.form == "volume and passage":
-        line.inserts.insert(0, inertance(0.0, values["inertance"]))
+        line.passage.append(inertance(0.0, values["inertance"]))
 
 
 EFFECT = Effect(
