@@ -128,7 +128,8 @@ def _load_pressure(rig: Rig, observation, flow: float) -> float | None:
     if stated is None:
         if not len(means):
             return None
-        nearest = np.argmax([sensor.position for sensor in sensors[: len(means)]])
+        positions = [sensor.position for sensor in sensors[: len(means)]]
+        nearest = np.argmax(positions) if positions else -1  # an impedance is of no sensor
         return float(means[nearest])
     if observation.kind == "input_impedance" or not len(means) or not stated > 0.0:
         return stated
