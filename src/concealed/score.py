@@ -10,7 +10,7 @@ from concealed.names import (
     same_or_equivalent,
 )
 
-SILENT_VERDICTS = ("consistent", "calibration_only")
+SILENT_VERDICTS = ("consistent", "calibration_only", "crashed")
 PLAIN_CHANGE = 0.05
 """Relative change of the ripple from which an effect counts as plain: above the 1 to 4 % by which
 the nominal flow ripple is wrong."""
@@ -35,7 +35,7 @@ def score_case(truth: dict, verdict: dict, baselines: dict, oracle: dict = NO_OR
         mesh             estimated error of the recording's numerics, None for a linear line
         oracle_log_evidence, oracle_held_out   of the fit begun from the truth, None without one
         verdict, named, sentence   from the verdict; `named` are its effects as text
-        alarm            the verdict is neither one of SILENT_VERDICTS nor `crashed`
+        alarm            the verdict is not one of SILENT_VERDICTS
         effects_found    number of true effects that are named
         right            every true effect is named, and there is one
         named_first      whether the first of `rank_effects` counts for a true effect
@@ -77,7 +77,7 @@ def score_case(truth: dict, verdict: dict, baselines: dict, oracle: dict = NO_OR
         "verdict": verdict["verdict"],
         "named": " + ".join(f"{claim['name']} ({claim['element']})" for claim in named),
         "sentence": verdict["sentence"],
-        "alarm": verdict["verdict"] not in (*SILENT_VERDICTS, "crashed"),
+        "alarm": verdict["verdict"] not in SILENT_VERDICTS,
         "effects_found": len(found),
         "right": names.is_right,
         "named_first": bool(ranked) and any(ranked[0] is claim for _, claim in found),

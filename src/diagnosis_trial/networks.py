@@ -27,7 +27,7 @@ from rippletwin.diagnosis.network_answers import (
 )
 from rippletwin.diagnosis.pump_flow import simulate_healthy_pump, with_fitted_pump
 from rippletwin.diagnosis.randomised_signals import SignalSource
-from rippletwin.flow_sensor.estimate import band_limit
+from rippletwin.flow_sensor.estimate import band_limit, keep_orders
 from rippletwin.flow_sensor.line_response import line_factory
 from rippletwin.flow_sensor.methods import noise_of_flow
 from rippletwin.flow_sensor.spectral_inversion import estimate_flow
@@ -79,8 +79,7 @@ def teach_network(kind: str, twin: Twin, covariance: np.ndarray | None, case: Ca
     noise = noise_mad(recording.pressure)
     if kind in FLOW_KINDS:
         signal, channels = "flow", ["outlet"]
-        band = (_highest_order(speed_hz) + 0.5) * speed_hz
-        learnt, others = (band_limit(s, speed_hz, band) for s in (learnt, others))
+        learnt, others = (band_limit(s, speed_hz, BANDWIDTH_HZ) for s in (learnt, others))
         flow = _flow_windows(recording, case.rig, twin, speed_hz)[:, 0]
         noise = noise_of_flow(flow, np.zeros(len(flow)), np.ones(len(flow), bool))
     x, y = augment(learnt, DRAWS, noise, rng)
@@ -152,12 +151,6 @@ def _flow_windows(recording: Recording, rig: Rig, twin: Twin, learnt_speed_hz: f
         revolutions.speed_hz,
         line_factory(fitted, pressure, ripple),
         noise_mad(recording.pressure),
-        (_highest_order(learnt_speed_hz) + 0.5) * float(np.mean(revolutions.speed_hz)),
+        keep_orders(BANDWIDTH_HZ, learnt_speed_hz, revolutions.speed_hz, SAMPLES),
     )
     return found.flow[:, None]
-
-
-def _highest_order(speed_hz: float) -> int:
-    """Highest shaft order of the flow at rev/s. It follows from one speed, that of learning: by
-    each recording's own speed an order at the edge would come and go."""
-    return int(BANDWIDTH_HZ / speed_hz)

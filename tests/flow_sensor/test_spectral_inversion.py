@@ -5,7 +5,7 @@ import pytest
 
 from flow_windows import RESISTANCE, SAMPLES, SPEED, THREE, TWO, line, record, ripples
 from paper_rig import SEGMENTS, SENSORS
-from rippletwin.flow_sensor.estimate import band_limit, orders_within
+from rippletwin.flow_sensor.estimate import band_limit, keep_orders, orders_within
 from rippletwin.flow_sensor.line_response import line_response
 from rippletwin.flow_sensor.spectral_inversion import estimate_flow
 from rippletwin.harmonics import peak_amplitudes
@@ -179,3 +179,14 @@ def test_bandwidth_without_orders_is_refused(bandwidth):
         orders_within(bandwidth, SPEED, SAMPLES)
     for end in (SPEED, SAMPLES * SPEED / 2):
         assert f"{end:.4g} Hz" in str(caught.value)
+
+
+@pytest.mark.parametrize("share", [0.995, 1.0, 1.005])
+def test_orders_stay_those_of_the_simulations_whatever_the_windows_speed(share):
+    """90 orders at 1000 r/min end just at the bandwidth: windows half a per cent faster would have
+    one less by their own speed."""
+    speed = 1000.0 / 60.0
+    windows = share * speed * np.ones(4)
+    band = keep_orders(BAND, speed, windows, SAMPLES)
+    assert len(orders_within(band, windows.mean(), SAMPLES)) == 90
+    assert len(orders_within(BAND, 1.005 * speed, SAMPLES)) == 89

@@ -4,7 +4,7 @@ import xarray as xr
 
 from job import open_log
 from rippletwin import store
-from rippletwin.flow_sensor.estimate import orders_within
+from rippletwin.flow_sensor.estimate import keep_orders
 from rippletwin.flow_sensor.line_response import line_factory
 from rippletwin.flow_sensor.methods import estimate_flow_by, noise_of_flow
 from rippletwin.twin.twin_file import load_twin
@@ -13,15 +13,15 @@ report_progress = open_log(snakemake)
 params = snakemake.params
 recorded = store.load(snakemake.input.recorded)
 speeds = recorded.window_speed_hz.values
-# The orders are those at the speed of the simulations, which networks learn.
-orders = orders_within(params.bandwidth_hz, recorded.speed_hz, recorded.sizes["time"])
+# Networks learn simulations at the speed of `recorded`.
+band = keep_orders(params.bandwidth_hz, recorded.speed_hz, speeds, recorded.sizes["time"])
 estimate = estimate_flow_by(
     params.method,
     recorded.signal.values,
     speeds,
     line_factory(load_twin(snakemake.input.twin, snakemake.input.effects), recorded.load_pressure),
     recorded.noise_std.values,
-    (orders[-1] + 0.5) * speeds.mean(),
+    band,
     width=params.width,
     steps=params.steps,
     threads=snakemake.threads,

@@ -149,8 +149,8 @@ def _ask(given: dict) -> None:
         question = f"Temperature of the oil, °C (empty: {DEFAULTS['temperature']:g})"
         given["temperature"] = _prompt(question, TEMPERATURE.read, empty=True)
     if given["viscosity"] is None and given["viscosity_40"] is None:
-        celsius = given["temperature"]
-        celsius = DEFAULTS["temperature"] if celsius is None else celsius
+        known = given["temperature"]
+        celsius = DEFAULTS["temperature"] if known is None else known
         given["viscosity"] = _prompt(f"Viscosity at {celsius:g} °C, cSt", VISCOSITY.read)
     for key, question, read in (
         ("segments", "Segment: length,bore,wall in mm, pump first", read_segment),

@@ -25,7 +25,7 @@ from rippletwin.diagnosis.pump_flow import (
     simulate_healthy_pump,
     with_fitted_pump,
 )
-from rippletwin.pump.geometry import Geometry
+from rippletwin.pump.geometry import Geometry, stated_numbers
 from rippletwin.twin.twin import Twin
 
 PRIOR_SD = {
@@ -79,7 +79,7 @@ def calibrate_pump(twin: Twin, healthy: Sequence, sheet: Mapping) -> Recalibrate
     returned with its own pump where the data sheet has no geometry.
     """
     fitted, gain = with_fitted_pump(twin), 0.0
-    pump = {key: value for key, value in sheet.items() if value is not None}
+    pump = stated_numbers(sheet)
     if set(pump) == {"pistons"}:
         return RecalibratedTwin(fitted)
     for _ in range(ROUNDS):  # the flow is told beside the chambers of the pump that was fitted

@@ -19,7 +19,7 @@ from rippletwin.case.model import Fluid, Rig
 from rippletwin.diagnosis.faults.base import Fault
 from rippletwin.errors import InputError
 from rippletwin.harmonics import peak_amplitudes
-from rippletwin.pump.geometry import Geometry
+from rippletwin.pump.geometry import Geometry, stated_numbers
 from rippletwin.pump.outlets import ConstantPressure
 from rippletwin.pump.simulation import PumpRipple, simulate
 from rippletwin.twin.twin import Twin
@@ -47,12 +47,12 @@ def with_fitted_pump(twin: Twin, mean_flow: float | None = None, speed_hz: float
     Where the data sheet gives the number of pistons alone, the default pump is scaled to deliver
     `mean_flow`, m3/s, at `speed_hz`, rev/s.
     """
-    pump = {key: value for key, value in twin.rig.pump.items() if value is not None}
+    pump = stated_numbers(twin.rig.pump)
     if set(pump) == {"pistons"} and mean_flow is not None:
         pump = _default_pump(pump, mean_flow / speed_hz)
     own = {"viscosity_slope", *(p.name for p in twin.parameters if p.place == "pump")}
     own.update(f"{kind}[{label}]" for label in twin.labels for kind in ("angle", "state"))
-    fitted = {key: value for key, value in twin.fitted_pump().items() if value is not None}
+    fitted = stated_numbers(twin.fitted_pump())
     pump = _with_stated_discharge(pump | fitted, pump.get("discharge_coefficient"))
     kept = [name not in own for name in twin.index]
     return rebuild(twin, replace(twin.rig, pump=pump), theta=twin.theta[kept])
@@ -225,7 +225,7 @@ def moved_pumps(pump: Mapping) -> list[dict]:
 
 
 def _key(pump: Mapping) -> tuple:
-    return tuple(sorted((k, v) for k, v in pump.items() if v is not None))
+    return tuple(sorted(stated_numbers(pump).items()))
 
 
 @cache

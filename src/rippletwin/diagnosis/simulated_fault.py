@@ -21,6 +21,7 @@ from rippletwin.diagnosis.pump_flow import (
     with_fitted_pump,
 )
 from rippletwin.errors import InputError
+from rippletwin.pump.geometry import stated_numbers
 from rippletwin.twin.operating_point import OperatingCondition, operating_point
 from rippletwin.twin.propagation import propagate
 from rippletwin.twin.twin import Twin
@@ -107,7 +108,7 @@ def _with_pump(twin: Twin, speed_hz: float, load_pressure: float, warnings: list
             f"{load.back_pressure / 1e5:g} bar",
             "Give the pressure before the load",
         )
-    if len({name for name, value in pump.items() if value is not None}) > 1:
+    if len(stated_numbers(pump)) > 1:
         return with_fitted_pump(twin)
     warnings.append(
         "only the number of pistons is known of the pump: a default pump of the load's mean flow "

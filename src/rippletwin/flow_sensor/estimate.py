@@ -85,6 +85,18 @@ def orders_within(bandwidth_hz: float, speed_hz: float, samples: int) -> np.ndar
     return np.arange(1, highest + 1)
 
 
+def keep_orders(
+    bandwidth_hz: float, speed_hz: float, window_speed_hz: np.ndarray, samples: int
+) -> float:
+    """Bandwidth, Hz, in which windows of these speeds (n,), rev/s, have the orders that
+    `bandwidth_hz` has at `speed_hz`: by a recording's own speed one at the edge comes and goes.
+
+    Raises ValueError as `orders_within`.
+    """
+    highest = orders_within(bandwidth_hz, speed_hz, samples)[-1]
+    return (highest + 0.5) * float(np.mean(window_speed_hz))
+
+
 def band_limit(flow: np.ndarray, speed_hz: float, bandwidth_hz: float) -> np.ndarray:
     """`flow` (..., M) over one revolution with only the orders that a sensor estimates.
 

@@ -33,10 +33,10 @@ def estimate_flow_by(
     """Outlet flow of each one-revolution window, by one of `METHODS`.
 
     windows : (n, S, M) pressure, Pa; speed_hz : (n,) speed of each, rev/s, of which "pinn" takes
-    the mean; noise : (S,) standard deviation of a sample, Pa. `width`
-    (neurons of a hidden layer), `steps` (of the optimiser) and `threads` are for "pinn" alone: a
-    network is trained once for the line, then solved a window at a time. progress(text) is called
-    on the way. Raises ValueError for another method.
+    the mean; noise : (S,) standard deviation of a sample, Pa. `width` (neurons of a hidden layer),
+    `steps` (of the optimiser) and `threads` are for "pinn" alone: a network is trained once for the
+    line, then solved a window at a time. progress(text) is called on the way. Raises ValueError for
+    another method.
     """
     if method == "spectral":
         return spectral_inversion.estimate_flow(windows, speed_hz, line_at, noise, bandwidth_hz)

@@ -6,6 +6,7 @@ its inner dead centre. Piston k lags piston 0 by k/pistons of a revolution.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -54,7 +55,7 @@ class Geometry:
         unknown = sorted(set(pump) - set(known))
         if unknown:
             raise ValueError(f"unknown pump keys {unknown}; known are {known}")
-        stated = {key: value for key, value in pump.items() if value is not None}
+        stated = stated_numbers(pump)
         leak_discharge = stated.get("discharge_coefficient", LEAK_DISCHARGE)
         geometry, default = cls(**stated, leak_discharge=leak_discharge), cls()
         scaled = {
@@ -127,6 +128,11 @@ class Geometry:
         rising = np.clip((phi - shut) / self.port_opening_deg, 0.0, 1.0)
         falling = np.clip((180.0 - shut - phi) / self.port_opening_deg, 0.0, 1.0)
         return _smooth(rising) * _smooth(falling)
+
+
+def stated_numbers(pump: Mapping) -> dict:
+    """The keys of rig.yaml's `pump` that have a value."""
+    return {key: value for key, value in pump.items() if value is not None}
 
 
 def _smooth(u):

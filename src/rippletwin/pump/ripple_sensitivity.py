@@ -18,6 +18,7 @@ import numpy as np
 
 from rippletwin.case.model import Fluid
 from rippletwin.harmonics import peak_amplitudes
+from rippletwin.pump.geometry import stated_numbers
 from rippletwin.pump.outlets import ConstantPressure, PressureWave
 from rippletwin.pump.simulation import PumpRipple, simulate
 
@@ -112,7 +113,7 @@ def ripple_change(
     outlet = float(pressure) if np.ndim(pressure) == 0 else np.asarray(pressure, float).tobytes()
 
     def run(**changed) -> PumpRipple:
-        numbers = {k: v for k, v in {**pump, **changed}.items() if v is not None}
+        numbers = stated_numbers({**pump, **changed})
         return _simulate_cached(tuple(sorted(numbers.items())), fluid, float(speed_rpm), outlet)
 
     above, below = (run(**{KEYS[name]: float(end)}) for end in ends)
