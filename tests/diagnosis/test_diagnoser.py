@@ -12,11 +12,12 @@ from scipy.stats import kstest
 import leaking_pump
 from rippletwin.case.model import Load
 from rippletwin.diagnosis.diagnosed_numbers import gather
-from rippletwin.diagnosis.diagnoser import Diagnoser
+from rippletwin.diagnosis.diagnoser import Diagnoser, _probabilities
 from rippletwin.diagnosis.diagnosis_file import diagnosis_dict
 from rippletwin.diagnosis.evidence import ErrorPrior, _at_best_pitch, compare_healthy
 from rippletwin.diagnosis.faults.library import select_faults
 from rippletwin.diagnosis.hypothesis import Errors, Hypothesis
+from rippletwin.diagnosis.pump_flow import with_fitted_pump
 from rippletwin.diagnosis.screening import Screen
 from rippletwin.diagnosis.unlike import combine, judge_residual
 from rippletwin.errors import InputError
@@ -24,6 +25,7 @@ from rippletwin.figures import fault_posterior
 from rippletwin.pump.faults import Cylinder, Slipper
 from rippletwin.spectra.frequency_selection import select_frequencies
 from rippletwin.twin.twin import Twin
+from rippletwin.twin.twin_file import from_dict, to_dict
 
 DRIFTED = leaking_pump.WAVE_SPEED * 1.003
 FIRST_TURN, TURN = 0.3, 2.1  # rad, of the anchor's shaft and of the diagnosed one's
@@ -291,9 +293,97 @@ def test_a_band_below_the_pistons_is_refused(which):
     records = {label: leaking_pump.record(label) for label in ("now", "anchor")}
     twin = Twin(leaking_pump.rig(), [records["anchor"]])
     records[which] = select_frequencies(records[which], slice(8))
-    with pytest.raises(InputError, match=rf"recording {which}: max_frequency_hz: .* 133.3 Hz") as e:
+    keys = "min_frequency_hz, max_frequency_hz"
+    with pytest.raises(InputError, match=rf"recording {which}: {keys}: .* 133.3 Hz") as e:
         Diagnoser(twin, ()).make_model(records["now"], records["anchor"])
     assert "150 Hz" in e.value.problem and e.value.remedy
+
+
+def high_passed(observation, corners_hz):
+    """As sensors that pass no static pressure read it, with the band that they leave."""
+    ratio = 1j * observation.frequency_hz / np.array(corners_hz)[:, None]
+    passed = observation.values * ratio / (1.0 + ratio)
+    return replace(observation, values=passed, min_frequency_hz=100.0)
+
+
+def test_orders_below_the_band_do_not_count():
+    """Two sensors that pass no static pressure, one of them from 100 Hz: what they do to the orders
+    below is no fault of the pump. The same recordings with the whole band are unlike everything."""
+    rng = np.random.default_rng(0)
+    corners = 20.0, 60.0
+    anchor = high_passed(leaking_pump.record("anchor", turn=FIRST_TURN, rng=rng), corners)
+    leaking = high_passed(leaking_pump.record("now", Slipper(4e-7, 2), TURN, rng), corners)
+    diagnoser = Diagnoser(Twin(leaking_pump.rig(), [anchor]), select_faults())
+    found = diagnoser(leaking, [anchor])
+    assert found.model.orders[0] == 6 and found.model.orders[-1] == leaking_pump.ORDERS[-1]
+    assert found.state == "slipper"
+    whole = [replace(o, min_frequency_hz=0.0) for o in (leaking, anchor)]
+    assert diagnoser(whole[0], whole[1:]).unlikeness.p_value < found.unlikeness.p_value
+
+
+def test_bands_without_a_common_order_of_the_pistons_are_refused():
+    """One recording to 600 Hz, its anchor from 700 Hz on."""
+    low, high = (leaking_pump.record(label) for label in ("low", "high"))
+    twin = Twin(leaking_pump.rig(), [high])
+    low = select_frequencies(low, low.frequency_hz <= 600.0)
+    high = replace(high, min_frequency_hz=700.0)
+    with pytest.raises(InputError, match="700 to 3000 Hz together with that of recording low"):
+        Diagnoser(twin, ()).make_model(low, high)
+
+
+def test_changes_between_repeats_are_told_by_order():
+    """A repeat whose band begins at 100 Hz says nothing of the orders below; above they are what a
+    repeat with the whole band says, to a quarter."""
+    anchor = leaking_pump.record("anchor", turn=FIRST_TURN)
+    rng = np.random.default_rng(4)
+    repeat = leaking_pump.record("repeat", Slipper(3e-8, 2), TURN, rng)
+    diagnoser = Diagnoser(Twin(leaking_pump.rig(), [anchor]), ())
+    _, whole = diagnoser._learn_errors([anchor, repeat])
+    _, banded = diagnoser._learn_errors([anchor, replace(repeat, min_frequency_hz=100.0)])
+    assert np.all(banded[:, :6] == 0.0) and np.all(whole[:, 1:6] != 0.0)
+    assert np.linalg.norm(banded[:, 6:] - whole[:, 6:]) < 0.25 * np.linalg.norm(whole[:, 6:])
+
+
+@pytest.mark.parametrize("name", ["wave_speed", "load", "viscosity"])
+def test_a_line_drifts_though_the_data_sheet_is_exact(name):
+    """Readings after a drift are the same whether the data sheet states a tolerance or none."""
+    anchor = leaking_pump.record("anchor")
+    rig = leaking_pump.rig()
+    exact = replace(rig, uncertainty=replace(rig.uncertainty, **{name: 0.0}))
+    drift = np.array([1.0, -0.5, 2.0])
+    one, other = (
+        Diagnoser(Twin(each, [anchor]), ()).make_model(anchor, anchor).line for each in (rig, exact)
+    )
+    assert np.allclose(one.response(drift), other.response(drift), rtol=1e-6)
+    assert not np.allclose(one.response(drift), one.response(), rtol=1e-3)
+    assert np.allclose(one.response(), other.response(), rtol=1e-6)
+
+
+def test_uncertain_gains_stay_with_the_twin():
+    """A data sheet with uncertain sensitivities: the twin of recordings has a gain of every sensor,
+    and so has the one that a diagnosis takes, read from a file too."""
+    anchor = leaking_pump.record("anchor")
+    rig = leaking_pump.rig()
+    rig = replace(rig, uncertainty=replace(rig.uncertainty, sensor_gain=0.02))
+    twin = Twin(rig, [anchor])
+    theta = np.zeros(len(twin.parameters))
+    theta[[twin.index["gain[p1]"], twin.index["gain[p2]"]]] = 1.0, -1.0
+    kept = from_dict(to_dict(with_fitted_pump(twin.with_(theta=theta))))
+    assert kept.values()["gain[p1]"] == pytest.approx(np.exp(0.02))
+    assert kept.values()["gain[p2]"] == pytest.approx(np.exp(-0.02))
+    line = Diagnoser(kept, ()).make_model(anchor, anchor).line
+    plain = Diagnoser(Twin(leaking_pump.rig(), [anchor]), ()).make_model(anchor, anchor).line
+    gains = line.response() / plain.response()
+    assert np.allclose(gains, np.exp([[0.02], [-0.02]]), rtol=1e-9)
+
+
+def test_a_state_whose_likelihood_overflows_is_impossible():
+    """One state without a finite evidence leaves the others their probabilities."""
+    anchor = leaking_pump.record("anchor")
+    healthy = Diagnoser(Twin(leaking_pump.rig(), [anchor]), ())(anchor, [anchor]).best
+    slipper = select_faults()[0]
+    lost = replace(healthy, state=(slipper,), log_evidence=np.nan)
+    assert _probabilities([healthy, lost]) == {"healthy": 1.0, "slipper": 0.0}
 
 
 def test_a_load_that_was_not_measured_in_the_band_is_refused():

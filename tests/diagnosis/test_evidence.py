@@ -46,6 +46,22 @@ def twin_of(anchor):
     return Twin(leaking_pump.rig(), [anchor])
 
 
+def test_a_leak_that_another_one_leaves_a_single_area_has_evidence(recordings):
+    """A user's fault whose smallest leak is large: beside it the other leak's prior ends where it
+    begins. The pair has a finite evidence on a healthy recording, and the state is healthy."""
+    anchor, _ = recordings
+    again = leaking_pump.record("again", turn=1.0, rng=np.random.default_rng(5))
+    large = replace(FAULTS["cylinder"], name="large", smallest=0.1)
+    found = Diagnoser(twin_of(anchor), [SLIPPER, large])(again, [anchor])
+    assert found.state == "healthy" and "slipper+large" in found.probabilities
+    model = found.model
+    areas = model.flows["large"].areas
+    assert np.diff(model.area_ends(SLIPPER, [areas[0]])) > 0.0
+    corner = areas[0] * model.usual_error
+    low, high = model.area_ends(large, [corner])
+    assert 0.0 < high - low < 1e-5
+
+
 def test_the_evidence_is_the_mean_likelihood_over_areas_and_errors(recordings):
     """Of a slipper's leak: against the sum over a fine grid of areas and over all errors at once,
     with the shaft angle and the drift of the mode, to 0.2."""

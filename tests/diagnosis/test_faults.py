@@ -20,6 +20,13 @@ FAULT = Fault("{name}", "two worn slippers", lambda area, piston, pistons: [
     Slipper(area, piston), Slipper(area, piston + 1)], "a user")
 """
 
+SINGLE = """
+from rippletwin.diagnosis.faults.base import Fault
+from rippletwin.pump.faults import Slipper
+
+FAULT = Fault("single", "one worn slipper", lambda area, piston, pistons: {}, "a user")
+"""
+
 
 def test_the_library_has_the_contract_s_faults():
     """Slipper and cylinder are tried by default, in that order; the valve plate on demand."""
@@ -58,6 +65,12 @@ def test_a_user_s_file_is_a_fault(tmp_path):
         ("FAULT = 1", "no Fault"),
         ("raise RuntimeError('broken')", "broken"),
         (OWN.format(name="slipper"), "a second fault"),
+        (OWN.format(name="healthy"), "a fault cannot be called"),
+        (OWN.format(name="slipper+cylinder"), "a fault cannot be called"),
+        (OWN.format(name="own").replace("piston + 1", "1 / 0"), "leaks: fails: ZeroDivision"),
+        (SINGLE.format("Slipper(area, piston)"), "leaks: fails: .*not iterable"),
+        (SINGLE.format("[area]"), "1e-07 is no leak of the pump model"),
+        (SINGLE.format("[]"), "gives no leak"),
     ],
 )
 def test_a_file_that_is_no_fault_is_bad_input(tmp_path, content, words):

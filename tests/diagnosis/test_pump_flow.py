@@ -3,10 +3,13 @@
 Independent truth: the pump simulated with the very leak.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor
+from rippletwin.diagnosis import pump_flow
 from rippletwin.diagnosis.faults.library import FAULTS
 from rippletwin.diagnosis.pump_flow import STEPS, UNCERTAIN, simulate_leak_flow, with_fitted_pump
 from rippletwin.harmonics import peak_amplitudes
@@ -91,12 +94,23 @@ def test_a_pump_known_by_its_pistons_alone_delivers_the_ripple_s_mean_flow():
     volumes eightfold."""
     default = Geometry.from_dict({"pistons": 9})
     flow = 8.0 * default.displacement * 20.0
-    found = Geometry.from_dict(with_fitted_pump(_twin({"pistons": 9}), flow, 20.0).rig.pump)
-    assert found.displacement * 20.0 == pytest.approx(flow)
-    for name, growth in (("pitch_radius", 2), ("port_area", 4), ("dead_volume", 8)):
-        assert getattr(found, name) == pytest.approx(growth * getattr(default, name))
+    twin = _twin({"pistons": 9})
+    rig = replace(twin.rig, displacement=flow / 20.0)  # as recordings with a flow ripple tell it
+    for scaled in (with_fitted_pump(twin, flow / 20.0), with_fitted_pump(Twin(rig))):
+        found = Geometry.from_dict(scaled.rig.pump)
+        assert found.displacement * 20.0 == pytest.approx(flow)
+        for name, growth in (("pitch_radius", 2), ("port_area", 4), ("dead_volume", 8)):
+            assert getattr(found, name) == pytest.approx(growth * getattr(default, name))
+
+
+def test_runs_of_leaking_pumps_are_not_kept():
+    """A pump at many operating points: of each only the healthy runs and the leak's flow stay."""
+    pump_flow._simulated.cache_clear()
+    simulate_leak_flow(PUMP, OIL, 1010.0, 9.1e6, FAULTS["slipper"])
+    assert pump_flow._simulated.cache_info().currsize == 1 + len(pump_flow.NUMBERS)
+    assert pump_flow._leak_flow.cache_info().maxsize
 
 
 def test_a_pump_of_known_geometry_is_left_as_it_is():
     """A ripple's mean flow does not overrule the data sheet."""
-    assert with_fitted_pump(_twin(dict(PUMP)), 1.0, 20.0).rig.pump == PUMP
+    assert with_fitted_pump(_twin(dict(PUMP)), 0.05).rig.pump == PUMP

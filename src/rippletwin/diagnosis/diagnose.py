@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -20,6 +21,7 @@ from rippletwin.diagnosis.line_calibration import calibrate_line
 from rippletwin.diagnosis.pump_calibration import RecalibratedTwin, calibrate_pump, one_each_point
 from rippletwin.diagnosis.pump_flow import rebuild, with_fitted_pump
 from rippletwin.errors import InputError
+from rippletwin.pump.geometry import stated_numbers
 from rippletwin.spectra.frequency_selection import select_fitted_frequencies
 from rippletwin.spectra.observation import Observation, observe, revolutions_of
 from rippletwin.twin.twin import Twin
@@ -112,6 +114,9 @@ def recalibrate_twin(twin: Twin, healthy: Sequence[Recording], read: ReadOnce) -
     lines = [own] if np.array_equal(own.theta, again.theta) else [own, again]
     fitted = (calibrate_pump(line, points, twin.rig.pump) for line in lines)
     tried = [RecalibratedTwin(twin), *fitted]
+    if len(stated_numbers(twin.rig.pump)) > 1:
+        # leaks are those of the lumped pump: a ripple that is given says nothing of its numbers
+        observations = [replace(o, flow_ripple=None) for o in observations]
     return min(tried, key=lambda each: healthy_misfit(each.twin, observations))
 
 

@@ -34,6 +34,7 @@ from rippletwin.spectra.frequency_selection import check_load_table, select_freq
 from rippletwin.twin.twin import Twin
 
 MOST_REPEATS = 2  # healthy recordings beside the anchor whose scatter is looked at
+NO_REPEATS = np.zeros((0, ORDERS + 1), complex)
 DIGITS = 3  # of speed and load pressure at which the pump is simulated
 PRIOR = (0.5, 0.4, 0.1)
 """Prior probabilities of no fault, of one and of two; states of a kind share theirs evenly."""
@@ -55,7 +56,7 @@ class Diagnoser:
     ):
         self.twin, self.faults, self.anchored = twin, tuple(faults), anchored
         self.expected_gain = expected_gain
-        self._learned: dict[tuple[str, ...], tuple[ErrorPrior, list[np.ndarray]]] = {}
+        self._learned: dict[tuple[str, ...], tuple[ErrorPrior, np.ndarray]] = {}
 
     def __call__(self, observation, healthy: Sequence, start: float = 0.0) -> Diagnosis:
         """The diagnosis of a periodic observation, anchored to the first of `healthy`; the others
@@ -80,21 +81,23 @@ class Diagnoser:
         )
 
     def make_model(
-        self, observation, healthy, start: float = 0.0, repeats: Sequence[np.ndarray] = ()
+        self, observation, healthy, start: float = 0.0, repeats: np.ndarray = NO_REPEATS
     ) -> ObservationModel:
         """The observation model of an observation, anchored to a healthy one, at the orders that
-        both have, `ORDERS` at most. `start` and `repeats` as in `ObservationModel`.
+        the bands of both have, `ORDERS` at most. `start` and `repeats` as in `ObservationModel`.
 
         Raises InputError as `check_observations`.
         """
         check_observations([observation, healthy], self.twin.rig)
-        count = min(len(healthy.orders), len(observation.orders), ORDERS)
-        healthy, observation = (select_frequencies(o, slice(count)) for o in (healthy, observation))
+        orders = _common_orders(observation, healthy)
+        healthy, observation = (
+            select_frequencies(o, np.isin(o.orders, orders)) for o in (healthy, observation)
+        )
         pressure = _rounded(load_pressure_of(self.twin, observation))
         speed_rpm = _rounded(60.0 * observation.speed_hz)
         given = healthy.flow_ripple
-        mean_flow = None if given is None else float(np.mean(given.flow))
-        twin = with_fitted_pump(self.twin, mean_flow, healthy.speed_hz)
+        displacement = None if given is None else float(np.mean(given.flow)) / healthy.speed_hz
+        twin = with_fitted_pump(self.twin, displacement)
         pump, fluid = twin.rig.pump, twin.rig.fluid
         ripple = simulate_healthy_pump(pump, fluid, speed_rpm, pressure)
         line = DriftingLine(twin, observation, ripple)
@@ -108,34 +111,46 @@ class Diagnoser:
         }
         return ObservationModel(observation, anchor, line, flows, repeats, start)
 
-    def _learn_errors(self, healthy: Sequence) -> tuple[ErrorPrior, list[np.ndarray]]:
-        """What healthy repeats say of the errors, and changes of the pump's flow from one of them
-        to the next."""
+    def _learn_errors(self, healthy: Sequence) -> tuple[ErrorPrior, np.ndarray]:
+        """What healthy repeats say of the errors, and changes (R, `ORDERS` + 1) of the pump's flow
+        from one of them to the next, m3/s, by shaft order; 0 at orders that a repeat lacks."""
         prior = ErrorPrior()
         if not self.anchored:  # the twin's errors, which repeats share, are in the anchor
-            return prior, []
+            return prior, NO_REPEATS
         first, *others = healthy
         repeats = [o for o in others if not distance_between(o, first)][:MOST_REPEATS]
-        found = [compare_healthy(self.make_model(o, first), prior) for o in repeats]
-        scatters = [scatter for scatter, _ in found]
-        scatter = float(np.exp(np.mean(np.log([prior.scatter, *scatters]))))
-        return replace(prior, scatter=scatter), [change for _, change in found]
+        scatters = [prior.scatter]
+        changes = np.zeros((len(repeats), ORDERS + 1), complex)
+        for change, repeat in zip(changes, repeats):
+            model = self.make_model(repeat, first)
+            scatter, change[model.orders] = compare_healthy(model, prior)
+            scatters.append(scatter)
+        return replace(prior, scatter=float(np.exp(np.mean(np.log(scatters))))), changes
 
 
 def check_observations(observations: Sequence, rig: Rig) -> None:
-    """Raise InputError where a periodic observation ends below the first order of the pistons, and
-    as `check_load_table`: no twin can diagnose it."""
-    pistons = rig.pump["pistons"]
+    """Raise InputError where the bands of the first of the periodic observations and of another one
+    have no order of the pistons in common, and as `check_load_table`: no twin can diagnose it."""
+    pistons, first = rig.pump["pistons"], observations[0]
     for each in observations:
-        if each.orders[-1] < pistons:
+        if not np.any(_common_orders(first, each) % pistons == 0):
+            both = "" if each is first else f" together with that of recording {first.label}"
             raise InputError(
                 f"recording {each.label}",
-                "max_frequency_hz",
-                f"the band ends at {each.frequency_hz[-1]:.4g} Hz, below the piston frequency, "
-                f"{pistons * each.speed_hz:.4g} Hz, which a diagnosis needs",
-                "Give a higher one, best several times the piston frequency, or leave it out",
+                "min_frequency_hz, max_frequency_hz",
+                f"the band, {each.min_frequency_hz:.4g} to {each.frequency_hz[-1]:.4g} Hz{both}, "
+                f"has no multiple of the piston frequency, {pistons * each.speed_hz:.4g} Hz, which "
+                "a diagnosis needs",
+                "Give a wider band, best to several times the piston frequency",
             )
     check_load_table(observations, rig)
+
+
+def _common_orders(one, other) -> np.ndarray:
+    """The shaft orders (F,) that the bands of two periodic observations have, `ORDERS` at most."""
+    own = (o.orders[o.frequency_hz >= o.min_frequency_hz] for o in (one, other))
+    common = np.intersect1d(*own)
+    return common[common <= ORDERS]
 
 
 def _rounded(value: float) -> float:
@@ -149,5 +164,7 @@ def _probabilities(weighed: Sequence[StateEvidence]) -> dict[str, float]:
     log_posterior = np.array(
         [w.log_evidence + np.log(PRIOR[n] / sizes.count(n)) for w, n in zip(weighed, sizes)]
     )
+    # a state whose likelihood overflows explains nothing
+    log_posterior[~np.isfinite(log_posterior)] = -np.inf
     chances = np.exp(log_posterior - logsumexp(log_posterior))
     return {state_name(w.state): float(p) for w, p in zip(weighed, chances)}

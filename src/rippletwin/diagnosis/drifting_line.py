@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from rippletwin.case.model import FlowRipple
+from rippletwin.diagnosis.pump_flow import rebuild
 from rippletwin.twin.forward_model import ForwardModel
 from rippletwin.twin.twin import Twin
 
@@ -28,13 +29,10 @@ class DriftingLine:
     """
 
     def __init__(self, twin: Twin, observation, ripple: FlowRipple):
-        self.twin = twin
+        self.twin = twin = _free_to_drift(twin)
         point = replace(observation, flow_ripple=ripple, source="nominal")
         self._forward = ForwardModel(twin, [point])
-        self._moved = {
-            name: [twin.index[p.name] for p in twin.parameters if p.name.split("[")[0] == name]
-            for name in DRIFTS
-        }
+        self._moved = {name: _indices(twin, name) for name in DRIFTS}
 
     @property
     def drifts(self) -> tuple[str, ...]:
@@ -70,3 +68,20 @@ class DriftingLine:
                 value = prior.value(theta[k]) * np.exp(DRIFTS[name] * amount)
                 theta[k] = prior.coordinate(value)
         return theta
+
+
+def _free_to_drift(twin: Twin) -> Twin:
+    """The twin with a width for the priors of what drifts: what the data sheet calls exact can be
+    another state of the line in another recording."""
+    exact = {name: sd for name, sd in DRIFTS.items() if not getattr(twin.rig.uncertainty, name)}
+    if not exact:
+        return twin
+    rig = replace(twin.rig, uncertainty=replace(twin.rig.uncertainty, **exact))
+    theta = twin.theta.copy()
+    theta[[k for name in exact for k in _indices(twin, name)]] = 0.0
+    return rebuild(twin, rig, theta=theta)
+
+
+def _indices(twin: Twin, name: str) -> list[int]:
+    """Where a twin's theta has the parameters of a name, those of all segments."""
+    return [k for k, p in enumerate(twin.parameters) if p.name.split("[")[0] == name]

@@ -8,7 +8,6 @@ is taken again where the digest is the same; names and ages of files do not matt
 from __future__ import annotations
 
 import importlib.metadata
-import inspect
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, is_dataclass
@@ -147,9 +146,10 @@ def _effect_files(twin: Twin) -> list[bytes]:
 
 
 def _plain_fault(fault: Fault) -> list:
-    """What of a fault an answer depends on: its numbers, and the file that defines its leaks."""
-    numbers = [getattr(fault, f.name) for f in fields(fault) if f.name != "leaks"]
-    return [*numbers, Path(inspect.getfile(fault.leaks)).read_bytes()]
+    """What of a fault an answer depends on: its numbers, and the user's file that defines it; the
+    library's are part of the program."""
+    numbers = [getattr(fault, f.name) for f in fields(fault) if f.name not in ("leaks", "file")]
+    return numbers if fault.file is None else [*numbers, Path(fault.file).read_bytes()]
 
 
 @cache

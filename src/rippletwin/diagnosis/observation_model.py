@@ -37,6 +37,8 @@ MIN_CHANGE_ERROR = 0.04  # relative, of the change by a leak behind the best of 
 MAX_SHARE = 2.0  # of a measured change over the predicted one, up to which errors grow with it
 MAX_USUAL_ERROR = 0.3  # relative, of a leak's change behind the worst of twins
 ALIKE = 8.0  # readings whose errors go together: those of a line are as wide as its resonances
+LEAST_WIDTH = 1e-6  # of a prior on the logarithm of an area
+MOST_DRIFT = 10.0  # standard deviations, beyond which a line's response is not extrapolated
 WHOLE = slice(None)
 BETWEEN = 0.01  # share of a power whose errors show at orders that have none of it
 
@@ -44,9 +46,9 @@ BETWEEN = 0.01  # share of a power whose errors show at orders that have none of
 class ObservationModel:
     """The recording `observation`, its anchor and line, and the leaks' flows by fault name.
 
-    `repeats` are changes (F',) of the pump's flow, m3/s, by which healthy recordings differ from
-    the anchor. `start`, in revolutions, is how far the shaft turns from the recording's first
-    sample to where the observation's shaft angle counts from.
+    `repeats` (R, orders from 0) are changes of the pump's flow, m3/s, by which healthy recordings
+    differ from the anchor. `start`, in revolutions, is how far the shaft turns from the
+    recording's first sample to where the observation's shaft angle counts from.
     """
 
     def __init__(
@@ -55,7 +57,7 @@ class ObservationModel:
         anchor: Anchor,
         line: DriftingLine,
         flows: Mapping[str, LeakFlow],
-        repeats: Sequence[np.ndarray] = (),
+        repeats: np.ndarray,
         start: float = 0.0,
     ):
         self.start = start
@@ -63,10 +65,7 @@ class ObservationModel:
         self.sensors = len(observation.values)
         self.anchor, self.line, self.flows = anchor, line, flows
         self.orders = anchor.orders
-        self._repeats = np.zeros((len(repeats), len(self.orders)), complex)
-        for known, change in zip(self._repeats, repeats):
-            count = min(len(known), len(change))
-            known[:count] = change[:count]
+        self._repeats = repeats[:, self.orders]
         self.pistons = int(line.twin.rig.pump["pistons"])
         self._waves = _cosines(self.observation.frequency_hz, CHANGE_WAVES)
         self._expected = np.hypot(MIN_CHANGE_ERROR, [anchor.misfit, anchor.line_misfit])
@@ -111,7 +110,8 @@ class ObservationModel:
         areas = self.flows[fault.name].areas
         low = max([areas[0], *(self.usual_error * other for other in beside)])
         high = min([areas[-1], *(other / self.usual_error for other in beside)])
-        return float(np.log(low)), float(np.log(high))
+        # beside a leak that leaves one area only, rounding would leave none
+        return float(np.log(low)), max(float(np.log(high)), float(np.log(low)) + LEAST_WIDTH)
 
     def state_of_line(self, hypothesis: Hypothesis) -> np.ndarray:
         """Drift (D,), standard deviations, with what the leaks' change of mean flow makes of an
@@ -276,7 +276,7 @@ class ObservationModel:
             hypothesis = replace(
                 hypothesis,
                 turn=hypothesis.turn + TURN_SD * amplitudes[0],
-                drift=amplitudes[1 : 1 + len(self.line.drifts)],
+                drift=np.clip(amplitudes[1 : 1 + len(self.line.drifts)], -MOST_DRIFT, MOST_DRIFT),
             )
         self.linearise_line(hypothesis)
         return hypothesis

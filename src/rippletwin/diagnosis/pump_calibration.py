@@ -125,7 +125,9 @@ def _measured_flow(twin: Twin, observation) -> _Flow:
     response = DriftingLine(twin, observation, ripple).response()
     flow, _ = estimate_flow_at_pump(response, observation.values)
     orders = np.asarray(observation.orders)
-    used = (orders % twin.rig.pump["pistons"] == 0) & (observation.frequency_hz <= HIGHEST_HZ)
+    frequency_hz, low = observation.frequency_hz, observation.min_frequency_hz
+    used = orders % twin.rig.pump["pistons"] == 0
+    used &= (low <= frequency_hz) & (frequency_hz <= HIGHEST_HZ)
     flow = flow[used]
     least = LEAST_ERROR * np.sqrt(np.mean(np.abs(flow) ** 2))
     error = np.hypot(RELATIVE_ERROR * np.abs(flow), least)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.interpolate import CubicSpline, make_interp_spline
@@ -27,6 +27,7 @@ from rippletwin.twin.twin import Twin
 STEPS = 3072  # a revolution: the change moves by 0.3 % when they are doubled, 1 % at 1e-8 m2
 NODES = 21  # leak areas that are simulated, a factor of 1.5 apart
 ORDERS = 600  # highest shaft order whose flow is kept
+KEPT_FLOWS, KEPT_RIPPLES = 64, 256  # 0.5 and 0.3 MB each
 SLOPE_NODES = slice(2, None, 4)  # of these areas, at which slopes by the pump's numbers are taken
 UNCERTAIN = {
     "bulk_modulus": 0.08,
@@ -40,16 +41,17 @@ TIMING_SD_DEG = 0.5  # of the port plate
 NUMBERS = (*UNCERTAIN, "port_timing_deg")  # in the order of `moved_pumps`
 
 
-def with_fitted_pump(twin: Twin, mean_flow: float | None = None, speed_hz: float = 1.0) -> Twin:
+def with_fitted_pump(twin: Twin, displacement: float | None = None) -> Twin:
     """The twin with its pump's numbers as fitted, and neither they nor shaft angles and states of
     recordings parameters: those between two recordings belong to the diagnosis.
 
-    Where the data sheet gives the number of pistons alone, the default pump is scaled to deliver
-    `mean_flow`, m3/s, at `speed_hz`, rev/s.
+    Where the data sheet gives the number of pistons alone, the default pump is scaled to a
+    `displacement`, m3 a revolution, by default that of the recordings' flow ripples.
     """
     pump = stated_numbers(twin.rig.pump)
-    if set(pump) == {"pistons"} and mean_flow is not None:
-        pump = _default_pump(pump, mean_flow / speed_hz)
+    displacement = displacement or twin.rig.displacement
+    if set(pump) == {"pistons"} and displacement is not None:
+        pump = _default_pump(pump, displacement)
     own = {"viscosity_slope", *(p.name for p in twin.parameters if p.place == "pump")}
     own.update(f"{kind}[{label}]" for label in twin.labels for kind in ("angle", "state"))
     fitted = stated_numbers(twin.fitted_pump())
@@ -71,6 +73,7 @@ def rebuild(
         source_sd=twin.source_sd,
         theta=theta,
         guessed_load=twin.guessed_load,
+        absolute_gains=twin.absolute_gains,
     )
 
 
@@ -155,22 +158,24 @@ class LeakFlow:
 def simulate_healthy_pump(
     pump: Mapping, fluid: Fluid, speed_rpm: float, pressure: float
 ) -> PumpRipple:
-    """Ripple of the healthy pump at r/min into a pressure, Pa; simulations are kept.
+    """Ripple of the healthy pump at r/min into a pressure, Pa; the last simulations are kept.
 
     Raises ArithmeticError where the chamber equations cannot be solved.
     """
-    return _simulated(_key(pump), fluid, float(speed_rpm), float(pressure), None, 0.0)
+    return _simulated(_key(pump), fluid, float(speed_rpm), float(pressure))
 
 
 def simulate_leaking_pump(
     pump: Mapping, fluid: Fluid, speed_rpm: float, pressure: float, fault: Fault, area: float
 ) -> PumpRipple:
-    """Ripple of the pump with a fault of this leak area, m2, at piston 0; simulations are kept.
+    """Ripple of the pump with a fault of this leak area, m2, at piston 0.
 
     Raises ArithmeticError where the chamber equations cannot be solved.
     """
-    point = _key(pump), fluid, float(speed_rpm), float(pressure)
-    return _simulated(*point, fault, float(area))
+    numbers = stated_numbers(pump)
+    leaks = list(fault.leaks(float(area), 0, numbers["pistons"]))
+    outlet = ConstantPressure(float(pressure))
+    return simulate(numbers, fluid, float(speed_rpm), outlet, leaks, min_steps=STEPS)
 
 
 def leak_velocity(pump: Mapping, fluid: Fluid, pressure: float) -> float:
@@ -182,14 +187,14 @@ def leak_velocity(pump: Mapping, fluid: Fluid, pressure: float) -> float:
 def simulate_leak_flow(
     pump: Mapping, fluid: Fluid, speed_rpm: float, pressure: float, fault: Fault
 ) -> LeakFlow:
-    """`LeakFlow` of a fault at r/min into a pressure, Pa; it is kept.
+    """`LeakFlow` of a fault at r/min into a pressure, Pa; the last ones are kept.
 
     Raises ArithmeticError where the chamber equations cannot be solved.
     """
     return _leak_flow(_key(pump), fluid, float(speed_rpm), float(pressure), fault)
 
 
-@cache
+@lru_cache(KEPT_FLOWS)
 def _leak_flow(
     key: tuple, fluid: Fluid, speed_rpm: float, pressure: float, fault: Fault
 ) -> LeakFlow:
@@ -228,11 +233,6 @@ def _key(pump: Mapping) -> tuple:
     return tuple(sorted(stated_numbers(pump).items()))
 
 
-@cache
-def _simulated(
-    pump: tuple, fluid: Fluid, speed_rpm: float, pressure: float, fault: Fault | None, area: float
-) -> PumpRipple:
-    numbers = dict(pump)
-    leaks = None if fault is None else list(fault.leaks(area, 0, numbers["pistons"]))
-    outlet = ConstantPressure(pressure)
-    return simulate(numbers, fluid, speed_rpm, outlet, leaks, min_steps=STEPS)
+@lru_cache(KEPT_RIPPLES)
+def _simulated(pump: tuple, fluid: Fluid, speed_rpm: float, pressure: float) -> PumpRipple:
+    return simulate(dict(pump), fluid, speed_rpm, ConstantPressure(pressure), min_steps=STEPS)

@@ -94,7 +94,8 @@ def simulate_fault(
 
 
 def _with_pump(twin: Twin, speed_hz: float, load_pressure: float, warnings: list) -> Twin:
-    """The twin with its pump as fitted, or the default pump that delivers what its load passes."""
+    """The twin with its pump as fitted, or the default pump that delivers the mean of the flow
+    ripples that recordings stated, or else what its load passes."""
     load, pump = twin.rig.load, twin.rig.pump
     if "pistons" not in pump:
         raise InputError(
@@ -110,12 +111,19 @@ def _with_pump(twin: Twin, speed_hz: float, load_pressure: float, warnings: list
         )
     if len(stated_numbers(pump)) > 1:
         return with_fitted_pump(twin)
+    displacement, giver = twin.rig.displacement, "flow ripple"
+    if displacement is None:
+        condition = OperatingCondition(
+            speed_hz=speed_hz, load_pressure=load_pressure, source="free"
+        )
+        displacement, giver = (
+            operating_point(twin.rig, condition, None).mean_flow / speed_hz,
+            "load",
+        )
     warnings.append(
-        "only the number of pistons is known of the pump: a default pump of the load's mean flow "
-        "takes its place, and its leak is as uncertain as that"
+        f"only the number of pistons is known of the pump: a default pump of the {giver}'s mean "
+        "flow takes its place, and its leak is as uncertain as that"
     )
-    condition = OperatingCondition(speed_hz=speed_hz, load_pressure=load_pressure, source="free")
-    mean_flow = operating_point(twin.rig, condition, None).mean_flow
-    if not np.isfinite(mean_flow):
+    if not np.isfinite(displacement):
         raise InputError("twin", "pump", "gives no mean flow", "Give the geometry of the pump")
-    return with_fitted_pump(twin, mean_flow, speed_hz)
+    return with_fitted_pump(twin, displacement)

@@ -97,7 +97,8 @@ def _of_residual(
 
 def _element(model: ObservationModel, residual, variance, of_pump, of_line) -> str | None:
     """ "source" where what one flow at the pump accounts for is unlike, the sensor that has nearly
-    all of the residual, or "line"; None for a single sensor, which cannot tell."""
+    all of the residual, or "line". A single sensor tells the line by its drift alone: None where
+    the residual is unlike."""
     if of_pump < of_line:
         return "source" if model.sensors > 1 else None
     at_sensors = model.division.at_sensors(residual)

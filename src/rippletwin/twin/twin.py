@@ -89,6 +89,8 @@ class Twin:
     theta : coordinates of the twin's own values, (P,); nominal by default.
     guessed_load : whether the orifice's coefficient is only guessed; by default it is where an
         observation has neither a flow ripple nor a coefficient from which the mean flow follows.
+    absolute_gains : whether the gain of the first sensor is a parameter too, where gains are; by
+        default where an observation's source is not free.
     uncertain_pump : whether numbers of the pump are parameters. They can be only where recordings
         have a nominal source and the data sheet gives the pump's geometry, from which the lumped
         model calculates how they change the ripple.
@@ -111,6 +113,7 @@ class Twin:
         source_sd: float = SOURCE_SD,
         theta: np.ndarray | None = None,
         guessed_load: bool | None = None,
+        absolute_gains: bool | None = None,
         uncertain_pump: bool = False,
         changing_state: bool = False,
         reference: Sequence[str] | None = None,
@@ -130,6 +133,7 @@ class Twin:
                 o.source == "free" and o.flow_ripple is None for o in observations
             )
         self.guessed_load = bool(guessed_load)
+        self.absolute_gains = bool(self.labels) if absolute_gains is None else absolute_gains
         self.uncertain_pump = bool(uncertain_pump and self.labels and len(rig.pump) > 1)
         self.changing_state = bool(changing_state and len(self.labels) > 1)
         self.reference = reference
@@ -137,7 +141,7 @@ class Twin:
         self.parameters = (
             *line_parameters(rig),
             *load_parameters(rig, self.guessed_load),
-            *gain_parameters(rig, bool(self.labels)),
+            *gain_parameters(rig, self.absolute_gains),
             *(pump_parameters(rig) if self.uncertain_pump else ()),
             *(angle_parameter(label) for label in self.labels),
             *(state_parameters(self.labels) if self.changing_state else ()),
@@ -281,6 +285,7 @@ class Twin:
             "effects": self.effects,
             "source_sd": self.source_sd,
             "guessed_load": self.guessed_load,
+            "absolute_gains": self.absolute_gains,
             "uncertain_pump": self.uncertain_pump,
             "changing_state": self.changing_state,
             "reference": self.reference,

@@ -14,6 +14,7 @@ from rippletwin.pump.faults import Cylinder, Slipper
 SMALLEST, LARGEST = 0.002, 4.0
 """Ends of a log-uniform prior on a leak's flow under the load pressure, over the mean flow of one
 piston: from below 1 % of a healthy ripple to several times that ripple."""
+OTHER_STATES = ("healthy", "unlike", "unknown")
 
 
 @dataclass(frozen=True)
@@ -28,8 +29,9 @@ class Fault:
                   over the mean flow of one piston
     one_piston    whether it is at one piston; else all pistons are alike
     by_default    whether it is tried unless asked for otherwise
+    file          the user's file that defines it; None in the library
 
-    Raises ValueError unless 0 < smallest < largest.
+    Raises ValueError unless 0 < smallest < largest, and for the name of another state.
     """
 
     name: str
@@ -40,7 +42,12 @@ class Fault:
     largest: float = LARGEST
     one_piston: bool = True
     by_default: bool = True
+    file: str | None = None
 
     def __post_init__(self):
+        if self.name in OTHER_STATES or "+" in self.name:
+            raise ValueError(
+                f"a fault cannot be called {self.name!r}: other states have such names"
+            )
         if not 0.0 < self.smallest < self.largest:
             raise ValueError(f"fault {self.name!r}: 0 < smallest < largest must hold")

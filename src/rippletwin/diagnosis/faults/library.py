@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from rippletwin.case.python_file import read_object
 from rippletwin.diagnosis import faults
 from rippletwin.diagnosis.faults.base import Fault
 from rippletwin.errors import InputError
+from rippletwin.pump.faults import Cylinder, Slipper
 
 
 def _discover() -> dict[str, Fault]:
@@ -31,6 +33,8 @@ FAULTS: dict[str, Fault] = _discover()
 """Name -> fault, those that are not tried by default included."""
 
 
+TRIED = 1e-7, 0, 9  # area, piston and number of pistons of a leak that a user's fault is tried at
+LEAKS = "For area, piston and number of pistons it must return a list of Slipper and Cylinder"
 FAULT_OF = {"S": "slipper", "C1": "cylinder", "C2": "cylinder"}
 """Class of the networks -> fault; the healthy class H has none."""
 
@@ -59,8 +63,18 @@ def find_fault(asked: str | Path) -> Fault | None:
 
 
 def read_fault(path: str | Path) -> Fault:
-    """The `FAULT` of a user's Python file; raises InputError where there is none."""
-    return read_object(path, "FAULT", Fault, "fault", ", ".join(FAULTS))
+    """The `FAULT` of a user's Python file; raises InputError where there is none, and where its
+    leaks are none of the pump model's."""
+    fault = read_object(path, "FAULT", Fault, "fault", ", ".join(FAULTS))
+    try:
+        leaks = list(fault.leaks(*TRIED))
+    except Exception as error:  # a user's code may raise anything
+        raise InputError(path, "FAULT.leaks", f"fails: {error!r}", LEAKS) from error
+    strangers = [leak for leak in leaks if not isinstance(leak, (Slipper, Cylinder))]
+    if strangers or not leaks:
+        found = f"{strangers[0]!r} is no leak of the pump model" if strangers else "gives no leak"
+        raise InputError(path, "FAULT.leaks", found, LEAKS)
+    return replace(fault, file=str(path))
 
 
 def states_of(chosen: Sequence[Fault]) -> tuple[tuple[Fault, ...], ...]:
