@@ -193,6 +193,15 @@ def test_the_papers_pareto_form_agrees_with_the_default():
     assert not worse.any()
 
 
+def test_a_pareto_form_of_one_objective_has_one_member():
+    """With one sensor the least of its misfits is the whole set."""
+    rig = paper_rig(sensors=1, segments=1)
+    _, data = recordings(rig, [point(rig, highest_hz=1500.0)], 8)
+    twin = Twin(rig, data)
+    pareto = calibrate_pareto(twin, data, population=6, generations=2)
+    assert pareto.objectives.shape == (1, 1) and pareto.theta.shape == (1, len(twin.theta))
+
+
 def test_command_line_writes_a_twin_that_can_be_read(tmp_path, capsys):
     """A tube's input impedance computed from its closed formula goes in as a case folder; twin.json
     comes out with the tube's delay, and the report says how good the fit is.

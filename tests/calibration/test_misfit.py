@@ -13,6 +13,39 @@ from rippletwin.twin.twin import Twin
 from synthetic_recordings import point, recordings
 
 
+def test_impedances_count_beside_pressures():
+    """A reflection coefficient 40 % off beside pressures 10 % off: either is a quantity of its own,
+    though pressures are a million times larger in their unit. The Pareto form has an objective of
+    each sensor and one of the impedance."""
+    rig = paper_rig()
+    _, (pressures,) = recordings(rig, [point(rig)], seed=4)
+    impedance = replace(
+        pressures,
+        kind="input_impedance",
+        label="z",
+        source="known",
+        orders=None,
+        speed_hz=None,
+        flow_ripple=None,
+        sensors=(),
+        values=np.ones((1, len(pressures.orders)), complex),
+        covariance=1e-3 * pressures.covariance[:, :1, :1],
+    )
+    both = [pressures, impedance]
+    twin = Twin(rig, both, guessed_load=False)
+    model = Likelihood(twin, both)
+    predicted = model.by_observation(model.predict(twin.theta))
+    made, reflection = (part.predicted / share for part, share in zip(predicted, (0.9, 0.6)))
+    measured = (1.0 + reflection) / (1.0 - reflection)
+    off = [replace(pressures, values=made), replace(impedance, values=measured, normalised=True)]
+    model = Likelihood(twin, off)
+    found = measure_misfit(model, twin.theta)
+    by_sensor = dict.fromkeys([s.name for s in rig.sensors], 0.1) | {"reflection": 0.4}
+    assert found.relative_by_sensor == pytest.approx(by_sensor)
+    assert found.relative == pytest.approx(np.sqrt((0.1**2 + 0.4**2) / 2))
+    assert sensor_misfits(model, twin.theta) == pytest.approx([0.01, 0.01, 0.01, 0.16])
+
+
 def test_theil_from_harmonics_is_theil_from_the_time_signals():
     """Theil's U of the complex harmonics equals root-mean-square of the difference over the sum of
     the root-mean-squares of the signals that they make (Parseval).

@@ -21,7 +21,7 @@ from rippletwin.explanation.fit_starts import transfer_theta, weak_effect_starts
 from rippletwin.twin.parameters import coordinates
 from rippletwin.twin.twin import Twin
 from synthetic_effects import VOLUME
-from synthetic_observations import make
+from synthetic_observations import POINTS, make
 
 
 @pytest.mark.parametrize("place", [1.3, 4.4, 7.7])
@@ -83,6 +83,20 @@ def test_starts_behind_a_free_source_are_ranked_by_ratios_between_sensors():
     (true, other), stronger = misfits
     assert true < 0.01 * other
     np.testing.assert_allclose(stronger, misfits[0], rtol=1e-6)
+
+
+def test_starts_behind_a_known_source_are_ranked_with_their_phase():
+    """A reflection coefficient turned by half a radian, as a wrong wave speed turns it, misses by
+    the chord of that angle: the source of an impedance has no free phase."""
+    bench, (o, *_), _ = make(np.random.default_rng(4), sensors=1, points=POINTS[:1])
+    o = replace(
+        o, kind="input_impedance", source="known", orders=None, flow_ripple=None, normalised=True
+    )
+    twin = Twin(bench, [o], guessed_load=False)
+    turned = np.exp(0.5j) * Posterior(twin, [o]).predict(twin.theta)
+    o = replace(o, values=(1.0 + turned) / (1.0 - turned))
+    misfit, _ = align_shaft_angles(Posterior(twin, [o]), twin.theta)
+    assert misfit == pytest.approx(abs(1.0 - np.exp(0.5j)) ** 2, rel=1e-6)
 
 
 def test_modes_near_a_better_one_are_dropped():

@@ -34,6 +34,26 @@ def test_source_free_residual_ignores_the_amplitude_of_the_source():
     )
 
 
+def test_independent_errors_leave_each_frequency_alone():
+    """What a correction at one frequency does to the whitened residual is at that frequency, behind
+    a nominal source too, whose ripple may be of another size."""
+    _, observations, truth = make(np.random.default_rng(3), points=POINTS[:2])
+    posterior = Posterior(truth, observations)
+    prediction = posterior.predict(truth.theta)
+    posterior.estimate_errors(prediction, truth.theta)
+    slopes = np.zeros((1, *prediction.shape), complex)
+    slopes[..., 7] = prediction[:, 7]
+
+    def elsewhere():
+        _, columns = posterior.whiten_slopes(prediction, slopes)
+        whitened = np.abs(columns.reshape(2, *prediction.shape)).max(axis=(0, 1))
+        return np.delete(whitened, 7).max() / whitened[7]
+
+    assert elsewhere() > 1e-3
+    posterior.make_errors_independent(prediction)
+    assert elsewhere() < 1e-12
+
+
 def test_log_likelihood_is_that_of_the_whole_covariance_matrix():
     """Sum of squares and log determinant of the whitened residual equal those of one dense Gaussian
     with noise, model error and the source's error (independent, smooth, of size) over all sensors,

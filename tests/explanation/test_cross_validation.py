@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rippletwin.calibration.misfit import Score
+from rippletwin.errors import InputError
 from rippletwin.explanation.checks import cross_validation
 from rippletwin.explanation.checks.cross_validation import Validation, find_disagreement, make_folds
 from rippletwin.explanation.fit_jobs import (
@@ -17,6 +18,7 @@ from rippletwin.explanation.fit_jobs import (
     job_from,
 )
 from rippletwin.explanation.thresholds import MAX_DISAGREEMENT
+from rippletwin.spectra.frequency_selection import select_frequencies
 from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.twin import Twin
 from synthetic_effects import TRUTH, VOLUME
@@ -106,6 +108,26 @@ def test_a_gas_is_no_volume_of_oil(gas):
     ]
     found = find_disagreement(whole, parts, "line_volume@")
     assert (found.deviations > MAX_DISAGREEMENT) == gas
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 5, 9])
+def test_folds_of_few_frequencies_leave_some_to_fit(count):
+    """Each frequency is held out by one of the two folds and fitted by the other."""
+    _, (observation, *_), _ = make(np.random.default_rng(2), points=POINTS[:1])
+    few = select_frequencies(observation, slice(count))
+    held_out = []
+    for fold in make_folds(Workers(None, [few])):
+        ((fitted,), (left,)) = fold.fitted, fold.held_out
+        assert len(fitted.frequency_hz) and len(left.frequency_hz)
+        held_out += list(left.frequency_hz)
+    assert sorted(held_out) == list(few.frequency_hz)
+
+
+def test_a_single_frequency_is_refused():
+    """Nothing can be held out of it."""
+    _, (observation, *_), _ = make(np.random.default_rng(2), points=POINTS[:1])
+    with pytest.raises(InputError, match="one frequency"):
+        make_folds(Workers(None, [select_frequencies(observation, slice(1))]))
 
 
 def test_a_fold_of_a_spectrum_says_which_eighths_it_leaves_out():

@@ -27,9 +27,11 @@ ONE_PRESSURE = ((1000, 9.5e6), (1200, 9.5e6))
 TWO_PRESSURES = ((1000, 9.5e6), (1200, 2e6))
 
 
-def found(sensors=2, points=ONE_PRESSURE, source="nominal"):
+def found(sensors=2, points=ONE_PRESSURE, source="nominal", noise=2e3):
     """Name -> what recordings of the paper's line can tell of an effect."""
-    rig, observations, _ = make(np.random.default_rng(0), sensors=sensors, points=points)
+    rig, observations, _ = make(
+        np.random.default_rng(0), sensors=sensors, points=points, noise=noise
+    )
     observations = [replace(o, source=source) for o in observations]
     return {d.effect: d for d in expect_discriminations(rig, observations)}
 
@@ -52,6 +54,13 @@ def test_a_free_source_hides_what_is_at_the_pump(nominal):
     the first; with a nominal source something of the same effect is seen."""
     free = found(source="free")["source_impedance"]
     assert free.evidence < 0.01 < 1 < nominal["source_impedance"].evidence
+
+
+def test_noise_hides_effects_behind_a_free_source_too():
+    """A line volume that two quiet sensors notice is lost in noise as large as the ripple: the
+    readings are as large as in the recordings, not those of a unit flow."""
+    quiet, loud = (found(source="free", noise=sd)["line_volume"].evidence for sd in (2e3, 5e7))
+    assert loud < 0.01 * quiet
 
 
 def test_air_needs_a_second_pressure(nominal):

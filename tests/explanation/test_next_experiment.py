@@ -11,6 +11,7 @@ from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.frequency_continuation import refine
 from rippletwin.explanation.verdict import next_experiment
 from rippletwin.explanation.verdict.candidate_recordings import (
+    _at_operating_point,
     further_sensors,
     list_candidate_recordings,
 )
@@ -21,6 +22,7 @@ from rippletwin.explanation.verdict.next_experiment import (
     propose_sensor_position,
     transfer_twin,
 )
+from rippletwin.harmonics import flow_harmonics
 from rippletwin.twin.effects.base import Place
 from rippletwin.twin.effects.library import EFFECTS
 from rippletwin.twin.twin import Twin
@@ -140,6 +142,18 @@ def test_a_rival_with_another_pump_is_expected_to_lose(uncertain_pump):
     )
     assert expected_loss(fit, rival, rig, observation) > 1.0
     assert expected_loss(fit, fit, rig, observation) < 1e-6
+
+
+def test_a_proposed_recording_is_modulated_once(uncertain_pump):
+    """A shaft that turns unevenly: the ripple at another speed is that of the recording in
+    proportion to the speed, at every harmonic."""
+    fit, (near, *_) = uncertain_pump
+    near = replace(near, modulation=0.02 + 0.0j)
+    own = fit.twin.operating_point(near).ripple
+    new = _at_operating_point(fit.twin, near, 1.1 * near.speed_hz, near.load_pressure)
+    ripple = fit.twin.operating_point(new).ripple
+    orders = 9 * np.arange(1, 20)
+    assert np.allclose(flow_harmonics(ripple, orders), 1.1 * flow_harmonics(own, orders))
 
 
 def test_the_scaled_ripple_keeps_everything_but_its_size(uncertain_pump):

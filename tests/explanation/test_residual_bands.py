@@ -90,6 +90,23 @@ def test_a_burst_at_angle_0_gives_two_parts_of_one_interval():
     assert first[1] + 40.0 - last[0] < 10.0
 
 
+@pytest.mark.parametrize("source", ["nominal", "free"])
+def test_a_free_source_has_no_shaft_angle(monkeypatch, source):
+    """The same residual, a burst, of a source whose shaft angle is fitted and of a free one."""
+    orders = 9 * np.arange(1, 27)
+    values = np.exp(-0.5 * (2 * np.pi * np.arange(1, 27) / 40.0) ** 2)[None] + 0j
+    observation = SimpleNamespace(label="a", orders=orders, source=source, values=values)
+    posterior = SimpleNamespace(
+        observations=[observation],
+        forward=SimpleNamespace(slices=[slice(None)]),
+        predict=np.zeros_like,
+    )
+    monkeypatch.setattr(residual_bands, "_posterior", lambda *_: posterior)
+    fit = SimpleNamespace(twin=SimpleNamespace(theta=values, index={}))
+    found = residual_bands.residual_crank_angles(fit, [observation])
+    assert bool(found) == (source == "nominal")
+
+
 def test_a_single_harmonic_has_no_angle():
     """A residual of one harmonic has the same envelope at all angles, hence no interval."""
     wave = np.exp(2j * np.pi * 5 * np.arange(360) / 360)

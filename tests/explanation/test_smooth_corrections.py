@@ -131,6 +131,12 @@ def test_a_line_of_one_segment_is_that_segment():
     assert own == ("segment series", 0) and own in elements_of(single, [])
 
 
+def test_an_effect_at_a_segment_is_that_segment_whatever_it_is_said_to_act_on():
+    """A user's effect of the line whose places are segments."""
+    effect = replace(EFFECTS["viscoelastic_wall"], element="line")
+    assert own_element(effect, Place("segment 2", 1), {}, rig()) == ("segment shunt", 1)
+
+
 def test_elements_at_one_position_cannot_be_told_apart():
     """A shunt closer to an effect's shunt than the spacing is the effect's own element; a series
     element there, and a shunt further away, are others."""

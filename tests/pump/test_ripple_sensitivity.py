@@ -84,6 +84,14 @@ def misfit(a, b):
     return min(np.linalg.norm(a * np.exp(1j * k * t) - b) for t in turns) / np.linalg.norm(b)
 
 
+@pytest.mark.parametrize("pressure", [-200.0, 0.0, np.nan])
+def test_no_pressure_no_changes(pressure):
+    """Sensors that pass no static pressure, without a stated load pressure: how the pump's numbers
+    change its ripple is unknown, and nothing is made up."""
+    twin = Twin(bench(), observations(), uncertain_pump=True)
+    assert pump_changes(twin, observations()[0].speed_hz, pressure) == []
+
+
 @pytest.mark.parametrize("numbers", [{"modulus": MODULUS}, {"timing": TIMING}, {"modulus": -1.5}])
 def test_parabolas_predict_other_pumps(numbers):
     """The ripple of a pump simulated with other values, predicted from the nominal one and its

@@ -1,5 +1,7 @@
 """Observations against synthetic signals of known harmonics, noise and speed variation."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
@@ -265,6 +267,22 @@ def test_repeats_of_an_impedance_give_its_covariance():
         chi2.append(np.abs(error) ** 2 / seen.covariance[:, 0, 0].real)
     assert seen.source == "known" and seen.normalised
     assert np.mean(chi2) == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_silent_row_at_0_hz_has_no_part_in_the_scatter():
+    """Three repeats of a table that begins with zeros at 0 Hz have the covariance of the same table
+    without that row."""
+    rng = np.random.default_rng(3)
+    values = rng.normal(size=(3, 2, 60)) + 1j * rng.normal(size=(3, 2, 60))
+    table = spectrum(values, "spectrum")
+    silent = replace(
+        table,
+        frequency_hz=np.append(0.0, table.frequency_hz),
+        spectra=np.concatenate([np.zeros((3, 2, 1)), values], axis=2),
+    )
+    one, other = observe(table, RIG), observe(silent, RIG)
+    assert np.array_equal(one.covariance, other.covariance)
+    assert np.array_equal(one.values, other.values) and np.isfinite(one.covariance).all()
 
 
 def test_one_spectrum_has_the_stated_relative_error():

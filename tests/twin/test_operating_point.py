@@ -57,6 +57,26 @@ def test_sensors_without_a_mean_are_ignored():
     assert estimate(9.5e6, [0.0, 2e4, -3e4]).load_pressure == 9.5e6
 
 
+def test_a_spectrum_s_pressure_is_as_stated():
+    """Its sensors have no means: an observation of one has the stated pressure in their place,
+    which corrects nothing."""
+    o = replace(
+        point(RIG), kind="spectrum", source="free", flow_ripple=None, mean=np.full(3, 9.5e6)
+    )
+    assert operating_point(RIG, o, None).load_pressure == 9.5e6
+
+
+def test_the_load_of_an_input_impedance_is_guessed():
+    """Nothing tells the mean flow through an orifice behind a measured impedance, so that its prior
+    is as wide as behind a free source."""
+    o = replace(point(RIG), kind="input_impedance", flow_ripple=None, orders=None, sensors=())
+    priors = [
+        Twin(RIG, [replace(o, source=source)]).parameters[-1].prior for source in ("known", "free")
+    ]
+    assert priors[0] == priors[1]
+    assert priors[0].scale > 10 * RIG.uncertainty.load
+
+
 def test_no_mean_is_no_error_where_one_is_stated():
     o = replace(point(RIG), mean=None)
     assert operating_point(RIG, o, o.flow_ripple).load_pressure == o.load_pressure

@@ -135,6 +135,15 @@ def test_an_effect_of_the_source_is_tried_too():
         check_on_rig(broken, rig())
 
 
+@pytest.mark.parametrize("place", ["segment 1", "sensor p1"])
+def test_a_place_without_its_index_is_bad_input(place):
+    """The effect would act on all segments, or correct all sensors."""
+    name = "viscoelastic_wall" if place.startswith("segment") else "sensor_gain"
+    effect = replace(library.EFFECTS[name], file="own.py", places=lambda rig: (Place(place),))
+    with pytest.raises(InputError, match="without an index"):
+        check_on_rig(effect, rig())
+
+
 def test_no_file_is_bad_input(tmp_path):
     """A path where nothing is."""
     with pytest.raises(InputError, match="no such file"):

@@ -107,7 +107,7 @@ def posterior_at_fit(
 ) -> Posterior:
     """The posterior at a fit, with errors that are independent from frequency to frequency.
 
-    The smooth part of the source's error is added to the independent part.
+    The smooth part of the source's error and that of its size are added to the independent part.
 
     model_error   by default that of the fit
     """

@@ -176,7 +176,7 @@ class Likelihood:
         The sum of squares is scaled up for the degrees of freedom that the parameters take.
         """
         taken = min(len(self.prior), 0.5 * self.count)
-        scale = self.count / (self.count - taken)
+        scale = self.count / max(self.count - taken, 1.0)
         model_errors, sigmas = MODEL_ERRORS, self.twin.source_sd * SOURCE_SHARES
         for _ in range(3):
             cost: np.ndarray = sum(

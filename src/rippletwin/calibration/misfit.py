@@ -6,9 +6,10 @@ same as from the time signals over whole revolutions:
     relative misfit   |measured - predicted| / |measured|
     Theil's U         |measured - predicted| / (|measured| + |predicted|)
 
-with |.| the norm over sensors, frequencies and recordings. U lies between 0 (equal) and 1; it is
-U1 of Theil (1961), Economic Forecasts and Policy, 2nd ed., sec. 2.5, the coefficient used to
-validate simulations.
+with |.| the norm over sensors, frequencies and recordings. Pressures and the reflection
+coefficients of input impedances have one each; both together have their root mean square. U lies
+between 0 (equal) and 1; it is U1 of Theil (1961), Economic Forecasts and Policy, 2nd ed., sec. 2.5,
+the coefficient used to validate simulations.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.shaft_angles import find_best_turn, fit_shaft_angles
 from rippletwin.spectra.corrected_ripple import CorrectedRipple
+
+REFLECTION = "reflection"  # the name of an input impedance, which is of no sensor
 
 
 @dataclass(frozen=True)
@@ -52,19 +55,31 @@ def measure_misfit(model: ErrorModel, theta: np.ndarray) -> Misfit:
     A free source gets its most likely amplitude at each frequency, so the misfit then is that of
     the ratios between sensors.
     """
+    joined = readings_by_sensor(model, theta)
+    pressures = [p for name, p in joined.items() if name != REFLECTION]
+    quantities = [[np.concatenate(x) for x in zip(*pressures)]] if pressures else []
+    quantities += [joined[REFLECTION]] if REFLECTION in joined else []
+    return Misfit(
+        _rms([relative_misfit(*q) for q in quantities]),
+        _rms([theil_coefficient(*q) for q in quantities]),
+        {name: relative_misfit(*p) for name, p in joined.items()},
+        {name: theil_coefficient(*p) for name, p in joined.items()},
+    )
+
+
+def readings_by_sensor(model: ErrorModel, theta: np.ndarray) -> dict[str, list[np.ndarray]]:
+    """What was measured and what is predicted at theta (P,), (N,) each, of all observations by
+    sensor, `REFLECTION` for input impedances. A free source has its most likely amplitude."""
     pairs: dict[str, list] = {}
     for o, (measured, h, _) in zip(model.observations, model.by_observation(model.predict(theta))):
         h = with_likely_amplitude(o, h, measured)
         for name, v, x in zip(_names(o), measured, h):
             pairs.setdefault(name, []).append((v, x))
-    joined = {name: [np.concatenate(x) for x in zip(*p)] for name, p in pairs.items()}
-    everything = [np.concatenate(x) for x in zip(*joined.values())]
-    return Misfit(
-        relative_misfit(*everything),
-        theil_coefficient(*everything),
-        {name: relative_misfit(*p) for name, p in joined.items()},
-        {name: theil_coefficient(*p) for name, p in joined.items()},
-    )
+    return {name: [np.concatenate(x) for x in zip(*p)] for name, p in pairs.items()}
+
+
+def _rms(values: Sequence[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def with_likely_amplitude(observation, predicted: np.ndarray, measured: np.ndarray) -> np.ndarray:
@@ -78,7 +93,7 @@ def with_likely_amplitude(observation, predicted: np.ndarray, measured: np.ndarr
 
 def _names(observation) -> list[str]:
     if observation.kind == "input_impedance":
-        return ["reflection"]
+        return [REFLECTION]
     return [getattr(s, "name", s) for s in observation.sensors]
 
 

@@ -24,7 +24,7 @@ from rippletwin.calibration.calibrate import (
 )
 from rippletwin.calibration.frequency_continuation import continuation_limits
 from rippletwin.calibration.likelihood import EVENNESS, Likelihood
-from rippletwin.calibration.misfit import with_likely_amplitude
+from rippletwin.calibration.misfit import readings_by_sensor, relative_misfit
 from rippletwin.calibration.shaft_angles import align_shaft_angles
 from rippletwin.spectra.frequency_selection import check_load_table, check_sources
 from rippletwin.twin.twin import Twin
@@ -102,19 +102,17 @@ def calibrate_pareto(
         )
         members = result.pop.get("X")
         if progress is not None:
-            progress(f"below {limit:.0f} Hz: {len(result.X)} members, {result.F.min(0)}")
-    order = np.argsort(np.sum(result.F, axis=1))
-    theta = np.array([problem.whole(x) for x in result.X[order]])
-    return ParetoSet(theta, result.F[order], conclude(problem.likelihood, theta[0], settings))
+            best = np.atleast_2d(result.F)
+            progress(f"below {limit:.0f} Hz: {len(best)} members, {best.min(0)}")
+    # of a single objective there is one best member, without an axis of members
+    found, objectives = np.atleast_2d(result.X), np.atleast_2d(result.F)
+    order = np.argsort(np.sum(objectives, axis=1))
+    theta = np.array([problem.whole(x) for x in found[order]])
+    return ParetoSet(theta, objectives[order], conclude(problem.likelihood, theta[0], settings))
 
 
 def sensor_misfits(likelihood: Likelihood, theta: np.ndarray) -> np.ndarray:
-    """Squared relative misfit (S,) of each sensor at theta (P,), all observations together; a free
-    source has its most likely amplitude."""
-    left = total = np.zeros(1)
-    parts = likelihood.by_observation(likelihood.predict(theta))
-    for o, (measured, h, _) in zip(likelihood.observations, parts):
-        h = with_likely_amplitude(o, h, measured)
-        left = left + np.sum(np.abs(measured - h) ** 2, axis=1)
-        total = total + np.sum(np.abs(measured) ** 2, axis=1)
-    return left / total
+    """Squared relative misfit (S,) of each sensor at theta (P,), and of input impedances where
+    there are any, all observations together; a free source has its most likely amplitude."""
+    readings = readings_by_sensor(likelihood, theta).values()
+    return np.array([relative_misfit(*each) for each in readings]) ** 2

@@ -250,7 +250,12 @@ class Posterior:
 
     def best_source(self, prediction: np.ndarray) -> np.ndarray:
         """The prediction with every free source at its most likely amplitude, (S, F)."""
-        return self._errors.free_amplitudes(self._rotate(prediction)) * prediction
+        return self.free_amplitudes(prediction) * prediction
+
+    def free_amplitudes(self, prediction: np.ndarray) -> np.ndarray:
+        """Most likely amplitude (F,) of every free source, over that of the prediction (S, F); 1 of
+        any other."""
+        return self._errors.free_amplitudes(self._rotate(prediction))
 
     def most_likely_source(self, prediction: np.ndarray) -> np.ndarray:
         """Most likely source (F,) relative to that of the prediction, at the present errors."""

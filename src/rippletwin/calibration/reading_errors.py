@@ -206,8 +206,11 @@ class ReadingErrors:
             self._hold(h)
 
     def make_independent(self, h: np.ndarray) -> None:
-        """Add the smooth part of the source's error to the independent part, at h (S, F)."""
-        total = float(np.hypot(self.sizes.source, self.sizes.smooth))
+        """Add the smooth part of the source's error and that of its size to the independent part,
+        at h (S, F)."""
+        parts = self.sizes.source, self.sizes.smooth, self._smooth.size_sd
+        total = float(np.linalg.norm(parts))
+        self._smooth = self._smooth.without_size()
         self.sizes = ErrorSizes(0.0, total, self.sizes.model)
         self._expansion = self._smooth.without_error()
         self._hold(h)

@@ -39,7 +39,8 @@ def align_shaft_angles(
             left = left - np.abs(weighted) ** 2 / np.maximum(whole, 1e-300)
             misfit += float(np.sum(left))
             continue
-        match = np.sum(np.abs(weighted))  # of a source whose phase is free
+        known = o.source == "known"
+        match = np.sum(weighted.real if known else np.abs(weighted))  # else its phase is free
         index = twin.index.get(f"angle[{o.label}]")
         if index is not None and not model.source_free:
             orders = np.asarray(o.orders, int)

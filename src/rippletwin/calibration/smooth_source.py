@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,7 +42,7 @@ class SmoothSourceError:
 
     frequency_hz, recording   (F,) of all frequencies
     nominal                   (F,) mask of those with a nominal source
-    size_sd                   standard deviation s of the size
+    size_sd                   standard deviation s, relative, of the size
     """
 
     def __init__(self, frequency_hz, recording, nominal, size_sd: float):
@@ -49,14 +50,20 @@ class SmoothSourceError:
         smooth = smooth_basis(frequency_hz[nominal], recording[nominal])
         self.basis = np.concatenate([smooth, np.ones((1, smooth.shape[1]))])
         self._recording = np.asarray(recording)[nominal]
-        self._size_sd, self._count = size_sd, len(nominal)
+        self.size_sd, self._count = size_sd, len(nominal)
 
     def sds(self, tau) -> np.ndarray:
         """Standard deviations (..., J), relative, of the amplitudes for tau (...)."""
         sds = np.empty((*np.shape(tau), len(self.basis)))
         sds[..., :-1] = np.asarray(tau)[..., None]
-        sds[..., -1] = self._size_sd
+        sds[..., -1] = self.size_sd
         return sds
+
+    def without_size(self) -> SmoothSourceError:
+        """The same errors but for that of the size."""
+        other = copy(self)
+        other.size_sd = 0.0
+        return other
 
     def most_likely(self, pull: np.ndarray, tau: float) -> np.ndarray:
         """Most likely amplitudes (J,) given the derivative `pull` (F,) of the log likelihood by the

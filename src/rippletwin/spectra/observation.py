@@ -100,8 +100,7 @@ def observe(
     else:
         observation = _observe_spectra(recording, rig, max_frequency_hz)
     low = recording.min_frequency_hz or 0.0
-    # a table may begin at 0 Hz, where no wave is
-    kept = (observation.frequency_hz >= low) & (observation.frequency_hz > 0.0)
+    kept = observation.frequency_hz >= low
     _check_any(recording, kept)
     observation = replace(observation, min_frequency_hz=low)
     together = observation.orders is not None and not piston_harmonics_only
@@ -207,9 +206,10 @@ def _observe_random(recording, rig, max_frequency_hz) -> Observation:
 
 
 def _observe_spectra(recording, rig, max_frequency_hz) -> Observation:
-    keep = slice(None)
+    # at 0 Hz, where a table may begin, no wave is, and the scatter of silence is not relative
+    keep = recording.frequency_hz > 0.0
     if max_frequency_hz is not None:
-        keep = recording.frequency_hz <= max_frequency_hz
+        keep &= recording.frequency_hz <= max_frequency_hz
     frequency_hz, repeats = recording.frequency_hz[keep], recording.spectra[:, :, keep]
     values = repeats.mean(axis=0)
     impedance = recording.kind == "input_impedance"

@@ -92,7 +92,8 @@ def pump_changes(
     twin: Twin, speed_hz: float, load_pressure: float, ripple: FlowRipple | None = None
 ) -> list[tuple]:
     """(index, `RippleChange`) of each parameter of the pump, at rev/s and load pressure in Pa;
-    empty where there are no such parameters.
+    empty where there are no such parameters, and where that pressure is unknown or not positive, as
+    that of sensors which pass no static pressure.
 
     They are about the pump that `ripple` is simulated with, against the pressure at its outlet, in
     the frame of the data sheet's port plate. Where it is not simulated, they are about the data
@@ -100,7 +101,7 @@ def pump_changes(
     Operating points that differ by less than OPERATING_STEP have the same changes, so that the
     halves of a recording, or a mean pressure that a fit moves, take no further simulation.
     """
-    if not twin.uncertain_pump or not np.isfinite(load_pressure):
+    if not twin.uncertain_pump or not 0.0 < load_pressure < np.inf:
         return []
     from rippletwin.pump.ripple_sensitivity import KEYS, ripple_change
     from rippletwin.pump.simulation import PumpRipple

@@ -131,7 +131,8 @@ def _load_pressure(rig: Rig, observation, flow: float) -> float | None:
         positions = [sensor.position for sensor in sensors[: len(means)]]
         nearest = np.argmax(positions) if positions else -1  # an impedance is of no sensor
         return float(means[nearest])
-    if observation.kind == "input_impedance" or not len(means) or not stated > 0.0:
+    # the sensors of spectra and impedances have no means
+    if observation.kind not in ("periodic", "random") or not len(means) or not stated > 0.0:
         return stated
     fall = np.array([pressure_fall(rig, sensor.position, flow) for sensor in sensors]) / stated
     if len(fall) != len(means):

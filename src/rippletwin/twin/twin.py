@@ -130,7 +130,7 @@ class Twin:
             raise ValueError(f"recordings need labels of their own, not {self.labels}")
         if guessed_load is None:
             guessed_load = rig.load.passes_flow and any(
-                o.source == "free" and o.flow_ripple is None for o in observations
+                o.source != "nominal" and o.flow_ripple is None for o in observations
             )
         self.guessed_load = bool(guessed_load)
         self.absolute_gains = bool(self.labels) if absolute_gains is None else absolute_gains

@@ -16,6 +16,7 @@ from rippletwin.calibration.misfit import Score, score_fit
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.ripple_correction import correct_ripple
 from rippletwin.calibration.shaft_angles import fit_shaft_angles
+from rippletwin.errors import InputError
 from rippletwin.explanation.fit_jobs import Workers, job_from
 from rippletwin.spectra.frequency_selection import select_frequencies
 from rippletwin.spectra.observation import Observation
@@ -177,7 +178,15 @@ def make_folds(workers: Workers, halves: Halves | None = None) -> list[Fold]:
         return [Fold(own, None, [late], "the second half of the recording")]
     (observation,) = observations
     frequencies = len(observation.frequency_hz)
-    block = np.floor(FREQUENCY_BLOCKS * np.arange(frequencies) / frequencies)
+    if frequencies < 2:
+        raise InputError(
+            observation.label,
+            "min_frequency_hz, max_frequency_hz",
+            "one frequency is fitted, so that none can be held out",
+            "Give a wider band, or a recording of another operating point",
+        )
+    blocks = min(FREQUENCY_BLOCKS, frequencies)
+    block = np.floor(blocks * np.arange(frequencies) / frequencies)
     folds = []
     for parity, words in enumerate(("even", "odd")):  # counted from 1, of what is held out
         inside = block % 2 == parity

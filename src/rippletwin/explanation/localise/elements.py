@@ -57,7 +57,7 @@ def own_element(effect, place, values: Mapping[str, float], rig) -> tuple:
     everywhere = tuple(range(len(rig.line))) if len(rig.line) > 1 else 0
     if effect.element == "sensor":
         return "sensor", place.index
-    if effect.element == "segment" and place.index is not None:
+    if place.element.startswith("segment"):
         return "segment shunt", place.index
     if place.element == "line":
         return ("segment series" if effect.friction else "segment shunt"), everywhere

@@ -131,7 +131,8 @@ def residual_crank_angles(
 ) -> list[list[float]]:
     """Shaft angles (deg, within a piston's pitch) at which the fit's residual is concentrated.
 
-    Of periodic recordings, on the common shaft angle.
+    Of periodic recordings whose source is nominal, on the common shaft angle: that of a free source
+    is unknown.
 
     samples   angles of a pitch at which the residual is calculated
     """
@@ -139,7 +140,7 @@ def residual_crank_angles(
     prediction = posterior.predict(fit.twin.theta)
     waves, pitch = [], None
     for o, part in zip(posterior.observations, posterior.forward.slices):
-        if o.orders is None:
+        if o.orders is None or o.source == "free":
             continue
         index = fit.twin.index.get(f"angle[{o.label}]")
         turn = 0.0 if index is None else fit.twin.parameters[index].value(fit.twin.theta[index])

@@ -115,6 +115,7 @@ def _at_operating_point(
         speed_hz=speed_hz,
         load_pressure=load,
         flow_ripple=_scaled_ripple(twin, near, speed_hz),
+        modulation=0.0,  # the ripple has it already
         mean=np.full(len(noise), load or 0.0),
     )
 

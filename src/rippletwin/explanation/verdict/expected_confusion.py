@@ -88,7 +88,7 @@ def expect_discriminations(
     base = _Rival(Twin(rig, observations), observations)
     rivals = []
     for pair in _one_place_each(rig, observations):
-        rivals.append(_Rival(base.twin.with_(effects=(pair,)), observations))
+        rivals.append(_Rival(base.twin.with_(effects=(pair,)), observations, base.amplitudes))
         rivals[-1].set_strength(base.readings)
     for done, truth in enumerate(rivals, 1):
         losses = {r.name: r.loss(truth.readings) for r in rivals if r is not truth}
@@ -109,10 +109,11 @@ def _one_place_each(rig: Rig, observations) -> list[tuple[Effect, Place]]:
 class _Rival:
     """A twin with an effect, or with none, and the data sheet's values of all else.
 
-    readings   (S, F), what it predicts
+    amplitudes   (F,) of free sources over those that are predicted; None for those that the
+                 recordings have
     """
 
-    def __init__(self, twin: Twin, observations):
+    def __init__(self, twin: Twin, observations, amplitudes: np.ndarray | None = None):
         self.twin, self.name, self.place = twin, "", ""
         for effect, place in twin.effects:
             self.name, self.place = effect.name, str(place)
@@ -124,7 +125,15 @@ class _Rival:
         flat = [parameter.flat for parameter in twin.parameters]
         self._scale = np.where(flat, np.sqrt(FLAT_VARIANCE), 1.0)
         self._theta = np.zeros(len(twin.parameters))
-        self.readings = self._posterior.predict(self._theta)
+        self._predicted = self._posterior.predict(self._theta)
+        if amplitudes is None:
+            amplitudes = self._posterior.free_amplitudes(self._predicted)
+        self.amplitudes = amplitudes
+
+    @property
+    def readings(self) -> np.ndarray:
+        """What the sensors should read (S, F), as large as in the recordings."""
+        return self.amplitudes * self._predicted
 
     def set_strength(self, base: np.ndarray) -> None:
         """Make the effect as strong as changes the readings from those of `base` (S, F) by CHANGE,
@@ -158,16 +167,16 @@ class _Rival:
         for k, parameter in enumerate(self.twin.parameters):
             if parameter.name.startswith(f"{self.name}@"):
                 self._theta[k] = _coordinate(parameter.prior, strength)
-        self.readings = self._posterior.predict(self._theta)
+        self._predicted = self._posterior.predict(self._theta)
 
     @cached_property
     def _slopes(self) -> np.ndarray:
-        return self._posterior.slopes(self._theta, self.readings)
+        return self._posterior.slopes(self._theta, self._predicted)
 
     def loss(self, readings: np.ndarray) -> float:
         """Log evidence that this twin is expected to lose where these (S, F) are the readings."""
         posterior = self._posterior.with_values(readings)
-        r, columns = posterior.whiten_slopes(self.readings, self._slopes)
+        r, columns = posterior.whiten_slopes(self._predicted, self._slopes)
         columns = columns * self._scale[:, None]
         projection = columns @ r
         absorbed = np.linalg.solve(np.eye(len(projection)) + columns @ columns.T, projection)

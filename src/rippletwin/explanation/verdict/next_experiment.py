@@ -118,7 +118,7 @@ def expected_loss(
     true = transfer_twin(accepted, rig, observation, uncertain_pump)
     (reading,) = true.predict([observation])
     covariance = observation.covariance
-    if observation.kind == "random":
+    if observation.source == "free":  # of unknown size, so that errors can only be relative
         variance = RANDOM_ERROR**2 * np.abs(reading) ** 2
         covariance = np.einsum("sf,st->fst", variance, np.eye(len(reading))).astype(complex)
     values = reading

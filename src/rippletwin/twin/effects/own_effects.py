@@ -39,6 +39,9 @@ def check_on_rig(effect: Effect, rig) -> None:
     for place in _run(effect, "places", effect.places, rig):
         if not isinstance(place, Place):
             raise _fault(effect, "places", f"gives {place!r}", "Give a tuple of Place")
+        if place.index is None and place.element.startswith(("segment", "sensor")):
+            remedy = "Give it with index, from 0, or take segment_places or sensor_places"
+            raise _fault(effect, "places", f"gives {place!r} without an index", remedy)
         own = _run(effect, "parameters", effect.parameters, rig, place)
         if not all(isinstance(p, Parameter) for p in own):
             raise _fault(effect, "parameters", f"gives {own!r}", "Give a tuple of Parameter")
