@@ -13,6 +13,7 @@ from rippletwin.case.band import band_warnings, limit_to_ripple, narrow_band
 from rippletwin.case.model import (
     STATE_CODES,
     Case,
+    FlowRipple,
     Fluid,
     Load,
     Recording,
@@ -138,7 +139,7 @@ def _recording(folder: Path, entry: dict, rig: Rig) -> Recording:
     kind = fields["kind"]
     if "flow_ripple" in entry:
         ripple = tables.read_flow_ripple(folder / entry["flow_ripple"])
-        _check_mean_flow(folder / entry["flow_ripple"], ripple.flow, rig)
+        _check_mean_flow(folder / entry["flow_ripple"], ripple, rig)
         fields["flow_ripple"] = ripple
     if kind not in SAMPLED:
         files = [path, *(folder / name for name in entry.get("repeats", []))]
@@ -157,16 +158,17 @@ def _recording(folder: Path, entry: dict, rig: Rig) -> Recording:
 def _displacement(recordings: Sequence[Recording]) -> float | None:
     """Flow per revolution, m3, of the stated flow ripples; None without one."""
     stated = [
-        abs(float(np.mean(r.flow_ripple.flow))) / (r.speed_rpm / 60.0)
+        abs(r.flow_ripple.mean) / (r.speed_rpm / 60.0)
         for r in recordings
         if r.flow_ripple is not None and r.speed_rpm
     ]
     return float(np.mean(stated)) or None if stated else None
 
 
-def _check_mean_flow(path: Path, flow: np.ndarray, rig: Rig) -> None:
+def _check_mean_flow(path: Path, ripple: FlowRipple, rig: Rig) -> None:
     """Raise InputError where an orifice's coefficient has to come from a mean flow of zero."""
-    if rig.load.passes_flow and abs(np.mean(flow)) < SMALLEST_MEAN * np.max(np.abs(flow)):
+    largest = np.max(np.abs(ripple.flow))
+    if rig.load.passes_flow and abs(ripple.mean) < SMALLEST_MEAN * largest:
         raise InputError(
             path,
             "flow_m3_s",

@@ -93,7 +93,7 @@ class Diagnoser:
         pressure = _rounded(load_pressure_of(self.twin, observation))
         speed_rpm = _rounded(60.0 * observation.speed_hz)
         given = healthy.flow_ripple
-        mean_flow = None if given is None else float(np.mean(given.flow))
+        mean_flow = None if given is None else given.mean
         twin = with_fitted_pump(self.twin, mean_flow, healthy.speed_hz)
         pump, fluid = twin.rig.pump, twin.rig.fluid
         ripple = simulate_healthy_pump(pump, fluid, speed_rpm, pressure)
