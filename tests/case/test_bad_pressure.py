@@ -32,6 +32,16 @@ def test_whole_pascals_are_no_counts(tmp_path):
     assert load_case(tmp_path).recordings[0].pressure.dtype == float
 
 
+def test_pascals_called_bar(tmp_path):
+    """Of an AC-coupled sensor, whose mean tells nothing: its ripple, 1e5 times too large, is far
+    more than the load pressure."""
+    content = sheet()
+    content["recordings"][0]["unit"] = "bar"
+    write_case(tmp_path, content, ripple() - 9.5e6)
+    with pytest.raises(InputErrors, match="correct unit, scale or load_pressure"):
+        load_case(tmp_path)
+
+
 def test_inverted_pressure(tmp_path):
     """A mean of -9.5 MPa is below vacuum."""
     pressure = ripple()
