@@ -29,7 +29,25 @@ def test_raw_counts_of_a_converter(tmp_path):
 def test_whole_pascals_are_no_counts(tmp_path):
     """Pressures stored as whole numbers of Pa are read."""
     write_case(tmp_path, sheet(), np.round(ripple()).astype(np.int32))
-    assert load_case(tmp_path).recordings[0].pressure.dtype == float
+    case = load_case(tmp_path)
+    assert case.recordings[0].pressure.dtype == float
+    assert not [w for w in case.warnings if "whole numbers" in w]
+
+
+def test_whole_numbers_without_a_mean_may_be_counts(tmp_path):
+    """Of an AC-coupled sensor nothing tells counts from pascals: a warning asks for the scale. It
+    says nothing where one sample is no whole number, or the scale is stated."""
+    content = sheet()
+    whole = np.round(ripple() - 9.5e6)
+    broken = whole.copy()
+    broken[1, 2000] += 0.5
+    for pressure, names in ((whole, "p1, p2"), (broken, "p1")):
+        write_case(tmp_path, content, pressure)
+        (told,) = [w for w in load_case(tmp_path).warnings if "whole numbers" in w]
+        assert told.startswith(f"healthy_0: {names}: whole numbers only; give scale")
+    content["recordings"][0]["scale"] = 1
+    write_case(tmp_path, content, whole)
+    assert not [w for w in load_case(tmp_path).warnings if "whole numbers" in w]
 
 
 def test_pascals_called_bar(tmp_path):

@@ -23,7 +23,7 @@ from rippletwin.case.model import (
     Uncertainty,
 )
 from rippletwin.case.plausibility import unusual_values
-from rippletwin.case.pressure_units import PASCALS
+from rippletwin.case.pressure_units import PASCALS, count_warnings
 from rippletwin.case.readers.layout import Layout
 from rippletwin.case.readers.registry import read_signals
 from rippletwin.case.rig_yaml import find_sheet, find_sheet_faults, parse_sheet
@@ -83,6 +83,8 @@ def load_case(
             recording, limited = limit_to_ripple(recording)
             recordings.append(recording)
             limits += limited
+            if "scale" not in entry:
+                limits += count_warnings(recording, rig)
         except InputError as error:
             errors.append(error)
         if progress is not None:
@@ -148,6 +150,13 @@ def _recording(folder: Path, entry: dict, rig: Rig) -> Recording:
         return Recording(**fields, frequency_hz=frequency_hz, spectra=spectra)
     signals = read_signals(path, Layout.of((sensor.name for sensor in rig.sensors), entry))
     rate = sampling_rate(path, signals, entry.get("sampling_rate_hz"))
+    if signals.counts and "scale" not in entry:
+        raise InputError(
+            path,
+            "scale",
+            "missing: the file holds whole numbers, which are raw counts",
+            "Give scale in rig.yaml: the recorder's, Pa a count, or 1 where they are pressures",
+        )
     factor = entry.get("scale", 1.0) * PASCALS[entry.get("unit", "Pa")]
     pressure = signals.pressure if factor == 1.0 else signals.pressure * factor
     recording = Recording(**fields, pressure=pressure, sampling_rate_hz=rate)

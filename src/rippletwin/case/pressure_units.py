@@ -12,6 +12,7 @@ PASCALS = {"Pa": 1.0, **dict(UNITS)}
 """Unit of a recording's `unit` in rig.yaml -> Pa."""
 LARGEST_COUNT = 2**24  # of a converter of 24 bits
 VACUUM = -1.1e5  # Pa; gauge pressure cannot be lower
+FEW = 1000  # samples that spare a look at all of a recording
 LARGEST_FALL = 1e6  # Pa; of the mean pressure from a sensor to the load
 LARGEST_RIPPLE = 1e8  # Pa rms, where no load pressure is stated
 
@@ -45,6 +46,25 @@ def unit_error(recording: Recording, rig: Rig, name: str, row: np.ndarray) -> In
         remedy += "; raw counts need the recorder's scale, Pa a count, as scale in rig.yaml"
     stated = "load_pressure" if unit or counts else "unit, scale or load_pressure"
     return InputError(recording.file, name, problem + looks, f"{remedy}; or correct {stated}")
+
+
+def count_warnings(recording: Recording, rig: Rig) -> list[str]:
+    """A line that names the sensors whose samples may be raw counts: whole numbers without a mean
+    that shows them to be pascals. None where none may be, or nothing was sampled."""
+    if recording.pressure is None:
+        return []
+    largest = np.inf if recording.load_pressure is None else recording.load_pressure / 3
+    names = [
+        sensor.name
+        for sensor, row in zip(rig.sensors, recording.pressure)
+        if _looks_like_counts(row[:FEW]) and abs(np.mean(row)) < largest and _looks_like_counts(row)
+    ]
+    if not names:
+        return []
+    return [
+        f"{recording.label}: {', '.join(names)}: whole numbers only; give scale in rig.yaml: the "
+        "recorder's where they are raw counts, 1 where they are pressures"
+    ]
 
 
 def _problem(mean: float, ripple: float, load: float | None, rig: Rig) -> str | None:
