@@ -110,6 +110,16 @@ def test_matlab_struct_as_rig_yaml_describes_it(tmp_path, write):
     same(read(tmp_path, "r.mat", write, dataset="rec.y", sampling_rate_name="fs", **NUMBERED))
 
 
+@pytest.mark.parametrize("write", [matlab, matlab73])
+def test_orientation_is_that_of_matlab_s_array(tmp_path, write):
+    """MATLAB shows samples by sensors in either version of the format, though a file of v7.3 holds
+    the dimensions in reverse order: it is read when told so, and the other way round in vain."""
+    entry = {"dataset": "rec.y", "sampling_rate_name": "fs", **NUMBERED}
+    same(read(tmp_path, "r.mat", write, orientation="samples_by_sensors", **entry))
+    with pytest.raises(ValueError, match="revolutions"):
+        read(tmp_path, "r.mat", write, orientation="sensors_by_samples", **entry)
+
+
 def test_zarr(tmp_path):
     """A store is a folder; its array is named as in HDF5."""
     import zarr
