@@ -126,9 +126,7 @@ class NewSheet:
             text += "  # coefficient, m3/s/sqrt(Pa), follows from mean flow and load pressure\n"
             if self.mean_flow is not None:
                 flow = _decimal(self.mean_flow)
-                text += (
-                    f"  # divide {flow} m3/s by the root of the load pressure at this flow, Pa\n"
-                )
+                text += f"  # divide {flow} m3/s by the root of its load pressure, Pa\n"
         return text
 
     def _wave_speed_uncertainty(self) -> float:
