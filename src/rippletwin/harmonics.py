@@ -6,12 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.fft import ifft, irfft, rfft
-from scipy.interpolate import CubicSpline
 from scipy.special import jv
 
 from rippletwin.case.model import FlowRipple
 
-ROUNDED_ANGLE = 0.01  # of a step: as much off an even grid are angles that a file rounds
 ROUNDING = 1e-13  # of the largest amplitude: below it are errors of rounding
 
 
@@ -103,18 +101,12 @@ def flow_harmonics(ripple: FlowRipple, orders: np.ndarray) -> np.ndarray:
 
 
 def _calculate_harmonics(ripple: FlowRipple, orders: np.ndarray) -> np.ndarray:
-    angle, flow = (np.asarray(x, float) for x in (ripple.angle_deg, ripple.flow))
+    even, flow = ripple.on_even_angles()
     orders, count = np.asarray(orders, float), len(flow)
-    even = angle[0] + 360.0 * np.arange(count) / count
-    if np.max(np.abs(angle - even)) > ROUNDED_ANGLE * 360.0 / count:
-        count *= 4
-        even = angle[0] + 360.0 * np.arange(count) / count
-        around, closed = np.append(angle, angle[0] + 360.0), np.append(flow, flow[0])
-        flow = CubicSpline(around, closed, bc_type="periodic")(even)
     is_resolved = np.abs(orders) <= ripple.highest_order
     if np.all(orders == np.abs(np.round(orders))):
         known = peak_amplitudes(flow)[np.where(is_resolved, orders, 0).astype(int)]
-        known *= np.exp(-1j * orders * np.deg2rad(angle[0]))
+        known *= np.exp(-1j * orders * np.deg2rad(even[0]))
     else:
         known = np.exp(-1j * np.outer(orders, np.deg2rad(even))) @ flow / count
         known = np.where(orders == 0, known, 2 * known)

@@ -1,4 +1,4 @@
-"""Which angles of a flow ripple are one revolution."""
+"""Which angles of a flow ripple are one revolution, and what its mean is."""
 
 import numpy as np
 import pytest
@@ -6,10 +6,15 @@ import pytest
 from rippletwin.case.tables import read_flow_ripple
 from rippletwin.errors import InputError
 
+EVEN = np.arange(0.0, 360.0, 2.0)
+OPENINGS = np.add.outer(40.0 * np.arange(9), np.arange(0.0, 5.0, 0.02)).ravel()
+REFINED = np.unique(np.round([*EVEN, *OPENINGS], 6))
+"""Steps of 0.02 degrees about nine port openings, of 2 degrees elsewhere."""
 
-def read(folder, angle):
-    """The ripple of these angles, degrees; its flow (m3/s) grows with the row."""
-    flow = 5e-4 + 1e-7 * np.arange(len(angle)) ** 2
+
+def read(folder, angle, flow=None):
+    """The ripple of these angles, degrees; its flow (m3/s) grows with the row unless given."""
+    flow = 5e-4 + 1e-7 * np.arange(len(angle)) ** 2 if flow is None else flow
     table = np.column_stack([angle, flow])
     path = folder / "q.csv"
     np.savetxt(path, table, "%.9g", ",", header="angle_deg,flow_m3_s", comments="")
@@ -22,6 +27,7 @@ def read(folder, angle):
         np.arange(0.0, 360.0, 10.0),
         np.arange(5.0, 365.0, 10.0),  # from any angle on
         np.arange(0.0, 331.0, 10.0),  # three steps to the end
+        REFINED,
         np.linspace(0.0, 350.0, 32),
     ],
 )
@@ -51,3 +57,24 @@ def test_an_end_that_repeats_the_beginning_is_left_out(tmp_path):
 def test_other_angles_are_refused(tmp_path, angle):
     with pytest.raises(InputError, match="not one revolution"):
         read(tmp_path, angle)
+
+
+@pytest.mark.parametrize("holes", [1, 3])
+def test_a_hole_is_no_step(tmp_path, holes):
+    """Rows are missing inside the revolution: three quarters of a piston's period, that the spline
+    would make up. The refined table above has steps that differ by more, and is read."""
+    angle = EVEN
+    for k in range(holes):
+        angle = angle[(angle <= 50.0 + 100 * k) | (angle >= 80.0 + 100 * k)]
+    with pytest.raises(InputError, match=r"from 50 to 80 \(row 27\) among steps of 2 deg"):
+        read(tmp_path, angle)
+
+
+def test_the_mean_is_that_of_the_revolution(tmp_path):
+    """Independent truth: 5e-4 m3/s is the mean of 5e-4 - 4e-3 cos. Most rows are where the flow is
+    negative: their own mean is below zero, for which the ripple would be refused."""
+    angle = np.unique([*EVEN, *np.arange(0.0, 60.0, 0.1)])
+    flow = 5e-4 - 4e-3 * np.cos(np.radians(angle))
+    found, _ = read(tmp_path, angle, flow)
+    assert np.mean(flow) < -1e-3
+    assert found.mean == pytest.approx(5e-4, rel=1e-4)

@@ -110,6 +110,16 @@ def test_matlab_struct_as_rig_yaml_describes_it(tmp_path, write):
     same(read(tmp_path, "r.mat", write, dataset="rec.y", sampling_rate_name="fs", **NUMBERED))
 
 
+@pytest.mark.parametrize("write", [matlab, matlab73])
+def test_orientation_is_that_of_matlab_s_array(tmp_path, write):
+    """MATLAB shows samples by sensors in either version of the format, though a file of v7.3 holds
+    the dimensions in reverse order: it is read when told so, and the other way round in vain."""
+    entry = {"dataset": "rec.y", "sampling_rate_name": "fs", **NUMBERED}
+    same(read(tmp_path, "r.mat", write, orientation="samples_by_sensors", **entry))
+    with pytest.raises(ValueError, match="revolutions"):
+        read(tmp_path, "r.mat", write, orientation="sensors_by_samples", **entry)
+
+
 def test_zarr(tmp_path):
     """A store is a folder; its array is named as in HDF5."""
     import zarr
@@ -210,14 +220,18 @@ def test_the_header_of_a_wav_says_the_size_of_its_counts(tmp_path, valid_bits, u
         np.testing.assert_array_equal(found.pressure, samples.T / unused)
 
 
-def test_wav_of_counts_without_a_scale_is_told(tmp_path):
-    """Counts are no pascals."""
+@pytest.mark.parametrize("mean", [0.0, 9.5e6])
+def test_wav_of_counts_without_a_scale_is_told(tmp_path, mean):
+    """Counts are no pascals. Those of an AC-coupled sensor could be: only the file's type tells."""
+    counts = np.round((PRESSURE - 9.5e6 + mean) / (COUNT if mean else 10.0)).astype(np.int16)
     content = sheet()
     content["recordings"][0].update(file="r.wav")
     write_case(tmp_path, content, pressure=None)
-    wavfile.write(tmp_path / "r.wav", int(RATE), np.round(PRESSURE / COUNT).astype(np.int16).T)
-    with pytest.raises(ValueError, match="raw counts"):
-        load_case(tmp_path)
+    wavfile.write(tmp_path / "r.wav", int(RATE), counts.T)
+    refused(tmp_path, "r.wav", "scale", "raw counts", "Pa a count")
+    content["recordings"][0].update(scale=1 if mean == 0.0 else COUNT)
+    write_case(tmp_path, content, pressure=None)
+    assert not [w for w in load_case(tmp_path).warnings if "whole numbers" in w]
 
 
 @pytest.mark.parametrize("binary", [0, 1])

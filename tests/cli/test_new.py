@@ -185,6 +185,26 @@ def test_what_makes_no_sense(tmp_path, capsys, name):
     assert not (tmp_path / "case" / "rig.yaml").exists()
 
 
+def test_a_flow_without_a_recording_sets_no_orifice(tmp_path):
+    """The load pressure of the example in the sheet is nobody's: the flow, 38 L/min, stands in a
+    comment that says what to do with it."""
+    assert main(["new", str(tmp_path), *flags(recording=[])]) == 0
+    assert read_sheet(tmp_path / "rig.yaml")["load"] == {"kind": "orifice"}
+    assert "# divide 6.333e-04 m3/s by the root" in (tmp_path / "rig.yaml").read_text()
+
+
+def test_files_of_one_name_in_two_folders(tmp_path):
+    """Each has a label of its own, made of its path; a name that is there once needs none. Two
+    files that differ by their suffix are told by that."""
+    files = ("mon/a.h5", "tue/a.h5", "b.h5", "wed/c.h5", "wed/c.csv")
+    given = flags(recording=[f"{file},healthy,1000,95" for file in files])
+    assert main(["new", str(tmp_path), *given]) == 0
+    recordings = read_sheet(tmp_path / "rig.yaml")["recordings"]
+    assert [entry["file"] for entry in recordings] == list(files)
+    labels = [entry.get("label") for entry in recordings]
+    assert labels == ["mon_a", "tue_a", None, "wed_c.h5", "wed_c.csv"]
+
+
 def test_two_sensors_of_one_name(tmp_path, capsys):
     """Neither of them is dropped: the command line is refused, and can be given again."""
     case = str(tmp_path / "case")

@@ -1,11 +1,13 @@
 """The page: whole, escaped, without requests, and with the numbers that the results have."""
 
 import base64
+import errno
 import hashlib
 import json
 import re
 import shlex
 from html.parser import HTMLParser
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -488,3 +490,24 @@ def test_results_that_no_command_wrote_are_refused(tmp_path, name):
         (folder / "explained" / name).write_text("{}")
     with pytest.raises(InputError, match="are not as the commands write them"):
         report_case(folder, folder / "report.html")
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["explained/verdict.json", "explained/figures/explain.json", "diagnosed/diagnosis.json"],
+)
+def test_a_result_that_may_not_be_read_is_told_as_such(folder, tmp_path, monkeypatch, capsys, name):
+    """It is no page that could not be written: the file and the reason are named. A test that runs
+    as root may read everything, so that the refusal of the operating system is made up."""
+    read_text = Path.read_text
+
+    def refuse(path, *arguments, **options):
+        if path == folder / name:
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return read_text(path, *arguments, **options)
+
+    monkeypatch.setattr(Path, "read_text", refuse)
+    assert main(["report", str(folder), "--out", str(tmp_path / "report.html")]) == 2
+    said = capsys.readouterr().err
+    assert f"{folder / name}: results: cannot be read (Permission denied)" in said
+    assert "not written" not in said

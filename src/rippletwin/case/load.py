@@ -13,6 +13,7 @@ from rippletwin.case.band import band_warnings, limit_to_ripple, narrow_band
 from rippletwin.case.model import (
     STATE_CODES,
     Case,
+    FlowRipple,
     Fluid,
     Load,
     Recording,
@@ -22,7 +23,7 @@ from rippletwin.case.model import (
     Uncertainty,
 )
 from rippletwin.case.plausibility import unusual_values
-from rippletwin.case.pressure_units import PASCALS
+from rippletwin.case.pressure_units import PASCALS, count_warnings
 from rippletwin.case.readers.layout import Layout
 from rippletwin.case.readers.registry import read_signals
 from rippletwin.case.rig_yaml import find_sheet, find_sheet_faults, parse_sheet
@@ -82,6 +83,8 @@ def load_case(
             recording, limited = limit_to_ripple(recording)
             recordings.append(recording)
             limits += limited
+            if "scale" not in entry:
+                limits += count_warnings(recording, rig)
         except InputError as error:
             errors.append(error)
         if progress is not None:
@@ -138,7 +141,7 @@ def _recording(folder: Path, entry: dict, rig: Rig) -> Recording:
     kind = fields["kind"]
     if "flow_ripple" in entry:
         ripple = tables.read_flow_ripple(folder / entry["flow_ripple"])
-        _check_mean_flow(folder / entry["flow_ripple"], ripple.flow, rig)
+        _check_mean_flow(folder / entry["flow_ripple"], ripple, rig)
         fields["flow_ripple"] = ripple
     if kind not in SAMPLED:
         files = [path, *(folder / name for name in entry.get("repeats", []))]
@@ -147,6 +150,13 @@ def _recording(folder: Path, entry: dict, rig: Rig) -> Recording:
         return Recording(**fields, frequency_hz=frequency_hz, spectra=spectra)
     signals = read_signals(path, Layout.of((sensor.name for sensor in rig.sensors), entry))
     rate = sampling_rate(path, signals, entry.get("sampling_rate_hz"))
+    if signals.counts and "scale" not in entry:
+        raise InputError(
+            path,
+            "scale",
+            "missing: the file holds whole numbers, which are raw counts",
+            "Give scale in rig.yaml: the recorder's, Pa a count, or 1 where they are pressures",
+        )
     factor = entry.get("scale", 1.0) * PASCALS[entry.get("unit", "Pa")]
     pressure = signals.pressure if factor == 1.0 else signals.pressure * factor
     recording = Recording(**fields, pressure=pressure, sampling_rate_hz=rate)
@@ -157,16 +167,17 @@ def _recording(folder: Path, entry: dict, rig: Rig) -> Recording:
 def _displacement(recordings: Sequence[Recording]) -> float | None:
     """Flow per revolution, m3, of the stated flow ripples; None without one."""
     stated = [
-        abs(float(np.mean(r.flow_ripple.flow))) / (r.speed_rpm / 60.0)
+        abs(r.flow_ripple.mean) / (r.speed_rpm / 60.0)
         for r in recordings
         if r.flow_ripple is not None and r.speed_rpm
     ]
     return float(np.mean(stated)) or None if stated else None
 
 
-def _check_mean_flow(path: Path, flow: np.ndarray, rig: Rig) -> None:
+def _check_mean_flow(path: Path, ripple: FlowRipple, rig: Rig) -> None:
     """Raise InputError where an orifice's coefficient has to come from a mean flow of zero."""
-    if rig.load.passes_flow and abs(np.mean(flow)) < SMALLEST_MEAN * np.max(np.abs(flow)):
+    largest = np.max(np.abs(ripple.flow))
+    if rig.load.passes_flow and abs(ripple.mean) < SMALLEST_MEAN * largest:
         raise InputError(
             path,
             "flow_m3_s",

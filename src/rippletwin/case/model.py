@@ -25,6 +25,7 @@ STATE_CODES = {
 ATMOSPHERE = 101325.0
 """Standard atmosphere, Pa. Every pressure of a case, a twin and a pump is a gauge pressure, above
 it; a gas goes by the absolute one."""
+ROUNDED_ANGLE = 0.01  # of a step: as much off an even grid are angles that a file rounds
 
 
 def absolute(gauge):
@@ -129,6 +130,25 @@ class FlowRipple:
         """The highest shaft order that the angles resolve: more than two of them, on average, lie
         in its period."""
         return (len(self.angle_deg) - 1) // 2
+
+    def on_even_angles(self) -> tuple[np.ndarray, np.ndarray]:
+        """Evenly spaced angles, degrees, and the flow at them, m3/s: its own where they are even,
+        else those of a periodic cubic spline at four times as many angles."""
+        angle, flow = (np.asarray(x, float) for x in (self.angle_deg, self.flow))
+        count = len(flow)
+        even = angle[0] + 360.0 * np.arange(count) / count
+        if np.max(np.abs(angle - even)) <= ROUNDED_ANGLE * 360.0 / count:
+            return even, flow
+        from scipy.interpolate import CubicSpline  # few cases need it
+
+        around, closed = np.append(angle, angle[0] + 360.0), np.append(flow, flow[0])
+        even = angle[0] + 360.0 * np.arange(4 * count) / (4 * count)
+        return even, CubicSpline(around, closed, bc_type="periodic")(even)
+
+    @cached_property
+    def mean(self) -> float:
+        """Mean flow over the revolution, m3/s, however the angles are spaced."""
+        return float(np.mean(self.on_even_angles()[1]))
 
     @cached_property
     def known_harmonics(self) -> dict[bytes, np.ndarray]:

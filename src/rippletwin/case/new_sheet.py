@@ -56,6 +56,7 @@ class NewSheet:
     density, viscosity  kg/m3 and m2/s, with the temperature in words
     pump                the keys of rig.yaml's `pump`; None where a number is not known
     sensors             names, and m from the pump outlet
+    mean_flow           m3/s, where it is known but not the load pressure that belongs to it
     recordings          entries as rig.yaml has them
     """
 
@@ -67,6 +68,7 @@ class NewSheet:
     sensors: Sequence[tuple[str, float]]
     load: str
     coefficient: float | None = None
+    mean_flow: float | None = None
     recordings: Sequence[Mapping] = field(default_factory=tuple)
 
     def text(self) -> str:
@@ -122,6 +124,9 @@ class NewSheet:
             text += f"  coefficient: {_decimal(self.coefficient)}  # m3/s/sqrt(Pa)\n"
         elif self.load == "orifice":
             text += "  # coefficient, m3/s/sqrt(Pa), follows from mean flow and load pressure\n"
+            if self.mean_flow is not None:
+                flow = _decimal(self.mean_flow)
+                text += f"  # divide {flow} m3/s by the root of its load pressure, Pa\n"
         return text
 
     def _wave_speed_uncertainty(self) -> float:

@@ -12,6 +12,9 @@ PASCALS = {"Pa": 1.0, **dict(UNITS)}
 """Unit of a recording's `unit` in rig.yaml -> Pa."""
 LARGEST_COUNT = 2**24  # of a converter of 24 bits
 VACUUM = -1.1e5  # Pa; gauge pressure cannot be lower
+FEW = 1000  # samples that spare a look at all of a recording
+LARGEST_FALL = 1e6  # Pa; of the mean pressure from a sensor to the load
+LARGEST_RIPPLE = 1e8  # Pa rms, where no load pressure is stated
 
 
 def unit_error(recording: Recording, rig: Rig, name: str, row: np.ndarray) -> InputError | None:
@@ -33,7 +36,7 @@ def unit_error(recording: Recording, rig: Rig, name: str, row: np.ndarray) -> In
     if problem is None:
         return None
     counts = _looks_like_counts(row)
-    unit = _unit_guess(abs(mean), load)
+    unit = None if ripple > LARGEST_RIPPLE else _unit_guess(abs(mean), load)
     looks, remedy = "", "Give pressure in Pa"
     if unit:
         looks = f" and looks like {unit[0]}"
@@ -41,18 +44,39 @@ def unit_error(recording: Recording, rig: Rig, name: str, row: np.ndarray) -> In
     if counts:
         looks += f"{' or' if unit else ' and looks like'} raw counts: whole numbers only"
         remedy += "; raw counts need the recorder's scale, Pa a count, as scale in rig.yaml"
-    return InputError(recording.file, name, problem + looks, f"{remedy}; or correct load_pressure")
+    stated = "load_pressure" if unit or counts else "unit, scale or load_pressure"
+    return InputError(recording.file, name, problem + looks, f"{remedy}; or correct {stated}")
+
+
+def count_warnings(recording: Recording, rig: Rig) -> list[str]:
+    """A line that names the sensors whose samples may be raw counts: whole numbers without a mean
+    that shows them to be pascals. None where none may be, or nothing was sampled."""
+    if recording.pressure is None:
+        return []
+    largest = np.inf if recording.load_pressure is None else recording.load_pressure / 3
+    names = [
+        sensor.name
+        for sensor, row in zip(rig.sensors, recording.pressure)
+        if _looks_like_counts(row[:FEW]) and abs(np.mean(row)) < largest and _looks_like_counts(row)
+    ]
+    if not names:
+        return []
+    return [
+        f"{recording.label}: {', '.join(names)}: whole numbers only; give scale in rig.yaml: the "
+        "recorder's where they are raw counts, 1 where they are pressures"
+    ]
 
 
 def _problem(mean: float, ripple: float, load: float | None, rig: Rig) -> str | None:
     """What contradicts pascals in a mean and a ripple (rms); None where nothing does."""
     if load is None:
-        if rig.fluid.is_gas or ripple > 10:
+        if ripple <= LARGEST_RIPPLE and (rig.fluid.is_gas or ripple > 10):
             return None
         return f"a ripple of {ripple:.3g} rms is implausible as Pa"
-    if mean > 3 * load + 1e6:
+    if mean > 3 * load + LARGEST_FALL:
         return f"a mean of {mean:.3g} is implausible beside a load pressure of {load:.3g} Pa"
-    if ripple < 1e-4 * load and (mean < 10 * ripple or mean < load / 1000):
+    weak = ripple < 1e-4 * load and (mean < 10 * ripple or mean < load / 1000)
+    if weak or ripple > load + LARGEST_FALL - VACUUM:  # it would fall far below vacuum
         return f"a ripple of {ripple:.3g} rms is implausible beside {load:.3g} Pa of load"
     if mean > 10 * ripple and mean < load / 3 - 2e5:
         return f"a mean of {mean:.3g} is implausible beside a load pressure of {load:.3g} Pa"

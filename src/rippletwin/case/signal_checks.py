@@ -58,7 +58,7 @@ def sampling_rate(path: Path, signals: Signals, stated: float | None) -> float:
 
 
 def _rate_of_time(path: Path, signals: Signals) -> float:
-    time, samples = signals.time_s.ravel(), signals.pressure.shape[1]
+    time, samples = signals.time_s.ravel().astype(float), signals.pressure.shape[1]
     if time.size != samples:
         raise InputError(
             path, "time_s", f"{time.size} times for {samples} samples", "One time a sample"
@@ -74,17 +74,27 @@ def _rate_of_time(path: Path, signals: Signals) -> float:
     if not step > 0:
         problem = f"runs from {time[0]:g} to {time[-1]:g} s, not forward"
         raise InputError(path, "time_s", problem, "Time is in seconds and rises from row to row")
+    rounding = float(np.spacing(np.max(np.abs(signals.time_s))))
+    if rounding > step:  # a sample that was dropped could not be told
+        kind = "single" if signals.time_s.dtype == np.float32 else "double"
+        raise InputError(
+            path,
+            "time_s",
+            f"{kind} precision rounds the times to {rounding:.2g} s, more than a step of "
+            f"{step:.2g} s",
+            "Store double precision from 0 s on, or leave time_s out and give sampling_rate_hz",
+        )
     usual = np.median(np.diff(time))
-    off = np.abs(time - time[0] - step * np.arange(samples)) > 0.5 * step
+    off = np.abs(time - time[0] - step * np.arange(samples)) > 0.5 * step + rounding
     if np.any(off):
-        row = int(np.argmax(np.abs(np.diff(time) - usual) > 0.5 * abs(usual))) + 2
+        row = int(np.argmax(np.abs(np.diff(time) - usual) > 0.5 * abs(usual) + rounding)) + 2
         raise InputError(
             path,
             "time_s",
             f"not evenly spaced (first at row {row})",
             "Samples were dropped or the clock jumped: export one unbroken stretch",
         )
-    return 1 / step
+    return float(1 / step)
 
 
 def signal_errors(recording: Recording, rig: Rig) -> list[InputError]:

@@ -20,6 +20,9 @@ from rippletwin.errors import InputError
 
 LARGEST_PLAUSIBLE_FLOW = 1.0  # m3/s; a pump of 60,000 L/min
 SMALLEST_RIPPLE = 1e-9  # of the largest flow; less is rounding
+FEWEST_ANGLES = 32  # of a flow ripple
+LARGEST_STEP = 3.0  # of the angles of a flow ripple; relative to the others
+MOST_HOLES = 3  # that are told from the coarse steps of a table
 MAX_TABLE_GIB = 0.05
 
 
@@ -86,27 +89,42 @@ def read_flow_ripple(path: Path) -> FlowRipple:
     """Columns angle_deg, flow_m3_s over one revolution."""
     angle, flow = read_table(path, ["angle_deg", "flow_m3_s"])
     _ascending(path, "angle_deg", angle)
-    step = np.max(np.diff(angle), initial=0.0)
-    if (
-        angle.size < 32
-        or angle[-1] - angle[0] > 360 + 1e-6
-        or angle[0] + 360 - angle[-1] > 3 * step
-    ):
+    _check_angles(path, angle)
+    if angle[-1] - angle[0] > 360 - 1e-6:  # the end repeats the beginning
+        angle, flow = angle[:-1], flow[:-1]
+    ripple = FlowRipple(angle_deg=angle, flow=flow)
+    _check_flow(path, ripple)
+    return ripple
+
+
+def _check_angles(path: Path, angle: np.ndarray) -> None:
+    """Raise InputError where ascending angles (M,), degrees, are not one revolution without a hole.
+
+    A hole is a step that few others come near. Steps of a table that is refined where ports open
+    differ more, but its coarse steps are many.
+    """
+    steps = np.diff(angle, append=angle[0] + 360)
+    last, hole = angle.size - 1, int(np.argmax(steps))
+    coarse = float(np.sort(steps)[-1 - MOST_HOLES :][0])
+    holed = steps[hole] > LARGEST_STEP * coarse
+    if angle.size < FEWEST_ANGLES or steps[last] < -1e-6 or (holed and hole == last):
+        problem = f"{angle.size} angles from {angle[0]:g} to {angle[last]:g} are not one revolution"
+        remedy = f"Give at least {FEWEST_ANGLES} angles over one whole revolution, 0 to 360 degrees"
+        raise InputError(path, "angle_deg", problem, remedy)
+    if holed:
         raise InputError(
             path,
             "angle_deg",
-            f"{angle.size} angles from {angle[0]:g} to {angle[-1]:g} are not one revolution",
-            "Give at least 32 angles over one whole revolution, 0 to 360 degrees",
+            f"a step of {steps[hole]:.4g} degrees from {angle[hole]:g} to {angle[hole + 1]:g} (row "
+            f"{hole + 2}) among steps of {coarse:.3g} degrees",
+            "Give the flow between these angles too",
         )
-    _check_flow(path, flow)
-    if angle[-1] - angle[0] > 360 - 1e-6:  # the end repeats the beginning
-        angle, flow = angle[:-1], flow[:-1]
-    return FlowRipple(angle_deg=angle, flow=flow)
 
 
-def _check_flow(path: Path, flow: np.ndarray) -> None:
-    """Raise InputError where `flow` (M,), m3/s, cannot be a pump's flow into a line."""
-    largest, mean = float(np.max(np.abs(flow))), float(np.mean(flow))
+def _check_flow(path: Path, ripple: FlowRipple) -> None:
+    """Raise InputError where `ripple` cannot be a pump's flow into a line."""
+    flow, mean = ripple.flow, ripple.mean
+    largest = float(np.max(np.abs(flow)))
     if largest > LARGEST_PLAUSIBLE_FLOW:
         problem = f"up to {largest:g} m3/s is implausible"
         remedy = "Give m3/s: divide L/min by 60000"

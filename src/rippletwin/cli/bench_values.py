@@ -6,7 +6,10 @@ it was given in.
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import PurePath
 
 from rippletwin.case.plausibility import LIQUID
 from rippletwin.cli import options
@@ -106,6 +109,22 @@ def read_recording(text: str) -> tuple[str, str, float, float]:
     if state not in STATES:
         raise ValueError(f"{state} is no state. Choose one of {', '.join(STATES)}")
     return file, state, SPEED.read(speed), PRESSURE.read(pressure)
+
+
+def labels_of(files: Sequence[str]) -> list[dict[str, str]]:
+    """The label of each recording whose file's name, without folder and suffix, is another's too:
+    made of its path, with its suffix where need be. Empty for the others, which need none."""
+    paths = [PurePath(file) for file in files]
+    labels = stems = [path.stem for path in paths]
+    for name in ("stem", "name"):
+        count = Counter(labels)
+        labels = [
+            "_".join((*path.relative_to(path.anchor).parts[:-1], getattr(path, name)))
+            if count[label] > 1
+            else label
+            for path, label in zip(paths, labels)
+        ]
+    return [{} if label == stem else {"label": label} for label, stem in zip(labels, stems)]
 
 
 def read_pistons(text: object) -> int:

@@ -24,6 +24,7 @@ from rippletwin.cli.bench_values import (
     VISCOSITY,
     WALL,
     BenchQuantity,
+    labels_of,
     read_pistons,
     read_recording,
     read_segment,
@@ -219,9 +220,9 @@ def _sheet(given: dict) -> NewSheet:
     modulus = given["bulk_modulus"]
     recordings = given["recordings"] or (EXAMPLE,)
     unit = {} if given["unit"] == "Pa" else {"unit": given["unit"]}
-    coefficient = None
-    if given["flow"] and given["load"] == "orifice":
-        coefficient = given["flow"] / math.sqrt(recordings[0][3])
+    flow, coefficient = given["flow"], None
+    if flow and given["recordings"] and given["load"] == "orifice":
+        coefficient = flow / math.sqrt(recordings[0][3])
     return NewSheet(
         density=density,
         viscosity=viscosity,
@@ -231,9 +232,10 @@ def _sheet(given: dict) -> NewSheet:
         sensors=given["sensors"],
         load=given["load"],
         coefficient=coefficient,
+        mean_flow=flow if coefficient is None else None,
         recordings=[
-            {"file": f, "state": s, "speed_rpm": n, "load_pressure": p, **unit}
-            for f, s, n, p in recordings
+            {"file": f, **label, "state": s, "speed_rpm": n, "load_pressure": p, **unit}
+            for (f, s, n, p), label in zip(recordings, labels_of([f for f, *_ in recordings]))
         ],
     )
 

@@ -130,12 +130,19 @@ def _read_folders(
 
 @contextmanager
 def refuse_foreign(case_folder: str | Path) -> Iterator[None]:
-    """Turn what results raise that no command has written so into an InputError: they are JSON
-    that may have been edited, or come from another version."""
+    """Turn what results raise that cannot be read, or that no command has written so, into an
+    InputError: they are JSON that may have been edited, or come from another version."""
     try:
         yield
     except InputError:
         raise
+    except OSError as error:
+        raise InputError(
+            error.filename or case_folder,
+            "results",
+            f"cannot be read ({error.strerror})",
+            "Correct the permissions of the file and its folder, or copy it again",
+        ) from error
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise InputError(
             case_folder,

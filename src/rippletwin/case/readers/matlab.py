@@ -1,8 +1,8 @@
 """MATLAB .mat, v5 (scipy) and v7.3 (HDF5): `pressure` in either orientation, Pa.
 
 Instead of `pressure` there may be one vector a sensor, named as the sensors. `sampling_rate_hz` is
-a scalar; `time_s` a vector. A v7.3 file stores arrays transposed; both orders are understood, for
-the sensors are fewer than the samples. A field of a struct is named with a point: rec.pressure.
+a scalar; `time_s` a vector. A v7.3 file holds arrays with their dimensions reversed; they are read
+as MATLAB shows them. A field of a struct is named with a point: rec.pressure.
 """
 
 from __future__ import annotations
@@ -71,17 +71,34 @@ def _fields_of(path: Path, struct: str) -> list[str]:
 
 def _read_v73(path: Path, layout: Layout) -> Signals:
     """A file of v7.3, which is HDF5."""
+
+    def array(name: str) -> Reversed | None:
+        dataset = find_dataset(path, file, name.replace(".", "/"))
+        return None if dataset is None else Reversed(dataset)
+
     with h5py.File(path, "r") as file:
         return read_arrays(
             ArrayFile(
                 path,
                 lambda: [name.replace("/", ".") for name in datasets_in(file)],
-                lambda name: find_dataset(path, file, name.replace(".", "/")),
+                array,
                 _no_attribute,
                 ".",
             ),
             layout,
         )
+
+
+class Reversed:
+    """A dataset with its dimensions in reverse order; what is indexed is read."""
+
+    def __init__(self, dataset: h5py.Dataset):
+        self._dataset, self.shape = dataset, dataset.shape[::-1]
+
+    def __getitem__(self, index) -> np.ndarray:
+        index = () if index is Ellipsis else index if isinstance(index, tuple) else (index,)
+        rest = (slice(None),) * (len(self.shape) - len(index))
+        return self._dataset[(*index, *rest)[::-1]].T
 
 
 def _no_attribute(beside: str, name: str) -> None:

@@ -12,11 +12,15 @@ from rippletwin.errors import InputError
 
 @dataclass(frozen=True)
 class Signals:
-    """Pressure (S, N) in the rig's sensor order, with whatever the file says of its time axis."""
+    """Pressure (S, N) in the rig's sensor order, with whatever the file says of its time axis.
+
+    `counts` where the file's format holds a recorder's raw counts, which need a scale.
+    """
 
     pressure: np.ndarray
     sampling_rate_hz: float | None = None
     time_s: np.ndarray | None = None
+    counts: bool = False
 
 
 def numbers(path: Path, field: str, values) -> np.ndarray:

@@ -34,15 +34,15 @@ def read(path: Path, layout: Layout) -> Signals:
             bits = read_bits(file)
     if not values.size:
         raise InputError(path, "file", "no samples", "Copy it again from where it was recorded")
-    unused = 8 * values.dtype.itemsize - bits if values.dtype.kind in "iu" else 0
+    counts = values.dtype.kind in "iu"
+    unused = 8 * values.dtype.itemsize - bits if counts else 0
     values = numbers(path, "channels", values)
     if unused > 0:
         values = values / 2**unused
     stated = Layout(layout.sensors, None, SAMPLES_BY_SENSORS, layout.channels)
     channels = values[:, None] if values.ndim == 1 else values
-    return Signals(
-        pressure=rows_of(path, "channels", channels, stated, None), sampling_rate_hz=float(rate)
-    )
+    rows = rows_of(path, "channels", channels, stated, None)
+    return Signals(pressure=rows, sampling_rate_hz=float(rate), counts=counts)
 
 
 def read_bits(file: BinaryIO) -> int:
