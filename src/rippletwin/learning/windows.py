@@ -67,15 +67,23 @@ def first_of_each_state(state: np.ndarray, recording: np.ndarray) -> np.ndarray:
     return recording == recording[first][of_state]
 
 
+def learnt_from(state: np.ndarray, recording: np.ndarray) -> np.ndarray:
+    """Mask (n,) of the windows of the first recording of every known state, from which networks of
+    recordings learn.
+
+    state, recording : (n,) of each window.
+    """
+    return first_of_each_state(state, recording) & (np.asarray(state) != UNKNOWN)
+
+
 def early_known(state: np.ndarray, recording: np.ndarray, share: float) -> np.ndarray:
-    """Indices of the early `share` of the windows of the first recording of every known state.
+    """Indices of the early `share` of the windows that are `learnt_from`.
 
     state, recording : (n,) of each window; a recording's windows follow each other, and recordings
     are numbered in their order.
     """
     early, _ = split_by_time(np.bincount(recording), share)
-    early = early[first_of_each_state(state, recording)[early]]
-    return early[np.asarray(state)[early] != UNKNOWN]
+    return early[learnt_from(state, recording)[early]]
 
 
 def early_healthy(state: np.ndarray, recording: np.ndarray, share: float) -> np.ndarray:
