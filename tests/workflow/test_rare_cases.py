@@ -1,5 +1,7 @@
 """Scripts of the workflow on cases that are rare: what they refuse, and what they let pass."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -10,6 +12,34 @@ from rippletwin.learning.training import History
 from run_script import run_script
 
 SAMPLES = 1024
+
+
+def test_a_line_that_does_not_settle_names_the_key_of_its_tolerance(tmp_path, monkeypatch):
+    """One line says which key is too strict, by how much, and what else to look at."""
+    told = SimpleNamespace(periods=200, change=3e-4, worst_position=1.0, converged=False)
+    monkeypatch.setattr("rippletwin.twin.propagation.propagate", lambda *_: told)
+    monkeypatch.setattr("rippletwin.twin.twin_file.load_twin", lambda *_: None)
+    pump = xr.Dataset({"source_flow": ("time", np.ones(4))}, attrs={"source_capacitance_m3_pa": 0})
+    store.save(pump, tmp_path / "pump.zarr")
+    point = xr.Dataset({"signal": ("time", np.ones(4))}, attrs={"speed_hz": 1, "load_pressure": 1})
+    store.save(point, tmp_path / "recorded.zarr")
+    with pytest.raises(InputError) as refused:
+        run_script(
+            "propagate",
+            tmp_path,
+            {"o": tmp_path / "propagated.zarr"},
+            {"twin": "corrected", "state": "H"},
+            {"steps": 8, "tolerance": 1e-6},
+            recordings=tmp_path / "recorded.zarr",
+            flow=tmp_path / "pump.zarr",
+            healthy=tmp_path / "pump.zarr",
+            twin=tmp_path / "twin.json",
+        )
+    assert str(refused.value) == (
+        "config: propagation.tolerance: 1e-06: after 200 revolutions the line still changes by "
+        "0.0003 of its ripple from one to the next. Raise it, or check in rig.yaml what damps the "
+        "line: load and viscosity"
+    )
 
 
 def test_a_short_recording_that_nobody_learns_from_does_not_stop_a_training(tmp_path, monkeypatch):
