@@ -3,11 +3,14 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
+from case_folders import sheet, write_case
 from rippletwin import store
 from rippletwin.errors import InputError
+from rippletwin.learning import recording_accuracy
 from rippletwin.learning.training import History
 from run_script import run_script
 
@@ -79,3 +82,39 @@ def test_a_short_recording_that_nobody_learns_from_does_not_stop_a_training(tmp_
     assert learnt == [[0] * 4 + [1] * 4 + [2] * 4]
     with pytest.raises(InputError, match="recording S1: file: makes 2 windows"):
         run(("H", 5), ("S", 2), ("S", 5))
+
+
+def test_claims_take_a_label_for_text(tmp_path, monkeypatch):
+    """Recordings called None, 1 and 01 are three: none is a gap in the table, and no two are one
+    number. Two networks are compared on each of them."""
+    write_case(tmp_path, sheet())
+    labels = ["None", "1", "01"]
+    networks = ("cnn1d_341_100", "cnn1d_3_1")
+    cells = [dict(architecture=name, dataset="CFD-P", seed=0) for name in networks]
+    rows = [cell | dict(recording=label, share=1.0) for cell in cells for label in labels]
+    pd.DataFrame(rows).to_csv(tmp_path / "recordings.csv", index=False)
+    scores = dict(accuracy=100.0, accuracy_either=100.0, converged=True)
+    pd.DataFrame([cell | scores for cell in cells]).to_csv(tmp_path / "accuracy.csv", index=False)
+    paper = pd.DataFrame(columns=["architecture", "dataset", "mean", "std"])
+    paper.to_csv(tmp_path / "paper.csv", index=False)
+    seen, shares_of = [], recording_accuracy.recording_shares
+
+    def keep(rows):
+        seen.append(shares_of(rows))
+        return seen[-1]
+
+    monkeypatch.setattr(recording_accuracy, "recording_shares", keep)
+    monkeypatch.setattr("rippletwin.figures.style.save", lambda *_: None)
+    outputs = ("table", "comparisons", "page", "png", "svg")
+    run_script(
+        "claims",
+        tmp_path,
+        {name: tmp_path / f"claims.{name}" for name in outputs},
+        {},
+        {"datasets": ["CFD-P"], "samples_per_revolution": 3072},
+        rig=tmp_path / "rig.yaml",
+        table=tmp_path / "accuracy.csv",
+        recordings=tmp_path / "recordings.csv",
+        paper=tmp_path / "paper.csv",
+    )
+    assert sorted(seen[0].index) == sorted(labels) and seen[0].notna().all(axis=None)
