@@ -118,3 +118,46 @@ def test_claims_take_a_label_for_text(tmp_path, monkeypatch):
         paper=tmp_path / "paper.csv",
     )
     assert sorted(seen[0].index) == sorted(labels) and seen[0].notna().all(axis=None)
+
+
+def calibrate(folder, monkeypatch, **changed):
+    """The ripples that the scripts `calibrate` and `plot_calibration` make and draw of a case with
+    one recording, some of its keys changed; nothing is fitted."""
+    content = sheet()
+    content["recordings"][0] |= changed
+    write_case(folder, content)
+    fit = SimpleNamespace(relative=0.1, theil=0.1)
+
+    def fitted(twin, *_, **__):
+        return SimpleNamespace(warnings=(), before=fit, after=fit, twin=twin, nominal=twin)
+
+    monkeypatch.setattr("rippletwin.calibration.calibrate.calibrate", fitted)
+    monkeypatch.setattr("rippletwin.calibration.report.save", lambda *_: None)
+    ripples, pictures = folder / "ripples.zarr", folder / "pictures"
+    run_script(
+        "calibrate",
+        folder,
+        {"ripples": ripples, "twin": folder / "twin.json"},
+        {},
+        {"method": "map", "friction": "steady", "max_frequency_hz": None},
+        rig=folder / "rig.yaml",
+    )
+    run_script("plot_calibration", folder, {"o": pictures}, {}, {}, ripples=ripples)
+    return store.load(ripples), list(pictures.iterdir())
+
+
+@pytest.mark.parametrize(("kind", "count"), [("periodic", 1), ("random", 0)])
+def test_a_case_without_a_healthy_ripple_is_calibrated(tmp_path, monkeypatch, kind, count):
+    """Of a random excitation there is no ripple to draw: the store is empty and has the rig's
+    sensors, and the folder of pictures, which Snakemake asks for, is there."""
+    ripples, pictures = calibrate(tmp_path, monkeypatch, kind=kind)
+    assert dict(ripples.sizes) == {"point": count, "channel": 2, "time": 1024}
+    assert len(pictures) == 2 * count and ripples.point.size == count
+    assert ripples.channel.values.tolist() == ["p1", "p2"]
+    assert ripples.angle_deg.values[512] == 180.0
+
+
+def test_a_case_without_a_healthy_recording_is_refused(tmp_path, monkeypatch):
+    """With the words of the command line."""
+    with pytest.raises(InputError, match="recordings: none has state: healthy"):
+        calibrate(tmp_path, monkeypatch, state="slipper")
