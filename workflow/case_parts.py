@@ -9,6 +9,7 @@ file makes none either.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 
 from rippletwin.case.diagnosed_point import reference_recordings, unknown_recordings
@@ -48,14 +49,17 @@ def recordings_for(sheet: dict, purpose: str) -> list[dict]:
     return [entry for entry in sheet["recordings"] if label_of(entry) in chosen]
 
 
-def files_for(sheet: dict, purpose: str) -> list[str]:
-    """Files, relative to rig.yaml, that a job for a purpose reads besides it; sorted."""
+def files_for(sheet: dict, purpose: str, folder: str) -> list[str]:
+    """Files that a job for a purpose reads besides the rig.yaml in `folder`; sorted.
+
+    A name may be absolute (RIPPLETWIN_DATA allows it), and `folder` is empty for this one.
+    """
     load = sheet["load"]
     files = {load["impedance"]} if "impedance" in load else set()
     for entry in recordings_for(sheet, purpose):
         files |= {entry[key] for key in NAMED_FILES if key in entry}
         files |= set(entry.get("repeats", ()))
-    return sorted(files)
+    return sorted(os.path.join(folder, name) for name in files)
 
 
 def is_scored(sheet: dict) -> bool:

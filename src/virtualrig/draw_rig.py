@@ -19,6 +19,8 @@ UNCERTAINTY = {
 
 RECORDING_S = 3.2
 HIGHEST_HZ = 4000.0  # of the harmonics that count in comparisons
+COARSE_TURNS = 16  # shaft angles tried in a period of the highest of these harmonics
+FINE_TURNS = 401  # and between the neighbours of the best of them
 
 
 def draw_data_sheet(rng: np.random.Generator) -> dict:
@@ -167,13 +169,22 @@ def draw_wrong_pump(sheet: dict, point: Point, error: float, rng: np.random.Gene
 def ripple_difference(wave: np.ndarray, other: np.ndarray, pistons: int, point: Point) -> float:
     """Norm of the difference of two ripples (..., N), over that of `other`.
 
-    Of their piston harmonics below HIGHEST_HZ, at the shaft angle that makes it least.
+    Of their piston harmonics below HIGHEST_HZ, at the shaft angle that makes it least, of a whole
+    pitch of the pistons.
     """
     top = int(HIGHEST_HZ / (point.speed_rpm / 60 * pistons))
     a, b = (np.fft.rfft(x)[..., pistons : top * pistons + 1 : pistons] for x in (wave, other))
     order = np.arange(1, top + 1)
-    turned = (b * np.exp(-2j * np.pi * t * order) for t in np.linspace(-0.02, 0.02, 801))
-    return float(min(np.linalg.norm(a - x) for x in turned) / np.linalg.norm(b))
+    alike = np.sum((a * b.conj()).reshape(-1, top), axis=0)
+
+    def best(turns: np.ndarray) -> float:
+        """The one of `turns`, in pitches, by which `other` is most like `wave`."""
+        return turns[np.argmax((np.exp(2j * np.pi * np.outer(turns, order)) @ alike).real)]
+
+    coarse = best(np.linspace(-0.5, 0.5, COARSE_TURNS * top, endpoint=False))
+    step = 1.0 / (COARSE_TURNS * top)
+    turn = best(coarse + step * np.linspace(-1.0, 1.0, FINE_TURNS))
+    return float(np.linalg.norm(a - b * np.exp(-2j * np.pi * turn * order)) / np.linalg.norm(b))
 
 
 def _four_digits(value: float) -> float:

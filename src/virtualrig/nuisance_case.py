@@ -239,9 +239,10 @@ def floor_of(drawn: DrawnRig, ripples: list[np.ndarray]) -> float:
     errors = []
     for plan, true in zip(drawn.recordings, ripples, strict=True):
         seal = seal_at(drawn.sheet, drawn.true, drawn.nuisance, plan.kelvin)
-        nominal = settled_ripple(Bench(build(drawn.sheet, seal | {"pump": {}})), plan.point)
-        pistons = drawn.sheet["pump"]["pistons"]
-        errors.append(ripple_difference(nominal, true, pistons, plan.point))
+        # The pump is replaced in the rig that is built: volumes are divided by the true modulus.
+        rig = replace(build(drawn.sheet, seal), pump=Pump(**drawn.sheet["pump"]))
+        nominal = settled_ripple(Bench(rig), plan.point)
+        errors.append(ripple_difference(nominal, true, rig.pump.pistons, plan.point))
     return float(np.sqrt(np.mean(np.square(errors))))
 
 

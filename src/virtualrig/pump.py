@@ -1,8 +1,9 @@
 """Axial piston pump of the virtual rig: chambers of a compressible liquid between two ports.
 
 Crank angle is zero where a piston is furthest out; a chamber then shrinks, and delivers, for half a
-turn. Around both dead centres a chamber is shut off for `port_overlap_deg`; from there the port in
-question opens to its whole area over `port_opening_deg`, and closes the same way.
+turn. Around both dead centres a chamber is shut off for `port_overlap_deg`, or open to both ports
+where that is negative; from there the port in question opens to its whole area over
+`port_opening_deg`, and closes the same way.
 
 Free air makes the chambers' liquid softer at low pressure. A chamber's state is its compression
 e(p) = p + B f (1 - (p0/p)^(1/n)), absolute p, that of a liquid of modulus B with a volume fraction
@@ -135,7 +136,10 @@ def port_opening(angle, ports):
 
     The suction port is the same half a turn later.
     """
-    from_start = (angle - ports[TIMING]) % (2 * np.pi) - 0.5 * ports[OVERLAP]
+    from_centre = (angle - ports[TIMING]) % (2 * np.pi)
+    if from_centre >= 1.5 * np.pi:  # the dead centre is ahead, and the port may open before it
+        from_centre -= 2 * np.pi
+    from_start = from_centre - 0.5 * ports[OVERLAP]
     to_end = np.pi - ports[OVERLAP] - from_start
     if ports[GROOVE] > 0:
         return _grooved_opening(min(from_start, to_end), ports)

@@ -90,6 +90,16 @@ def texts(figure):
     return [t for t in drawn if t.get_text().strip()]
 
 
+def test_more_networks_than_colours_differ_in_their_markers():
+    """Nine networks of either kind, which somebody has added: no two of them look alike."""
+    names = [f"network {k}" for k in range(18)]
+    images = [k % 2 == 0 for k in range(18)]
+    points = np.full((18, 2), 0.9), np.full((18, 2), 80.0)
+    figure = attention.plot_ranks({"CFD-P": (names, images, *points)})
+    lines = [drawn.lines[0] for drawn in figure.axes[0].containers]
+    assert len({(line.get_marker(), line.get_color()) for line in lines}) == 18
+
+
 @pytest.mark.parametrize("name", DRAWN)
 def test_no_text_is_cut_off(name):
     """Every text that is drawn lies within the picture."""

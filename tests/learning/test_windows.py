@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rippletwin.errors import InputError
-from rippletwin.learning.dataset import UNKNOWN
+from rippletwin.learning.dataset import UNKNOWN, split_by_time
 from rippletwin.learning.windows import (
     check_window_counts,
     early_healthy,
@@ -84,3 +84,22 @@ def test_early_healthy_windows_are_of_one_recording():
     assert early_healthy(state, recording, 0.5).tolist() == [1, 2]
     with pytest.raises(InputError, match="none is healthy"):
         early_healthy(state[:1], recording[:1], 0.5)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.75, 0.8, 0.9])
+def test_early_healthy_windows_are_tested_by_no_network(share):
+    """For any number of windows, odd ones too: neither a network on windows nor one on pairs is
+    tested on a window that simulations have their misfit from."""
+    for count in range(4, 60):
+        recording = np.zeros(count, int)
+        early = early_healthy(np.full(count, "H"), recording, share)
+        _, late = split_by_time([count], share)
+        pairs = np.transpose(pair_windows(recording))
+        _, late_pairs = split_by_time([len(pairs)], share)
+        assert not set(early) & {*late, *pairs[late_pairs].flat}, count
+
+
+def test_a_healthy_recording_without_an_early_window_is_refused():
+    """A single window is tested, so that nothing is left for simulations."""
+    with pytest.raises(InputError, match="makes 1 windows, of which none is among the early 80%"):
+        early_healthy(np.array(["H"]), np.array([0]), 0.8)

@@ -10,9 +10,10 @@ import pytest
 from virtualrig.conceal import change_and_floor
 from virtualrig.draw import MIX, case_kinds, draw_case, random_generator
 from virtualrig.draw_effects import load_dynamics
-from virtualrig.draw_rig import UNCERTAINTY
+from virtualrig.draw_rig import UNCERTAINTY, ripple_difference
 from virtualrig.drawn_effect import RigContext
 from virtualrig.pump import Pump
+from virtualrig.recorder import Point
 from virtualrig.rig import build
 from virtualrig.source import constant_pressure_flow
 
@@ -82,7 +83,7 @@ def test_drawn_valves_are_passive_at_all_frequencies():
 
 def test_the_flow_ripple_is_wrong_by_the_drawn_error():
     """The true pump's ripple differs from the nominal one by the drawn 1 to 4 %, by this test's own
-    spectrum and search for the shaft angle."""
+    spectrum and search for the shaft angle over a pitch of the pistons."""
     d = draw_case(60, "a", 1, 3)
     point, density = d.points[0], d.sheet["fluid"]["density"]
     pump = Pump(**d.sheet["pump"])
@@ -94,10 +95,29 @@ def test_the_flow_ripple_is_wrong_by_the_drawn_error():
     top = int(4000 / (point.speed_rpm / 60))
     order = np.arange(pump.pistons, top + 1, pump.pistons)
     a, b = (np.fft.fft(flow)[order] for flow in flows)
-    angles = np.radians(np.linspace(-2, 2, 4001))
+    angles = np.pi / pump.pistons * np.linspace(-1, 1, 20001)
     misfits = [np.linalg.norm(a - b * np.exp(-1j * order * x)) for x in angles]
     assert 0.01 <= d.truth["source_error"] <= 0.04
     assert min(misfits) / np.linalg.norm(b) == pytest.approx(d.truth["source_error"], rel=0.1)
+
+
+@pytest.mark.parametrize("degrees", [0.5, 4.0, -11.0, 19.9])
+def test_ripples_that_differ_by_the_shaft_angle_alone_are_the_same(degrees):
+    """The timing of a wrong pump is up to four degrees late, and a verdict's shaft angle is free:
+    an angle is no error. A harmonic of one of them alone is one at any angle."""
+    point = Point("p", 1000.0, 9.5e6, 1.0)
+    turns = np.arange(4608) / 4608
+    rng = np.random.default_rng(0)
+    size, phase = rng.uniform(1, 2, (2, 26)), rng.uniform(0, 2 * np.pi, (2, 26))
+
+    def wave(shift):
+        parts = 9 * np.arange(1, 27)[:, None] * (turns - shift / 360)
+        return np.einsum("sk,skt->st", size, np.cos(2 * np.pi * parts + phase[..., None]))
+
+    assert ripple_difference(wave(degrees), wave(0), 9, point) < 1e-3
+    added = 0.3 * np.linalg.norm(size) * np.cos(2 * np.pi * 9 * 26 * turns)
+    worse = ripple_difference(wave(degrees) + added, wave(0), 9, point)
+    assert worse == pytest.approx(0.3 * np.sqrt(2), rel=0.1)
 
 
 @pytest.mark.long

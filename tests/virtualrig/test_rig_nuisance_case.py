@@ -15,6 +15,7 @@ from virtualrig.nuisance_case import (
     record_nuisance_case,
     true_ripples,
 )
+from virtualrig.pump import Pump
 from virtualrig.rig import build
 
 COUNT, COMMIT, NUMBER = 60, "fixed", 1
@@ -74,6 +75,26 @@ def test_nuisance_physics_is_part_of_the_truth():
     assert all(("sensor_gain", f"sensor {s['name']}") in places for s in rig.sheet["sensors"])
     volumes = [e["position"] for e in listed if e["name"] == "line_volume"]
     assert volumes == list(rig.true["sensors"])
+
+
+def test_the_floor_is_of_the_true_line_with_the_sheets_pump(monkeypatch):
+    """Volumes of liquid are stated with the true pump's bulk modulus: that of the sheet's would
+    make another line, and the floor would be an error of the line too."""
+    settled = []
+    monkeypatch.setattr(
+        "virtualrig.nuisance_case.settled_ripple",
+        lambda bench, _: settled.append(bench.rig) or np.ones((1, 4)),
+    )
+    monkeypatch.setattr("virtualrig.nuisance_case.ripple_difference", lambda *_: 0.0)
+    for case in cases("single"):
+        rig = case.rig
+        settled.clear()
+        true_ripples(rig)
+        floor_of(rig, [None] * len(rig.recordings))
+        true, nominal = settled[: len(rig.recordings)], settled[len(rig.recordings) :]
+        for one, other in zip(true, nominal, strict=True):
+            assert other.network == one.network and other.sensing == one.sensing
+            assert other.pump == Pump(**rig.sheet["pump"]) != one.pump
 
 
 @pytest.mark.parametrize("geometry", [True, False])

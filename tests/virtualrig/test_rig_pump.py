@@ -117,6 +117,18 @@ def test_ports_open_one_at_a_time():
     assert delivery.max() == suction.max() == 1
 
 
+@pytest.mark.parametrize("overlap", [-8.0, 0.0, 4.0])
+def test_a_port_opens_as_it_closes(overlap):
+    """A smooth step from half the overlap behind the dead centre on, or before it where the overlap
+    is negative: by this test's own formula, without a jump where a turn ends."""
+    _, ports = pump_tables(Pump(port_overlap_deg=overlap), RHO)
+    angle = np.arange(-90, 270, 0.25)
+    found = np.array([port_opening(a, ports) for a in np.radians(angle)])
+    x = np.clip((90 - overlap / 2 - np.abs(angle - 90)) / 30, 0, 1)
+    np.testing.assert_allclose(found, 3 * x**2 - 2 * x**3, atol=1e-12)
+    assert np.count_nonzero(found[angle < 0]) == max(-overlap / 2 * 4 - 1, 0)
+
+
 def rig(**effects):
     """A small rig: the built-in pump on one short pipe."""
     known = {

@@ -130,6 +130,23 @@ def test_method_of_the_flow_sensor_reruns_the_flow_columns_only(workflow):
     assert "output: out/models/CFD-Q+/" in text and "output: out/models/CFD-MOC-P" not in text
 
 
+def test_the_band_of_the_flow_sensor_reruns_the_flow_columns_only(workflow):
+    """Simulated and estimated flow are cut at it; no signal of pressure is made anew."""
+    edit(workflow / "config/config.yaml", "bandwidth_hz: 1500", "bandwidth_hz: 1200")
+    rules, text = planned(workflow)
+    assert {"flow_sensor", "seed_signal"} <= rules and "propagate" not in rules
+    assert "output: out/models/CFD-Q+/" in text
+    assert "output: out/models/CFD-MOC-P" not in text and "output: out/models/CFD-P/" not in text
+
+
+def test_a_network_that_the_flow_sensor_is_without_reruns_nothing(workflow):
+    """The spectral method has no physics-informed network. The page states the configuration, so it
+    alone is written anew."""
+    edit(workflow / "config/config.yaml", "width: 32", "width: 16")
+    edit(workflow / "config/config.yaml", "steps: 300", "steps: 200")
+    assert planned(workflow)[0] == {"report_page"}
+
+
 def test_a_compound_fault_adds_jobs_of_its_own(workflow):
     """Another pair of faults is simulated, propagated and shown. Every simulated dataset is trained
     again, whose temporary weights are asked, and no single fault is simulated again."""

@@ -47,7 +47,8 @@ RECORDED_HERE = config["case"] == "virtualrig"
 RIG, SHEET = (
     (f"{RESULTS}/case/rig.yaml", {}) if RECORDED_HERE else read_rig(config["case"])
 )
-CASE = os.path.dirname(RIG)
+CASE = os.path.dirname(RIG)  # empty where rig.yaml lies in the working directory
+WHOSE_RECORDINGS = "the virtual rig's" if RECORDED_HERE else f"those of {CASE or '.'}"
 
 # the virtual rig has a healthy pump and known faults at one operating point
 HAS_PERIODIC = RECORDED_HERE or case_parts.has_periodic(SHEET)
@@ -64,7 +65,7 @@ def recordings(purpose):
     virtual rig makes them."""
     if RECORDED_HERE:
         return [f"{CASE}/recordings"]
-    return local([f"{CASE}/{name}" for name in case_parts.files_for(SHEET, purpose)])
+    return local(case_parts.files_for(SHEET, purpose, CASE))
 
 
 def rig_sheet():

@@ -14,7 +14,7 @@ rule flow_sensor:
     params:
         bandwidth_hz=config["flow_sensor"]["bandwidth_hz"],
         method=config["flow_sensor"]["method"],
-        width=config["flow_sensor"]["pinn"]["width"],
-        steps=config["flow_sensor"]["pinn"]["steps"],
+        width=pinn_setting("width"),
+        steps=pinn_setting("steps"),
     script:
         "../scripts/flow_sensor.py"

@@ -80,6 +80,19 @@ def seed_variable_of(wildcards):
     return by_signal[DATASETS[wildcards.dataset].signal]
 
 
+def bandwidth_of(wildcards):
+    """Highest frequency of a dataset's signal, Hz, where it is flow; pressure has none, so that an
+    edit of the flow sensor's reruns no dataset of pressure."""
+    is_flow = DATASETS[wildcards.dataset].signal == "flow"
+    return config["flow_sensor"]["bandwidth_hz"] if is_flow else None
+
+
+def pinn_setting(name):
+    """A setting of the physics-informed network; None where the flow sensor is without one."""
+    sensor = config["flow_sensor"]
+    return sensor["pinn"][name] if sensor["method"] == "pinn" else None
+
+
 # ---- samples ----
 
 

@@ -32,6 +32,6 @@ rule seed_signal:
         f"{RESULTS}/benchmarks/seed_signal/{{dataset}}/{{faults}}.tsv"
     params:
         signal=seed_variable_of,
-        bandwidth_hz=config["flow_sensor"]["bandwidth_hz"],
+        bandwidth_hz=bandwidth_of,
     script:
         "../scripts/seed_signal.py"

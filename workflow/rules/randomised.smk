@@ -20,7 +20,7 @@ rule randomised_signals:
         severity=config["faults"]["severity"],
         limit=config["faults"]["severity_limit"],
         draws=config["propagation"]["draws"],
-        bandwidth_hz=config["flow_sensor"]["bandwidth_hz"],
+        bandwidth_hz=bandwidth_of,
         learnt_share=config["experimental"]["training_share"],
     script:
         "../scripts/randomised_signals.py"

@@ -28,7 +28,7 @@ rule accuracy_table:
         f"{RESULTS}/benchmarks/accuracy_table.tsv"
     params:
         severity=config["scoring"],
-        recordings="the virtual rig's" if RECORDED_HERE else f"those of {CASE}",
+        recordings=WHOSE_RECORDINGS,
         cells=cells(CHOSEN),
         columns=table_columns(),
         signals={name: DATASETS[name].signal for name in CHOSEN},
@@ -120,7 +120,7 @@ rule report_page:
         f"{RESULTS}/benchmarks/report_page.tsv"
     params:
         rig=rig_content(*RIG_SECTIONS, recordings="all"),
-        recordings="the virtual rig's" if RECORDED_HERE else f"those of {CASE}",
+        recordings=WHOSE_RECORDINGS,
         benchmarks=f"{RESULTS}/benchmarks",
         population=scored_population(),
         datasets={name: DATASETS[name]._asdict() for name in CHOSEN},

@@ -2,21 +2,22 @@
 
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
 from job import open_log
 from rippletwin import store
 from rippletwin.calibration import report
 from rippletwin.calibration.calibrate import Settings, calibrate
+from rippletwin.calibration.calibrate_case import observe_healthy
 from rippletwin.calibration.pareto import calibrate_pareto
 from rippletwin.case.load import load_case
-from rippletwin.spectra.observation import observe
 from rippletwin.twin.twin import Twin
 
 report_progress = open_log(snakemake)
 params = snakemake.params
 case = load_case(Path(snakemake.input.rig).parent, states={"healthy"})
-observations = [observe(r, case.rig, piston_harmonics_only=True) for r in case.recordings]
+observations = observe_healthy(case)
 twin = Twin(case.rig, observations, friction=params.friction)
 settings = Settings(max_frequency_hz=params.max_frequency_hz)
 if params.method == "pareto":
@@ -32,18 +33,20 @@ report_progress(
     f"Theil {calibration.before.theil:.3f} -> {calibration.after.theil:.3f}"
 )
 
-names = ("measured", "nominal", "calibrated")
+# None where no healthy recording is periodic: the store is then empty along `point`.
 ripples = report.compute_ripples(calibration, observations)
+sensors = [sensor.name for sensor in case.rig.sensors]
+dims, shape = ("point", "channel", "time"), (len(ripples), len(sensors), len(report.RIPPLE_DEG))
 store.save(
     xr.Dataset(
         {
-            name: (("point", "channel", "time"), [r[name] for r in ripples], {"units": "Pa"})
-            for name in names
+            name: (dims, np.reshape([r[name] for r in ripples], shape), {"units": "Pa"})
+            for name in ("measured", "nominal", "calibrated")
         },
         coords={
             "point": [r["label"] for r in ripples],
-            "channel": ripples[0]["sensors"],
-            "angle_deg": ("time", ripples[0]["angle_deg"], {"units": "degrees"}),
+            "channel": sensors,
+            "angle_deg": ("time", report.RIPPLE_DEG, {"units": "degrees"}),
         },
         attrs={"source": "piston harmonics of healthy recordings"},
     ),

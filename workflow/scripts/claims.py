@@ -15,9 +15,13 @@ from rippletwin.learning.recording_accuracy import recording_shares
 report_progress = open_log(snakemake)
 paths = snakemake.output
 pistons = load_case(Path(snakemake.input.rig).parent, states=()).rig.pump["pistons"]
+results = pd.read_csv(snakemake.input.table)
+# a recording's label is text, whatever it looks like: 01 or None
+recordings = pd.read_csv(
+    snakemake.input.recordings, dtype={"recording": str}, keep_default_na=False
+)
 results, recordings = (
-    table[table.dataset.isin(snakemake.params.datasets)]
-    for table in map(pd.read_csv, (snakemake.input.table, snakemake.input.recordings))
+    table[table.dataset.isin(snakemake.params.datasets)] for table in (results, recordings)
 )
 shares = recording_shares(recordings)
 cells = paper_claims.cells_of(results, pd.read_csv(snakemake.input.paper), shares)

@@ -10,6 +10,7 @@ from rippletwin.figures.style import save
 report_progress = open_log(snakemake)
 ripples = store.load(snakemake.input.ripples)
 folder = Path(snakemake.output[0])
+folder.mkdir(parents=True, exist_ok=True)  # empty where no healthy recording is periodic
 for label in ripples.point.values:
     point = ripples.sel(point=label)
     curves = {name: values.values for name, values in point.data_vars.items()}

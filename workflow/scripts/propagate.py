@@ -4,6 +4,7 @@ import xarray as xr
 
 from job import open_log
 from rippletwin import store
+from rippletwin.errors import InputError
 from rippletwin.twin.propagation import propagate, pump_change
 from rippletwin.twin.twin_file import load_twin
 
@@ -28,7 +29,13 @@ report_progress(
     f"largest at {result.worst_position:.2f} m"
 )
 if not result.converged:
-    raise ArithmeticError(f"the line does not repeat itself to {params.tolerance}")
+    raise InputError(
+        "config",
+        "propagation.tolerance",
+        f"{params.tolerance:g}: after {result.periods} revolutions the line still changes by "
+        f"{result.change:.1g} of its ripple from one to the next",
+        "Raise it, or check in rig.yaml what damps the line: load and viscosity",
+    )
 store.save(
     xr.Dataset(
         {

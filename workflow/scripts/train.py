@@ -10,11 +10,10 @@ from job import open_log
 from rippletwin import store
 from rippletwin.learning.architectures import CLASSES
 from rippletwin.learning.arithmetic import choose_arithmetic
-from rippletwin.learning.dataset import UNKNOWN
 from rippletwin.learning.networks import build, save_tensors
 from rippletwin.learning.side_by_side import train_all
 from rippletwin.learning.training import TrainingSettings, train_stepwise
-from rippletwin.learning.windows import check_window_counts, early_known
+from rippletwin.learning.windows import check_window_counts, early_known, learnt_from
 
 report_progress = open_log(snakemake)
 params, paths = snakemake.params, snakemake.input.samples
@@ -27,12 +26,13 @@ def samples(path):
     data = store.load(path)
     if "label" in data:
         return data.signal.values, data.label.values
-    of_recording = data.recording.values[data.state.values != UNKNOWN].tolist()
-    counts = {data.labels[k]: n for k, n in Counter(of_recording).items()}
+    state, recording = data.state.values, data.recording.values
+    learnt = Counter(recording[learnt_from(state, recording)].tolist())
+    counts = {data.labels[k]: n for k, n in learnt.items()}
     check_window_counts(counts, params.learnt_share, settings.validation_fraction)
-    kept = early_known(data.state.values, data.recording.values, params.learnt_share)
-    state = np.where(data.state == "C", params.cylinder, data.state)[kept]
-    return data.signal.values[kept], np.array([CLASSES.index(s) for s in state])
+    kept = early_known(state, recording, params.learnt_share)
+    scored = np.where(state == "C", params.cylinder, state)[kept]
+    return data.signal.values[kept], np.array([CLASSES.index(s) for s in scored])
 
 
 def report_epoch(epoch, so_far):

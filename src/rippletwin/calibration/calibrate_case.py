@@ -7,7 +7,7 @@ from collections.abc import Callable
 from rippletwin.calibration.calibrate import Calibration, calibrate
 from rippletwin.case.model import Case
 from rippletwin.errors import InputError
-from rippletwin.spectra.observation import observe
+from rippletwin.spectra.observation import Observation, observe
 from rippletwin.twin.twin import Twin
 
 
@@ -24,6 +24,16 @@ def calibrate_case(
     Raises InputError where no recording is healthy, and where the band of one holds no
     harmonic of the pistons.
     """
+    observations = observe_healthy(case)
+    twin = Twin(case.rig, observations, friction=friction)
+    return calibrate(twin, observations, progress=progress)
+
+
+def observe_healthy(case: Case) -> list[Observation]:
+    """What a calibration fits: the healthy recordings of a case at the pistons' harmonics.
+
+    Raises InputError as `calibrate_case`.
+    """
     if not case.healthy:
         raise InputError(
             case.folder / "rig.yaml",
@@ -31,6 +41,4 @@ def calibrate_case(
             "none has state: healthy",
             "calibration needs at least one healthy recording",
         )
-    observations = [observe(r, case.rig, piston_harmonics_only=True) for r in case.healthy]
-    twin = Twin(case.rig, observations, friction=friction)
-    return calibrate(twin, observations, progress=progress)
+    return [observe(r, case.rig, piston_harmonics_only=True) for r in case.healthy]

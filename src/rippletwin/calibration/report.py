@@ -17,7 +17,7 @@ from rippletwin.twin import twin_file
 from rippletwin.twin.unknown_load import LoadCurve
 
 LOAD_ROWS_STEP = 8  # frequencies of the load's curve from one row to the next
-
+RIPPLE_DEG = 360 * np.arange(1024) / 1024  # crank angles at which ripples are drawn
 
 UNEVENNESS = 0.0015
 """Relative standard deviation of a segment's wave speed as one number for all of it: it falls by
@@ -174,22 +174,19 @@ def _load_table(curve: LoadCurve) -> list[str]:
 
 
 def compute_ripples(
-    calibration: Calibration, observations: Sequence, samples: int = 1024
+    calibration: Calibration, observations: Sequence
 ) -> list[dict[str, np.ndarray]]:
     """Pressure ripples to draw, one dictionary for each periodic observation.
 
     label       of the observation
-    sensors     (S,) names
-    angle_deg   (samples,) over one revolution
-    measured, nominal, calibrated   (S, samples) Pa without mean, from the same harmonics; a free
-                source has its most likely amplitude
+    measured, nominal, calibrated   (S, len(RIPPLE_DEG)) Pa without mean, from the same harmonics; a
+                free source has its most likely amplitude
     """
     out = []
-    angle = 2 * np.pi * np.arange(samples) / samples
     for o in observations:
         if o.orders is None:
             continue
-        turn = np.exp(1j * np.outer(o.orders, angle))
+        turn = np.exp(1j * np.outer(o.orders, np.deg2rad(RIPPLE_DEG)))
         spectra = {
             "measured": o.values,
             "nominal": with_likely_amplitude(o, calibration.nominal.predict([o])[0], o.values),
@@ -198,8 +195,6 @@ def compute_ripples(
         out.append(
             {
                 "label": o.label,
-                "sensors": np.array([s.name for s in o.sensors]),
-                "angle_deg": np.rad2deg(angle),
                 **{name: (x @ turn).real for name, x in spectra.items()},
             }
         )

@@ -78,6 +78,7 @@ def command(
     from rippletwin.diagnosis.diagnosis_file import write_diagnosis
     from rippletwin.diagnosis.faults.library import select_faults
     from rippletwin.diagnosis.kept_answers import diagnose_changed, warnings_of
+    from rippletwin.figures.fault_posterior import draw, remove_figures
     from rippletwin.twin.effects.library import add_effects
 
     faults = select_faults(list(fault_names))
@@ -93,9 +94,9 @@ def command(
     entries = [each.entry for each in found]
     warnings = warnings_of(read, twin)
     result = write_diagnosis(entries, out, _answers(networks, recordings, read), warnings)
-    if not no_figures:
-        from rippletwin.figures.fault_posterior import draw
-
+    if no_figures:
+        remove_figures(out)
+    else:
         draw([each.numbers for each in found], out)
     if as_json:
         print(json.dumps(result))
@@ -143,10 +144,12 @@ def _twin_of(twin_file: str | None, out: str, processes: int, case, recordings, 
     from rippletwin.diagnosis.diagnose import check_recordings
     from rippletwin.explanation.explain import explain
     from rippletwin.explanation.verdict.verdict_file import write_verdict
+    from rippletwin.figures.explanation import remove_figures
 
     check_recordings(case, recordings)
     diagnosed = {recording.label for recording in recordings}
     known = tuple(r for r in case.recordings if r.label not in diagnosed)
     explanation = explain(replace(case, recordings=known), processes, progress)
     write_verdict(explanation, out)
+    remove_figures(out)  # of an earlier explanation in this folder
     return explanation.twin

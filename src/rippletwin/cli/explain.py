@@ -62,6 +62,7 @@ def command(
     from rippletwin.explanation.checks.bootstrap import MIN_DRAWS
     from rippletwin.explanation.explain import explain
     from rippletwin.explanation.verdict.verdict_file import write_verdict
+    from rippletwin.figures.explanation import draw, remove_figures
     from rippletwin.twin.effects.library import add_effects
 
     if bootstrap and bootstrap < MIN_DRAWS:
@@ -77,9 +78,9 @@ def command(
     with progress_bars(as_json) as progress:
         explanation = explain(read, processes, progress, bootstrap)
     result = write_verdict(explanation, out)
-    if not no_figures:
-        from rippletwin.figures.explanation import draw
-
+    if no_figures:
+        remove_figures(out)
+    else:
         draw(explanation, out, processes=processes)
     print(json.dumps(result) if as_json else result["sentence"])
     found = [result["verdict"]]

@@ -99,7 +99,9 @@ case = click.argument("case", metavar="CASE", type=click.Path(path_type=Path))
 json_output = click.option(
     "--json", "as_json", is_flag=True, help="Print the result as JSON and nothing else."
 )
-no_figures = click.option("--no-figures", is_flag=True, help="Write no figures.")
+no_figures = click.option(
+    "--no-figures", is_flag=True, help="Write no figures, and remove those of an earlier call."
+)
 
 
 def out(help: str):

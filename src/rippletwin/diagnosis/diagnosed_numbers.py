@@ -93,6 +93,14 @@ def load(folder: str | Path) -> dict[str, DiagnosedNumbers]:
     return {each["label"]: from_plain(each) for each in entries}
 
 
+def load_labels(folder: str | Path) -> list[str]:
+    """Labels of the recordings whose numbers are in `folder`; none where the file was spoilt."""
+    try:
+        return [str(each["label"]) for each in json.loads((Path(folder) / FILE).read_text())]
+    except (OSError, ValueError, LookupError, TypeError):
+        return []
+
+
 def from_plain(data: Mapping) -> DiagnosedNumbers:
     """The numbers of which `asdict` made plain data."""
     leaks = {name: Leak(**leak) for name, leak in data["leaks"].items()}

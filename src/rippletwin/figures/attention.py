@@ -8,6 +8,7 @@ region of the fault.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle, product
 
 import matplotlib as mpl
 import numpy as np
@@ -18,6 +19,9 @@ from rippletwin.figures import style
 from rippletwin.figures.diagnosis import ORDERS, order_ticks
 
 MAX_HEAT = 3.0  # of the colour scale in every figure, for comparison; few peaks exceed it
+MARKERS = {False: "oDv", True: "shp"}
+"""Of networks that judge windows, and of those that judge images: the next one where all colours
+are taken."""
 _BAR = dict(color=style.ALARM, lw=0)
 _OUTLINED = [patheffects.withStroke(linewidth=1.5, foreground="black")]  # visible on any heat
 
@@ -111,14 +115,16 @@ def plot_ranks(
     """
     fig, axes = style.panels(len(groups), 3, height=2.7, sharey=True)
     kind = {name: square for group in groups.values() for name, square in zip(*group[:2])}
-    colours = {
-        name: style.CYCLE[[n for n in kind if kind[n] == kind[name]].index(name)] for name in kind
-    }
+    look: dict[str, tuple[str, str]] = {}
+    for square, markers in MARKERS.items():
+        names = [name for name in kind if kind[name] == square]
+        look |= zip(names, cycle(product(markers, style.CYCLE)))
     for ax, (dataset, (labels, image, aligned, accuracy)) in zip(axes, groups.items()):
         for name, square, x, y in zip(labels, image, aligned, accuracy):
+            marker, colour = look[name]
             ax.errorbar(
-                x[0], y[0], xerr=x[1], yerr=y[1], fmt="s" if square else "o", ms=5, elinewidth=0.6,
-                color=colours[name], label=name, mfc="white" if square else None,
+                x[0], y[0], xerr=x[1], yerr=y[1], fmt=marker, ms=5, elinewidth=0.6,
+                color=colour, label=name, mfc="white" if square else None,
             )  # fmt: skip
         ax.axvline(1, color=style.NEUTRAL, lw=0.8, ls=":")
         ax.set(title=dataset, ylim=(-3, 103), xlabel="alignment (1: chance)")

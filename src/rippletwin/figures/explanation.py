@@ -23,17 +23,19 @@ FIGURES = {
     "immittance": plot_immittance,
     "load": plot_load,
 }
+SUFFIXES = (".png", ".svg")
 
 
 def draw(
     explanation: Explanation,
     folder: str | Path,
-    suffixes: Sequence[str] = (".png", ".svg"),
+    suffixes: Sequence[str] = SUFFIXES,
     processes: int = 1,
 ) -> list[Path]:
     """Write every applicable figure into `folder`/figures, once per suffix, and the numbers behind
-    them; returns the paths."""
+    them; returns the paths. Those of an earlier explanation are removed."""
     folder = Path(folder)
+    remove_figures(folder)
     (folder / "figures").mkdir(parents=True, exist_ok=True)
     numbers = explained_numbers.gather(explanation)
     paths = [explained_numbers.save(numbers, folder)]
@@ -44,12 +46,25 @@ def draw(
         return paths + [path for drawn in pool.map(draw_one, FIGURES) for path in drawn]
 
 
+def remove_figures(folder: str | Path) -> None:
+    """Remove what `draw` has written into `folder`: beside another verdict it would be wrong."""
+    folder = Path(folder)
+    (folder / explained_numbers.FILE).unlink(missing_ok=True)
+    for name in FIGURES:
+        for path in _paths(folder / "figures", name, SUFFIXES):
+            path.unlink(missing_ok=True)
+
+
+def _paths(folder: Path, name: str, suffixes: Sequence[str]) -> list[Path]:
+    return [folder / f"explain_{name}{suffix}" for suffix in suffixes]
+
+
 def _draw_one(
     numbers: ExplainedNumbers, folder: Path, suffixes: Sequence[str], name: str
 ) -> list[Path]:
     figure = FIGURES[name](numbers)
     if figure is None:
         return []
-    paths = [folder / f"explain_{name}{suffix}" for suffix in suffixes]
+    paths = _paths(folder, name, suffixes)
     style.save(figure, *paths)
     return paths

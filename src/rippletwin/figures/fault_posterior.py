@@ -17,25 +17,42 @@ from rippletwin.figures import style
 
 AREA = unit_of("m2")
 LINES = ("-", "--", "-.")
+SUFFIXES = (".png", ".svg")
 
 
 def draw(
     numbers: Sequence[DiagnosedNumbers],
     folder: str | Path,
-    suffixes: Sequence[str] = (".png", ".svg"),
+    suffixes: Sequence[str] = SUFFIXES,
 ) -> list[Path]:
     """Write both pictures of each recording into `folder`/figures, and the numbers behind them;
-    returns the paths."""
+    returns the paths. Those of an earlier diagnosis are removed."""
     folder = Path(folder)
+    remove_figures(folder)
     (folder / "figures").mkdir(parents=True, exist_ok=True)
     written = [diagnosed_numbers.save(numbers, folder)]
     for each in numbers:
-        for name, figure in (("change", plot_change(each)), ("severity", plot_severity(each))):
-            stem = f"diagnose_{each.label}_{name}"
-            paths = [folder / "figures" / f"{stem}{suffix}" for suffix in suffixes]
-            style.save(figure, *paths)
+        for name, plot in FIGURES.items():
+            paths = _paths(folder, each.label, name, suffixes)
+            style.save(plot(each), *paths)
             written += paths
     return written
+
+
+def remove_figures(folder: str | Path) -> None:
+    """Remove what `draw` has written into `folder`: beside another diagnosis it would be wrong.
+
+    The pictures are those of the labels that diagnosed_numbers.FILE names, which goes last.
+    """
+    for label in diagnosed_numbers.load_labels(folder):
+        for name in FIGURES:
+            for path in _paths(Path(folder), label, name, SUFFIXES):
+                path.unlink(missing_ok=True)
+    (Path(folder) / diagnosed_numbers.FILE).unlink(missing_ok=True)
+
+
+def _paths(folder: Path, label: str, name: str, suffixes: Sequence[str]) -> list[Path]:
+    return [folder / "figures" / f"diagnose_{label}_{name}{suffix}" for suffix in suffixes]
 
 
 def plot_change(d: DiagnosedNumbers) -> Figure:
@@ -79,6 +96,9 @@ def plot_severity(d: DiagnosedNumbers) -> Figure:
     _plot_areas(axes[0, 1], d)
     fig.suptitle(f"{style.plain(d.label)}: {name_state(d.state)}")
     return fig
+
+
+FIGURES = {"change": plot_change, "severity": plot_severity}
 
 
 def _plot_areas(ax, d: DiagnosedNumbers) -> None:

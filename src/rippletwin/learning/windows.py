@@ -67,21 +67,31 @@ def first_of_each_state(state: np.ndarray, recording: np.ndarray) -> np.ndarray:
     return recording == recording[first][of_state]
 
 
+def learnt_from(state: np.ndarray, recording: np.ndarray) -> np.ndarray:
+    """Mask (n,) of the windows of the first recording of every known state, from which networks of
+    recordings learn.
+
+    state, recording : (n,) of each window.
+    """
+    return first_of_each_state(state, recording) & (np.asarray(state) != UNKNOWN)
+
+
 def early_known(state: np.ndarray, recording: np.ndarray, share: float) -> np.ndarray:
-    """Indices of the early `share` of the windows of the first recording of every known state.
+    """Indices of the early `share` of the windows that are `learnt_from`.
 
     state, recording : (n,) of each window; a recording's windows follow each other, and recordings
     are numbered in their order.
     """
     early, _ = split_by_time(np.bincount(recording), share)
-    early = early[first_of_each_state(state, recording)[early]]
-    return early[np.asarray(state)[early] != UNKNOWN]
+    return early[learnt_from(state, recording)[early]]
 
 
 def early_healthy(state: np.ndarray, recording: np.ndarray, share: float) -> np.ndarray:
     """Indices of the early `share` of the windows of the first healthy recording.
 
-    Raises InputError where no recording is healthy.
+    None of them is a late window of `split_by_time`, nor part of a late pair of `pair_windows`.
+
+    Raises InputError where no recording is healthy, and where the first has no early windows.
     """
     healthy = np.flatnonzero((np.asarray(state) == "H") & first_of_each_state(state, recording))
     if not len(healthy):
@@ -91,7 +101,19 @@ def early_healthy(state: np.ndarray, recording: np.ndarray, share: float) -> np.
             "none is healthy at the diagnosed operating point",
             "Record one, or leave the randomised datasets out",
         )
-    return healthy[: max(1, round(share * len(healthy)))]
+    count = len(healthy)
+    # the shares of windows and of pairs are rounded apart: the earlier cut is before both tests
+    (early, _), (pairs, _) = (split_by_time([n], share) for n in (count, count // 2))
+    kept = min(len(early), 2 * len(pairs))
+    if not kept:
+        raise InputError(
+            "rig.yaml",
+            "recordings",
+            f"the first healthy one at the diagnosed operating point makes {count} windows, of "
+            f"which none is among the early {share:.0%}",
+            "Record ten revolutions or more, or leave the randomised datasets out",
+        )
+    return healthy[:kept]
 
 
 def spread_windows(state: np.ndarray, recording: np.ndarray, count: int) -> dict[str, np.ndarray]:
