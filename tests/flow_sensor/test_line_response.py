@@ -3,10 +3,38 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 import leaking_pump
-from rippletwin.flow_sensor.line_response import line_factory
+from rippletwin.flow_sensor.line_response import line_factory, line_response
+from rippletwin.line.frequency_domain.line_network import FrequencyDomainLine
 from rippletwin.twin.twin import Twin
+
+
+@pytest.mark.parametrize("position", [0.0, 2.0, 5.0])
+def test_sensors_read_what_the_line_says(position):
+    """Sensors at both ends and between, with a resistance in series and a volume beside the line at
+    one of these places: waves at the pump give the readings of the line itself."""
+    s = 2j * np.pi * np.linspace(20.0, 2000.0, 40)
+    line = FrequencyDomainLine(
+        s=s,
+        lengths=np.array([5.0]),
+        series=(2e6 * s + 1e8)[None],
+        shunt=(2e-13 * s)[None],
+        source_impedance=1e8 + 1e5 * s,
+        load=("impedance", np.full(40, 3e9)),
+        inserts=[(position, "series", np.full(40, 1e9)), (position, "shunt", 1e-14 * s)],
+        sensor_positions=[0.0, 2.0, 5.0],
+    )
+    pressure, _ = line.respond(line.sensor_positions)
+    response = line_response(line, of="outlet")
+    # the waves whose flow at the pump is the source's and which agree with the load
+    waves = np.linalg.solve(
+        np.stack([response.to_flow, response.to_load], axis=1),
+        np.tile([1.0, 0.0], (40, 1))[..., None],
+    )
+    readings = (response.to_sensors @ waves)[..., 0].T
+    np.testing.assert_allclose(readings, pressure, rtol=1e-6)
 
 
 def test_waves_meet_the_chambers_of_the_fitted_pump():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -46,7 +46,9 @@ def line_response(line: FrequencyDomainLine, of: str = "source") -> LineResponse
     factor = np.broadcast_to(line.sensor_factor, (len(line.sensor_positions), size))
     rows = []
     for x, k in zip(line.sensor_positions, factor):
-        matrix = line.transfer(0.0, x)
+        # a sensor is on the pump's side of what is inserted where it sits
+        before = replace(line, inserts=[insert for insert in line.inserts if insert[0] < x])
+        matrix = before.transfer(0.0, x)
         drop = matrix[:, 0, 1] + matrix[:, 1, 1] * line.source_impedance
         from_p, from_q = k * matrix[:, 1, 1], -k * drop / zc
         rows.append(np.stack([from_p + from_q, from_p - from_q], axis=-1))
