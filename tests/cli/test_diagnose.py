@@ -83,5 +83,7 @@ def test_a_recording_that_no_twin_can_diagnose_is_refused_before_anything_is_exp
     write_case(tmp_path, content)
     write_hdf5(tmp_path / "now.h5", ripple())
     assert _diagnose(tmp_path) == 2
-    assert "recording now: max_frequency_hz: the band ends at 100 Hz" in capsys.readouterr().err
+    assert "recording now: min_frequency_hz, max_frequency_hz: the band, 0 to 100 Hz" in (
+        capsys.readouterr().err
+    )
     assert not begun

@@ -110,8 +110,9 @@ class ObservationModel:
         areas = self.flows[fault.name].areas
         low = max([areas[0], *(self.usual_error * other for other in beside)])
         high = min([areas[-1], *(other / self.usual_error for other in beside)])
-        # beside a leak that leaves one area only, rounding would leave none
-        return float(np.log(low)), max(float(np.log(high)), float(np.log(low)) + LEAST_WIDTH)
+        low, high = float(np.log(low)), float(np.log(high))
+        # beside a leak that leaves a single area, rounding may leave none
+        return low, low + LEAST_WIDTH if abs(high - low) < LEAST_WIDTH else high
 
     def state_of_line(self, hypothesis: Hypothesis) -> np.ndarray:
         """Drift (D,), standard deviations, with what the leaks' change of mean flow makes of an
