@@ -8,6 +8,7 @@ from scipy.special import logsumexp
 
 import leaking_pump
 from rippletwin.case.model import Case
+from rippletwin.diagnosis import evidence
 from rippletwin.diagnosis.diagnose import check_twin, recalibrate_twin
 from rippletwin.diagnosis.diagnosed_numbers import gather
 from rippletwin.diagnosis.diagnoser import Diagnoser
@@ -22,7 +23,7 @@ from rippletwin.diagnosis.evidence import (
     weigh_states,
 )
 from rippletwin.diagnosis.faults.library import FAULTS
-from rippletwin.diagnosis.hypothesis import Errors
+from rippletwin.diagnosis.hypothesis import Errors, Hypothesis
 from rippletwin.diagnosis.pump_calibration import PRIOR_SD, _numbers
 from rippletwin.diagnosis.pump_flow import ORDERS, load_pressure_of
 from rippletwin.diagnosis.screening import Screen
@@ -60,6 +61,30 @@ def test_a_leak_that_another_one_leaves_a_single_area_has_evidence(recordings):
     corner = areas[0] * model.usual_error
     low, high = model.area_ends(large, [corner])
     assert 0.0 < high - low < 1e-5
+
+
+def test_two_areas_share_one_prior(recordings, monkeypatch):
+    """The mean of a likelihood that is sharp about two areas, over all pairs that can be together,
+    against the sum over a fine grid of pairs; for areas amid the prior, and near its end, where
+    one area leaves the other little room."""
+    anchor, leaking = recordings
+    pair = SLIPPER, FAULTS["cylinder"]
+    model = Diagnoser(twin_of(anchor), pair).make_model(leaking, anchor)
+    areas = [np.log(model.flows[fault.name].areas) for fault in pair]
+    for share in (0.5, 0.02):
+        middle = np.array([x[0] + share * (x[-1] - x[0]) + 0.3 for x in areas])
+
+        def likelihood(_, hypothesis, middle=middle, **_errors):
+            return -0.5 * float(np.sum(((np.log(hypothesis.areas) - middle) / 0.1) ** 2))
+
+        monkeypatch.setattr(evidence, "_over_changes", likelihood)
+        mode = Hypothesis(pair, tuple(np.exp(middle)), (0, 0), 0.0, np.zeros(3))
+        found, _ = evidence._over_areas(model, mode, Errors(0.005, 1.0), ErrorPrior())
+        one, other = (np.linspace(x[0], x[-1], 1501) for x in areas)
+        allowed = np.abs(one[:, None] - other) <= -np.log(model.usual_error)
+        squares = (one[:, None] - middle[0]) ** 2 + (other - middle[1]) ** 2
+        mean = np.mean(np.exp(-0.5 * squares[allowed] / 0.1**2))
+        assert found == pytest.approx(np.log(mean), abs=0.05)
 
 
 def test_the_evidence_is_the_mean_likelihood_over_areas_and_errors(recordings):

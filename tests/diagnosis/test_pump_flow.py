@@ -11,7 +11,14 @@ import pytest
 from rippletwin.case.model import Fluid, Load, Rig, Segment, Sensor
 from rippletwin.diagnosis import pump_flow
 from rippletwin.diagnosis.faults.library import FAULTS
-from rippletwin.diagnosis.pump_flow import STEPS, UNCERTAIN, simulate_leak_flow, with_fitted_pump
+from rippletwin.diagnosis.pump_flow import (
+    NUMBERS,
+    STEPS,
+    TIMING_SD_DEG,
+    UNCERTAIN,
+    simulate_leak_flow,
+    with_fitted_pump,
+)
 from rippletwin.harmonics import peak_amplitudes
 from rippletwin.pump.faults import Cylinder, Slipper
 from rippletwin.pump.geometry import Geometry
@@ -63,6 +70,18 @@ def test_slopes_are_what_another_pump_makes():
     found = slopes[list(UNCERTAIN).index("dead_volume")][ORDERS]
     assert np.linalg.norm(found - truth) < 0.25 * np.linalg.norm(truth)
     assert np.linalg.norm(truth) > 0.005 * np.linalg.norm(changes[0])
+
+
+def test_the_slope_of_the_timing_is_told_as_the_port_plate_stands():
+    """A plate half a degree late: what it makes of a leak's change beside turning it, as it turns
+    the healthy flow; to a quarter. The turn alone would be several times as much."""
+    area, late = 4e-7, PUMP | {"port_timing_deg": TIMING_SD_DEG}
+    nominal, moved = (simulated(pump, Slipper(area)) - simulated(pump) for pump in (PUMP, late))
+    truth = moved * np.exp(1j * np.radians(TIMING_SD_DEG) * ORDERS) - nominal
+    slopes = simulate_leak_flow(PUMP, OIL, SPEED, PRESSURE, FAULTS["slipper"]).pump_slopes(area)
+    found = slopes[NUMBERS.index("port_timing_deg")][ORDERS]
+    assert np.linalg.norm(found - truth) < 0.25 * np.linalg.norm(truth)
+    assert np.linalg.norm(truth) < 0.5 * np.linalg.norm(moved - nominal)
 
 
 def test_slopes_of_a_port_that_opens_slowly_are_there():

@@ -180,8 +180,10 @@ def _over_areas(
     densities = {
         fault.name: _explore_area(model, mode, k, likelihood) for k, fault in enumerate(mode.state)
     }
-    mean = sum(d.log_integral - at_mode - np.log(d.width) for d in densities.values())
-    return float(mean), densities
+    if not densities:
+        return 0.0, densities
+    integral = sum(density.log_integral - at_mode for density in densities.values())
+    return float(integral) - model.log_prior_size(mode.state), densities
 
 
 def _over_changes(model, hypothesis: Hypothesis, errors: Errors, prior: ErrorPrior) -> float:

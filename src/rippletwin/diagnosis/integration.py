@@ -36,11 +36,6 @@ class Density:
         return nodes, smooth(nodes)
 
     @property
-    def width(self) -> float:
-        """Distance of the outer nodes, in logarithms of an area."""
-        return float(self.nodes[-1] - self.nodes[0])
-
-    @property
     def cut_off(self) -> tuple[bool, bool]:
         """Whether the density ends at the first and at the last node where it still matters."""
         low, high = self.log_density[[0, -1]] - np.max(self.log_density)

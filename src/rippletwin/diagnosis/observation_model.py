@@ -37,6 +37,7 @@ MIN_CHANGE_ERROR = 0.04  # relative, of the change by a leak behind the best of 
 MAX_SHARE = 2.0  # of a measured change over the predicted one, up to which errors grow with it
 MAX_USUAL_ERROR = 0.3  # relative, of a leak's change behind the worst of twins
 ALIKE = 8.0  # readings whose errors go together: those of a line are as wide as its resonances
+PRIOR_NODES = 201  # of the integral over the prior of two areas
 LEAST_WIDTH = 1e-6  # of a prior on the logarithm of an area
 MOST_DRIFT = 10.0  # standard deviations, beyond which a line's response is not extrapolated
 WHOLE = slice(None)
@@ -113,6 +114,17 @@ class ObservationModel:
         low, high = float(np.log(low)), float(np.log(high))
         # beside a leak that leaves a single area, rounding may leave none
         return low, low + LEAST_WIDTH if abs(high - low) < LEAST_WIDTH else high
+
+    def log_prior_size(self, state: Sequence[Fault]) -> float:
+        """Log of the interval, of two faults of the area, that the logarithms of their leak areas
+        can be in: a prior's density is one over it."""
+        first, *rest = state
+        low, high = self.area_ends(first)
+        if not rest:
+            return float(np.log(high - low))
+        nodes = np.linspace(low, high, PRIOR_NODES)
+        ends = np.array([self.area_ends(*rest, (x,)) for x in np.exp(nodes)])
+        return float(np.log(np.trapezoid(ends[:, 1] - ends[:, 0], nodes)))
 
     def state_of_line(self, hypothesis: Hypothesis) -> np.ndarray:
         """Drift (D,), standard deviations, with what the leaks' change of mean flow makes of an

@@ -123,7 +123,7 @@ class LeakFlow:
     change   (A, K) change over area of the flow's peak amplitudes at orders 0 to K - 1, m/s
     mean     mean flow of the healthy pump, m3/s
     slopes   (B, P, K) derivatives of `change` by the P `NUMBERS` of the pump, in standard
-             deviations, at areas[SLOPE_NODES]
+             deviations, at areas[SLOPE_NODES], as the port plate stands (`plate_turns`)
     periodic whether every simulation behind them came to repeat itself
     """
 
@@ -150,7 +150,8 @@ class LeakFlow:
         return self.harmonics(area)[0].real / self.mean
 
     def pump_slopes(self, area: float) -> np.ndarray:
-        """What one standard deviation of each of the pump's numbers makes of it (P, K), m3/s."""
+        """What one standard deviation of each of the pump's numbers makes of it (P, K), m3/s, as
+        the port plate stands (`plate_turns`)."""
         first, *_, last = self.areas[SLOPE_NODES]
         return area * self._slopes(np.log(np.clip(area, first, last)))
 
@@ -217,7 +218,11 @@ def _leak_flow(
 
     found = change(pump, areas)
     at = areas[SLOPE_NODES]
-    slopes = [change(moved, at) - found[SLOPE_NODES] for moved in moved_pumps(pump)]
+    turns = plate_turns(np.arange(ORDERS + 1))
+    slopes = [
+        turn * change(moved, at) - found[SLOPE_NODES]
+        for turn, moved in zip(turns, moved_pumps(pump), strict=True)
+    ]
     return LeakFlow(areas, found, float(mean), np.stack(slopes, axis=1), all(periodic))
 
 
@@ -227,6 +232,18 @@ def moved_pumps(pump: Mapping) -> list[dict]:
     moved = [{**pump, name: getattr(geometry, name) * (1.0 + sd)} for name, sd in UNCERTAIN.items()]
     timing = geometry.port_timing_deg + TIMING_SD_DEG
     return [*moved, {**pump, "port_timing_deg": timing}]
+
+
+def plate_turns(orders: np.ndarray) -> np.ndarray:
+    """Factors (P, F) that turn the flow of each of `moved_pumps` at shaft orders (F,) to where the
+    port plate of the pump stands.
+
+    Another timing turns the flow, healthy and leaking, by as much. That says nothing, since the
+    shaft angle of a recording is unknown, but is far from linear at high orders.
+    """
+    turns = np.ones((len(NUMBERS), len(orders)), complex)
+    turns[NUMBERS.index("port_timing_deg")] = np.exp(1j * np.radians(TIMING_SD_DEG) * orders)
+    return turns
 
 
 def _key(pump: Mapping) -> tuple:

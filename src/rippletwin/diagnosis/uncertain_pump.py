@@ -4,8 +4,7 @@ To first order: a standard deviation of a number moves the healthy ripple by 6 t
 change by 1 to 7 %, and the second order is a few times smaller. So a thousand pumps cost no more
 simulations than `simulate_leak_flow` has made.
 
-Flow is told in the frame of the port plate. Another timing turns it by as much, which says nothing,
-since the shaft angle of a recording is unknown, but is far from linear at high orders.
+Flow is told as the port plate stands (`plate_turns`).
 """
 
 from __future__ import annotations
@@ -20,6 +19,7 @@ from rippletwin.diagnosis.pump_flow import (
     UNCERTAIN,
     LeakFlow,
     moved_pumps,
+    plate_turns,
     simulate_healthy_pump,
 )
 from rippletwin.pump.ripple_sensitivity import KEYS
@@ -42,16 +42,13 @@ class UncertainPump:
         self, pump: dict, fluid: Fluid, speed_rpm: float, pressure: float, orders: np.ndarray
     ):
         self._orders = orders
-        turns = np.ones((len(NUMBERS), len(orders)), complex)
-        turns[NUMBERS.index("port_timing_deg")] = np.exp(1j * np.radians(TIMING_SD_DEG) * orders)
-        self._turns = turns
         self._healthy, *moved = (
             even_flow(
                 simulate_healthy_pump(each, fluid, speed_rpm, pressure), orders, pump["pistons"]
             )
             for each in (pump, *moved_pumps(pump))
         )
-        self._slopes = turns * np.array(moved) - self._healthy
+        self._slopes = plate_turns(orders) * np.array(moved) - self._healthy
 
     def healthy(self, z: np.ndarray) -> np.ndarray:
         """Flow (F,) of the healthy pump, m3/s."""
@@ -59,9 +56,7 @@ class UncertainPump:
 
     def change(self, leak: LeakFlow, area: float, z: np.ndarray) -> np.ndarray:
         """Change (F,) of the flow by a leak of `area`, m2, at piston 0, m3/s."""
-        change = leak.harmonics(area)[self._orders]
-        moved = change + leak.pump_slopes(area)[:, self._orders]
-        return change + z @ (self._turns * moved - change)
+        return (leak.harmonics(area) + z @ leak.pump_slopes(area))[self._orders]
 
 
 def number_slopes(twin: Twin) -> np.ndarray:
