@@ -124,7 +124,8 @@ class ObservationModel:
             return float(np.log(high - low))
         nodes = np.linspace(low, high, PRIOR_NODES)
         ends = np.array([self.area_ends(*rest, (x,)) for x in np.exp(nodes)])
-        return float(np.log(np.trapezoid(ends[:, 1] - ends[:, 0], nodes)))
+        widths = np.maximum(ends[:, 1] - ends[:, 0], 0.0)
+        return float(np.log(np.trapezoid(widths, nodes)))
 
     def state_of_line(self, hypothesis: Hypothesis) -> np.ndarray:
         """Drift (D,), standard deviations, with what the leaks' change of mean flow makes of an
