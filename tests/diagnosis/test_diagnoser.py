@@ -19,7 +19,7 @@ from rippletwin.diagnosis.faults.library import select_faults
 from rippletwin.diagnosis.hypothesis import Errors, Hypothesis
 from rippletwin.diagnosis.pump_flow import with_fitted_pump
 from rippletwin.diagnosis.screening import Screen
-from rippletwin.diagnosis.unlike import combine, judge_residual
+from rippletwin.diagnosis.unlike import combine, judge_residual, smaller_of_two
 from rippletwin.errors import InputError
 from rippletwin.figures import fault_posterior
 from rippletwin.pump.faults import Cylinder, Slipper
@@ -198,6 +198,14 @@ def test_two_p_values_together_are_uniform_where_each_is():
     assert kstest(combined, "uniform").pvalue > 0.01
     assert combine(1e-6, 1.0) == pytest.approx(1e-6 * (1.0 + np.log(1e6)))
     assert combine(0.0, 0.5) == 0.0
+
+
+def test_the_smaller_of_two_p_values_is_judged_as_such():
+    """Of two independent uniform numbers its p-value is uniform; a tiny one doubles."""
+    pairs = np.random.default_rng(1).uniform(size=(4000, 2))
+    assert kstest([smaller_of_two(*pair) for pair in pairs], "uniform").pvalue > 0.01
+    assert smaller_of_two(1e-20, 0.3) == pytest.approx(2e-20)
+    assert smaller_of_two(1.0, 1.0) == pytest.approx(1.0)
 
 
 def test_known_states_are_not_unlike(diagnoses):

@@ -123,7 +123,7 @@ class ObservationModel:
         if not rest:
             return float(np.log(high - low))
         nodes = np.linspace(low, high, PRIOR_NODES)
-        ends = np.array([self.area_ends(*rest, (x,)) for x in np.exp(nodes)])
+        ends = np.array([self.area_ends(rest[0], (x,)) for x in np.exp(nodes)])
         widths = np.maximum(ends[:, 1] - ends[:, 0], 0.0)
         return float(np.log(np.trapezoid(widths, nodes)))
 

@@ -35,13 +35,14 @@ class Unlikeness:
 def judge_residual(model: ObservationModel, best: StateEvidence, prior: ErrorPrior) -> Unlikeness:
     """How often errors as the prior has them leave as large a residual as the best state does.
 
-    Two tests, either of which calls one in a hundred of the recordings unlike that are not. Of the
-    pump: what one flow accounts for. Of the line: what none does, and how far its state has to
-    drift, together. A line whose state must drift further than oil and load can is another line.
+    Two tests. Of the pump: what one flow accounts for. Of the line: what none does, and how far its
+    state has to drift, together. A line whose state must drift further than oil and load can is
+    another line. The p-value is that of both tests: one in a hundred of the recordings that are
+    like a state is called unlike.
     """
     model.linearise_line(best.mode)
     of_pump, of_line = _of_residual(model, best, prior, ALONG), _of_line(model, best, prior)
-    p = min(of_pump, of_line)
+    p = smaller_of_two(of_pump, of_line)
     if p >= UNLIKE:
         return Unlikeness(p)
     parts = model.predict(best.mode)
@@ -51,6 +52,13 @@ def judge_residual(model: ObservationModel, best: StateEvidence, prior: ErrorPri
     largest = np.argsort(-size)[:MOST_ORDERS]
     orders = sorted(int(model.orders[k]) for k in largest if size[k] > STANDS_OUT)
     return Unlikeness(p, tuple(orders), _element(model, residual, usual, of_pump, of_line))
+
+
+def smaller_of_two(one: float, other: float) -> float:
+    """The p-value of the smaller one of two independent p-values (Sidak 1967, J. Am. Stat. Assoc.
+    62, 626): the probability that the smaller of two uniform random numbers in [0, 1] is as small.
+    """
+    return float(-np.expm1(2.0 * np.log1p(-min(one, other, 1.0 - 1e-16))))
 
 
 def combine(one: float, other: float) -> float:
