@@ -63,8 +63,8 @@ EFFECT = Effect(
     name="piston_spread",
     element="source",
     medium="any",
-    equation="Q_n += Q_0 h_n A_(n mod z), A_m = (1/z) sum_j a_j e^(-2 pi j m/z): piston j delivers "
-    "1 + a_j times the mean, h_n the harmonics of a half sine; odd z",
+    equation="Q_n += Q_0 h_n A_(n mod z), A_m = (1/z) sum_p a_p exp(-2 pi j p m/z) = cosine_m + "
+    "j sine_m: piston p delivers 1 + a_p times the mean, h_n the harmonics of a half sine; odd z",
     source="Ivantysyn & Ivantysynova 2001, Hydrostatic Pumps and Motors, sec. 3.2 (kinematic flow)",
     parameters=_parameters,
     places=_places,
