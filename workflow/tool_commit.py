@@ -8,6 +8,7 @@ from pathlib import Path
 from snakemake.exceptions import WorkflowError
 
 TOOL = "src/rippletwin"
+TRIAL = "src"  # with it what draws, records and scores
 
 
 def tool_commit(root: Path) -> str:
@@ -19,8 +20,9 @@ def tool_commit(root: Path) -> str:
 
 
 def not_committed(root: Path) -> bool:
-    """Whether the tool that runs differs from that commit, which the trial's page then says."""
-    return _git(root, "status", "--porcelain", TOOL) != ""
+    """Whether the tool that runs, or what draws and scores its cases, differs from that commit,
+    which the trial's page then says."""
+    return _git(root, "status", "--porcelain", TRIAL) != ""
 
 
 def _git(root: Path, *arguments: str) -> str:

@@ -262,7 +262,8 @@ def bin_probabilities(
     table = []
     for low, high in pairwise(edges):
         last = high == edges[-1]
-        inside = [(p, right) for p, right in stated if low <= p < high or (last and p == high)]
+        # rounding can take a probability beyond 1
+        inside = [(p, right) for p, right in stated if low <= p < high or (last and p >= high)]
         if inside:
             mean = float(np.mean([p for p, _ in inside]))
             table.append(ProbabilityBin(low, high, mean, rate_of(right for _, right in inside)))

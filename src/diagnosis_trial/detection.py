@@ -38,10 +38,12 @@ class DetectionCurve(NamedTuple):
 
 
 class Leaks(NamedTuple):
-    """Recordings of one fault: their rows, and which of them (N,) raise the alarm."""
+    """Recordings of one fault: their rows, and which of them (N,) raise the alarm, beside the rows
+    of the healthy recordings."""
 
     rows: list[dict]
     hit: np.ndarray
+    healthy: list[dict]
 
     @property
     def change(self) -> np.ndarray:
@@ -57,10 +59,10 @@ class Leaks(NamedTuple):
 def detect_leaks(rows: Sequence[dict], state: str) -> Leaks:
     """The recordings of a state among rows of one column, and which of them raise the alarm that
     at most FALSE_ALARMS of the healthy ones raise; none does where no healthy one is there."""
-    healthy = [row["suspicion"] for row in rows if row["state"] == "healthy"]
-    threshold = alarm_threshold(healthy) if healthy else np.inf
+    healthy = [row for row in rows if row["state"] == "healthy"]
+    threshold = alarm_threshold([row["suspicion"] for row in healthy]) if healthy else np.inf
     chosen = [row for row in rows if row["state"] == state]
-    return Leaks(chosen, np.array([row["suspicion"] > threshold for row in chosen], bool))
+    return Leaks(chosen, np.array([row["suspicion"] > threshold for row in chosen], bool), healthy)
 
 
 class BinShare(NamedTuple):
@@ -117,26 +119,31 @@ def fit_curve(
 
 
 def smallest_found(
-    severity: Sequence[float],
-    detected: Sequence[bool],
-    rigs: Sequence[int],
-    probability: float,
-    rng: np.random.Generator,
+    leaks: Leaks, severity: Sequence[float], probability: float, rng: np.random.Generator
 ) -> tuple[float, float, float] | None:
-    """The severity detected with `probability`, and its 95 % interval by resampling whole rigs.
+    """The severity detected with `probability`, and its 95 % interval by resampling whole rigs, of
+    `leaks` with `severity` (N,).
 
     Recordings of one rig go together: they share its twin (Davison, Hinkley, Bootstrap Methods,
-    1997, section 3.8).
+    1997, section 3.8). The alarm is that of the resampled healthy recordings.
     """
-    severity, detected, rigs = map(np.asarray, (severity, detected, rigs))
-    curve = fit_curve(severity, detected)
+    severity = np.asarray(severity)
+    curve = fit_curve(severity, leaks.hit)
     if curve is None:
         return None
-    members = [np.flatnonzero(rigs == rig) for rig in np.unique(rigs)]
+    suspicion, rigs = (np.array([row[key] for row in leaks.rows]) for key in ("suspicion", "rig"))
+    known, own = (np.array([row[key] for row in leaks.healthy]) for key in ("suspicion", "rig"))
+    members = [
+        (np.flatnonzero(rigs == rig), np.flatnonzero(own == rig)) for rig in np.union1d(rigs, own)
+    ]
     drawn = []
     for _ in range(RESAMPLED):
-        picked = np.concatenate([members[k] for k in rng.integers(len(members), size=len(members))])
-        again = fit_curve(severity[picked], detected[picked], curve)
+        picked = [members[k] for k in rng.integers(len(members), size=len(members))]
+        leaking, healthy = map(np.concatenate, zip(*picked))
+        if not len(healthy):
+            continue
+        hit = suspicion[leaking] > alarm_threshold(known[healthy])
+        again = fit_curve(severity[leaking], hit, curve)
         if again is not None:
             drawn.append(again.severity(probability))
     low, high = np.quantile(drawn, [0.025, 0.975]) if drawn else (np.nan, np.nan)

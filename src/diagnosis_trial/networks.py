@@ -14,6 +14,7 @@ They learn the operating point that has most healthy recordings and answer there
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -101,9 +102,10 @@ def teach_network(kind: str, twin: Twin, covariance: np.ndarray | None, case: Ca
 
 
 def ask_network(kept: KeptNetworks, recordings: list[Recording], rig: Rig, twin: Twin) -> dict:
-    """What a network says, with the keys of diagnosis.json that are scored, of the recordings at
-    its operating point. The p-value is that of the middle one of a recording's windows. A network
-    that judges flow is asked about the flow by the line of `twin`."""
+    """What a network says, with the keys that are scored, of the recordings at its operating point.
+    The p-value is that of the middle one of a recording's windows; below the least rank it falls in
+    inverse proportion to the nonconformity, so that it ranks recordings. A network that judges flow
+    is asked about the flow by the line of `twin`."""
     entries = []
     for recording in recordings:
         if not is_at_their_point(recording, kept):
@@ -112,19 +114,29 @@ def ask_network(kept: KeptNetworks, recordings: list[Recording], rig: Rig, twin:
             windows = _flow_windows(recording, rig, twin, kept.speed_hz)
         else:
             windows = cut_windows(recording, rig, kept.samples_per_revolution)
-        probabilities = dict.fromkeys(dict.fromkeys(STATE_OF.values()), 0.0)
-        for name, share in zip(kept.classes, kept.probabilities(windows), strict=True):
-            probabilities[STATE_OF[name]] += float(share)
+        log_shares = _by_state(kept.classes, kept.log_probabilities(windows))
+        faulty = [value for state, value in log_shares.items() if state != STATE_OF["H"]]
         said, p_values = kept.answers(windows)
+        beyond = max(float(np.median(kept.strangeness(windows))), 1.0)
         entries.append(
             {
                 "label": recording.label,
                 "state": judge_windows(kept.classes, said, p_values)["state"],
-                "probabilities": probabilities,
-                "unlike": {"p_value": float(np.median(p_values))},
+                "probabilities": {name: float(np.exp(v)) for name, v in log_shares.items()},
+                "log_odds": float(np.logaddexp.reduce(faulty) - log_shares[STATE_OF["H"]]),
+                "unlike": {"p_value": float(np.median(p_values)) / beyond},
             }
         )
     return {"recordings": entries}
+
+
+def _by_state(classes: Sequence[str], log_shares: np.ndarray) -> dict[str, float]:
+    """Logarithm of the probability of each state, of those of the classes."""
+    found: dict[str, float] = {}
+    for name, value in zip(classes, log_shares, strict=True):
+        state = STATE_OF[name]
+        found[state] = float(np.logaddexp(found.get(state, -np.inf), value))
+    return found
 
 
 def _repeated(signals: np.ndarray, count: int) -> np.ndarray:

@@ -119,13 +119,12 @@ def _smallest_of_column(rows: list[dict], rng: np.random.Generator) -> list[tupl
     lines = []
     for state in summary.SINGLE:
         leaks = detection.detect_leaks(rows, state)
-        rigs = [row["rig"] for row in leaks.rows]
         for severity, unit, factor in (
             (leaks.change, "% of the ripple", 100.0),
             ([row["areas"][state] for row in leaks.rows], "mm2", 1e6),
         ):
             found = [
-                detection.smallest_found(severity, leaks.hit, rigs, probability, rng)
+                detection.smallest_found(leaks, severity, probability, rng)
                 for probability in detection.FOUND
             ]
             cells = [_found_text(each, severity, factor) for each in found]

@@ -23,6 +23,7 @@ def score_rig(rig: int, truth: dict, diagnosis: dict, run: dict) -> list[dict]:
         right                 see `is_right`
         suspicion             see `suspicion`
         probability           the tool's of the state that it names; None where it states none
+        states                the names of the states that have a probability
         likeliest             the known state that it gives the highest probability, also where it
                               names "unlike"; None where it crashed
         severities            a list of {fault, true, value, low, high} for each fault that is both
@@ -57,6 +58,7 @@ def _score_column(rig: int, truth: dict, entries: list[dict], run: dict) -> list
                 "right": is_right(true["state"], said["state"]),
                 "suspicion": suspicion(said),
                 "probability": said.get("probabilities", {}).get(said["state"]),
+                "states": list(said.get("probabilities", {})),
                 "likeliest": likeliest_state(said),
                 "severities": compare_severities(true["areas"], said),
                 "piston_right": is_piston_right(true["pistons"], said),
@@ -77,14 +79,12 @@ def is_right(state: str, told: str) -> bool:
 def suspicion(said: dict) -> float:
     """How far the tool doubts that a recording is healthy, on a scale that ranks recordings.
 
-    Log odds of the stated probabilities against healthy; where the recording is unlike all states
-    at least those of its p-value; -infinity where the tool crashed: it has found nothing.
+    Log odds against healthy; where the recording is unlike all states at least those of its
+    p-value; -infinity where the tool crashed: it has found nothing.
     """
     if said["state"] == "crashed":
         return -math.inf
-    healthy = said["probabilities"]["healthy"]
-    others = math.fsum(p for name, p in said["probabilities"].items() if name != "healthy")
-    odds = _log(others) - _log(healthy)
+    odds = said["log_odds"]  # probabilities of 0 and 1 would rank nothing
     if said["state"] == "unlike":
         p_value = said["unlike"]["p_value"]
         odds = max(odds, _log(1.0 - p_value) - _log(p_value))

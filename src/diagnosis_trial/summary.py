@@ -55,6 +55,9 @@ def score_table(rows: list[dict]) -> list[Score]:
     def plain(row: dict) -> bool:
         return row["change"] >= PLAIN
 
+    def finished(row: dict) -> bool:  # who crashes has named nothing, and earns nothing by it
+        return row["told"] != "crashed"
+
     return [
         Score("Healthy again: called anything else", "at most 2 %",
               rate_of(not row["right"] for row in of("healthy"))),
@@ -72,13 +75,13 @@ def score_table(rows: list[dict]) -> list[Score]:
         Score("95 % intervals of leak areas, state right: true area inside", "92 to 97 %",
               rate_of(covers(pair) for row in rows if row["right"] for pair in row["severities"])),
         Score("Faults that the tool does not know: given the name of a known one", "at most 10 %",
-              rate_of(row["told"] in LEAK_STATES for row in of(*OUTSIDE_STATES))),
+              rate_of(row["told"] in LEAK_STATES for row in of(*OUTSIDE_STATES, where=finished))),
         Score("The same, change 5 % or more: called unlike", "",
               right(of(*OUTSIDE_STATES, where=plain))),
         Score("The line was changed, change 5 % or more: called unlike", "",
               right(of(CHANGED_LINE, where=plain))),
         Score("The line was changed: given the name of a fault", "",
-              rate_of(row["told"] in LEAK_STATES for row in of(CHANGED_LINE))),
+              rate_of(row["told"] in LEAK_STATES for row in of(CHANGED_LINE, where=finished))),
         Score("Piston told of one leak that is named: right", "",
               rate_of(row["piston_right"] for row in of(*SINGLE)
                       if row["right"] and row["piston_right"] is not None)),
@@ -150,11 +153,11 @@ def severity_table(rows: list[dict]) -> list[SeverityErrors]:
 
 
 def reliability_table(rows: list[dict]) -> list[ProbabilityBin]:
-    """Recordings in a state that the tool knows by the probability of the state that it names.
+    """Recordings in a state that the column knows by the probability of the state that it names.
     Those that are called unlike state no probability."""
     stated = [
         (row["probability"], row["right"])
         for row in rows
-        if row["state"] in KNOWN and row["probability"] is not None
+        if row["state"] in row["states"] and row["probability"] is not None
     ]
     return bin_probabilities(stated, PROBABILITY_EDGES)

@@ -8,8 +8,9 @@ Its arguments are a case, an output folder and the columns, METHOD@TWIN. METHOD 
     P, PR, PRA, Q, QR     a network that the twin teaches (`diagnosis_trial.networks`)
 
 and TWIN one of `diagnosis_trial.twins`. Writes diagnosis.json, column -> the content of a file of
-`rippletwin diagnose`, and run.json, column -> the processor seconds that twin and diagnoses took
-and the twin's misfit. It runs in one process: its confinement has no shared memory.
+`rippletwin diagnose` with the log odds against healthy of each recording, and run.json, column ->
+the processor seconds that twin and diagnoses took and the twin's misfit. It runs in one process:
+its confinement has no shared memory.
 """
 
 import json
@@ -63,9 +64,9 @@ def diagnose_by(method: str, kind: str, fitted: FittedTwin, case: Case) -> dict:
     recordings = select_recordings(case)
     if method in ("anchored", "unanchored"):
         again, anchored = kind != "nominal", method == "anchored"
-        return diagnosis_dict(
-            diagnose(case, fitted.twin, recordings, recalibrate=again, anchored=anchored)
-        )
+        found = diagnose(case, fitted.twin, recordings, recalibrate=again, anchored=anchored)
+        entries = diagnosis_dict(found)["recordings"]
+        return {"recordings": [e | {"log_odds": d.log_odds} for e, d in zip(entries, found)]}
     network = teach_network(method, fitted.twin, fitted.covariance, case)
     return ask_network(network, recordings, case.rig, fitted.twin)
 

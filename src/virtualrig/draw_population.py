@@ -67,18 +67,16 @@ def draw_rig(commit: str, number: int | str, rig: int) -> DrawnRig:
     true = draw_true(sheet, rng)
     nuisance = draw_nuisance(rng, len(sheet["sensors"]), len(sheet["line"]["segments"]))
     points = draw_points(rng)
+    healthy = [replace(points[0], label=f"healthy_0_{k}") for k in range(HEALTHY_REPEATS)]
+    healthy += [replace(point, label=f"healthy_{k}") for k, point in enumerate(points[1:], 1)]
     plans = [
-        PlannedRecording(replace(points[0], label=f"healthy_0_{k}"), "healthy")
-        for k in range(HEALTHY_REPEATS)
-    ]
-    plans += [
-        PlannedRecording(replace(point, label=f"healthy_{k}"), "healthy")
-        for k, point in enumerate(points[1:], 1)
+        PlannedRecording(point, "healthy", kelvin=float(RECORDING_KELVIN * rng.standard_normal()))
+        for point in healthy
     ]
     session = nuisance["session_kelvin"]
     for k, state in enumerate(rng.permutation(STATES)):
         # three of four at the point that was recorded most often when the pump was healthy
-        at = 0 if rng.uniform() < 0.75 else int(rng.integers(len(points)))
+        at = 0 if rng.uniform() < 0.75 else int(rng.integers(1, len(points)))
         point = replace(points[at], label=f"unknown_{k:02d}")
         plans.append(_draw_state(str(state), point, sheet, true, session, rng))
     return DrawnRig(sheet, true, nuisance, tuple(plans))

@@ -12,7 +12,7 @@ from scipy.stats import kstest
 import leaking_pump
 from rippletwin.case.model import Load
 from rippletwin.diagnosis.diagnosed_numbers import gather
-from rippletwin.diagnosis.diagnoser import Diagnoser, _probabilities
+from rippletwin.diagnosis.diagnoser import Diagnoser, _log_posterior
 from rippletwin.diagnosis.diagnosis_file import diagnosis_dict
 from rippletwin.diagnosis.evidence import ErrorPrior, _at_best_pitch, compare_healthy
 from rippletwin.diagnosis.faults.library import select_faults
@@ -391,7 +391,7 @@ def test_a_state_whose_likelihood_overflows_is_impossible():
     healthy = Diagnoser(Twin(leaking_pump.rig(), [anchor]), ())(anchor, [anchor]).best
     slipper = select_faults()[0]
     lost = replace(healthy, state=(slipper,), log_evidence=np.nan)
-    assert _probabilities([healthy, lost]) == {"healthy": 1.0, "slipper": 0.0}
+    assert _log_posterior([healthy, lost]) == {"healthy": 0.0, "slipper": -np.inf}
 
 
 def test_a_load_that_was_not_measured_in_the_band_is_refused():

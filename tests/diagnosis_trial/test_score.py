@@ -100,10 +100,13 @@ def test_unlike_raises_the_suspicion_and_never_lowers_it(p_value, odds):
     assert row["suspicion"] == pytest.approx(odds)
 
 
-def test_certainty_is_a_finite_suspicion():
-    """A probability of 0 has no logarithm: both certainties still rank."""
-    true = truth(unknown_00=("healthy", 0.0, None), unknown_01=("slipper", 0.1, {"slipper": 1e-8}))
-    told = [said("unknown_00", "healthy", 1.0), said("unknown_01", "slipper", 0.0)]
-    sound, leaking = scored(0, true, told)
-    assert math.isfinite(sound["suspicion"]) and math.isfinite(leaking["suspicion"])
-    assert sound["suspicion"] < -600 and leaking["suspicion"] > 600
+def test_what_is_sure_is_ranked_by_its_log_odds():
+    """Two recordings whose probability of being healthy is 0: the log odds tell them apart."""
+    leak = "slipper", 0.1, {"slipper": 1e-8}
+    true = truth(unknown_00=leak, unknown_01=leak)
+    told = [
+        said(label, "slipper", 1e-9) | {"probabilities": {"healthy": 0.0, "slipper": 1.0}}
+        | {"log_odds": odds}
+        for label, odds in (("unknown_00", 900.0), ("unknown_01", 1100.0))
+    ]  # fmt: skip
+    assert [row["suspicion"] for row in scored(0, true, told)] == [900.0, 1100.0]

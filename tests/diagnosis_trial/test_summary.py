@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from concealed.summary import bin_probabilities
 from diagnosed_rigs import made_rows as rows
 from diagnosis_trial.figures import draw_detection, draw_figures
 from diagnosis_trial.page import report_page
@@ -67,6 +68,27 @@ def test_stated_probabilities_are_those_of_known_states():
     assert sum(b.right.count for b in table) == 10 * 4 - 1
     wrong = next(b for b in table if b.low == 0.8)
     assert wrong.mean == pytest.approx(0.83, abs=0.05)
+
+
+def test_a_column_is_asked_about_the_states_that_it_has():
+    """A network without a state of both leaks states no probability of it: the recordings with both
+    are no evidence of its calibration."""
+    made = [row | {"states": ["healthy", "slipper", "cylinder"]} for row in rows()]
+    assert sum(b.right.count for b in reliability_table(made)) == 10 * 3 - 1
+
+
+def test_a_probability_that_rounding_takes_beyond_one_counts():
+    """Of the sum of two probabilities."""
+    (sure,) = bin_probabilities([(1.0 + 1e-10, True), (1.0, True)], (0.999, 1.0))
+    assert sure.right.count == 2
+
+
+def test_who_crashes_has_named_no_fault():
+    """Crashed recordings are in neither line of wrong names."""
+    crashed = [row | {"told": "crashed", "right": False} for row in rows()]
+    table = score_table(crashed)
+    assert by_words(table, "given the name of a known one").count == 0
+    assert by_words(table, "given the name of a fault").count == 0
 
 
 def two_columns() -> list[dict]:

@@ -1,5 +1,7 @@
 """Truths and diagnoses of a rig, made up for tests of the diagnosis trial."""
 
+import math
+
 from diagnosis_trial.score import score_rig
 
 
@@ -29,7 +31,7 @@ def said(
         for name, (low, high) in (intervals or {}).items()
     }
     return {"label": label, "state": state, "probabilities": probabilities, "severity": severity,
-            "piston": piston,
+            "piston": piston, "log_odds": math.log((1 - healthy) / healthy),
             "unlike": {"p_value": 1e-3 if state == "unlike" else 0.5}}  # fmt: skip
 
 

@@ -130,6 +130,17 @@ def test_many_draws_are_taken_at_random_from_the_right_class():
         assert set(found[y == label]) == set(level[label])
 
 
+@pytest.mark.parametrize(("count", "most"), [(20, 1), (35, 2)])
+def test_samples_share_as_few_draws_as_can_be(count, most):
+    """Of 20 draws 20 samples share none; of 35 some are of two samples, and all are there."""
+    draws = np.arange(40.0).reshape(2, 20, 1, 1) * np.array([1.0, -1.0, 1.0, -1.0])
+    x, y = augment(draws, count, np.zeros(1), np.random.default_rng(0))
+    sizes = np.round(np.abs(x[:, 0]).max(axis=1))
+    for label in (0, 1):
+        _, times = np.unique(sizes[y == label], return_counts=True)
+        assert len(times) == 20 and times.max() == most
+
+
 def test_each_once_takes_every_revolution():
     """As many samples as revolutions, in class order, none of them twice."""
     level = np.arange(1.0, 9.0).reshape(2, 4)

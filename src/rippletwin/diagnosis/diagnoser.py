@@ -68,11 +68,11 @@ class Diagnoser:
         prior, repeats = self._learned[labels]
         model = self.make_model(observation, healthy[0], start, repeats)
         weighed = weigh_states(model, states_of(self.faults), prior)
-        probabilities = _probabilities(weighed)
-        best = max(weighed, key=lambda w: probabilities[state_name(w.state)])
+        log_posterior = _log_posterior(weighed)
+        best = max(weighed, key=lambda w: log_posterior[state_name(w.state)])
         return Diagnosis(
             label=observation.label,
-            probabilities=probabilities,
+            log_posterior=log_posterior,
             best=best,
             unlikeness=judge_residual(model, best, prior),
             anchor=model.anchor,
@@ -158,13 +158,13 @@ def _rounded(value: float) -> float:
     return float(f"{value:.{DIGITS}g}")
 
 
-def _probabilities(weighed: Sequence[StateEvidence]) -> dict[str, float]:
-    """Posterior probabilities by state's name."""
+def _log_posterior(weighed: Sequence[StateEvidence]) -> dict[str, float]:
+    """Log posterior probabilities by state's name."""
     sizes = [len(w.state) for w in weighed]
     log_posterior = np.array(
         [w.log_evidence + np.log(PRIOR[n] / sizes.count(n)) for w, n in zip(weighed, sizes)]
     )
     # a state whose likelihood overflows explains nothing
     log_posterior[~np.isfinite(log_posterior)] = -np.inf
-    chances = np.exp(log_posterior - logsumexp(log_posterior))
-    return {state_name(w.state): float(p) for w, p in zip(weighed, chances)}
+    log_posterior -= logsumexp(log_posterior)
+    return {state_name(w.state): float(value) for w, value in zip(weighed, log_posterior)}

@@ -29,19 +29,31 @@ class Severity:
 class Diagnosis:
     """What a recording says about the pump.
 
-    probabilities   of each state by its name; that the recording is like none of them is another
-                    question, which `unlikeness` answers
+    log_posterior   log probability of each state by its name; that the recording is like none of
+                    them is another question, which `unlikeness` answers
     best            evidence of the most probable state
     expected_gain   what one more step of the pump's fit promises to add to the log posterior
     """
 
     label: str
-    probabilities: Mapping[str, float]
+    log_posterior: Mapping[str, float]
     best: StateEvidence = field(repr=False)
     unlikeness: Unlikeness
     anchor: Anchor = field(repr=False)
     model: ObservationModel = field(repr=False)
     expected_gain: float = 0.0
+
+    @property
+    def probabilities(self) -> dict[str, float]:
+        """Of each state by its name."""
+        return {name: float(np.exp(value)) for name, value in self.log_posterior.items()}
+
+    @property
+    def log_odds(self) -> float:
+        """Log odds of all other states together against the healthy one; they also rank what is so
+        sure that its probability is 0 or 1."""
+        faulty = [value for name, value in self.log_posterior.items() if name != state_name(())]
+        return float(np.logaddexp.reduce(faulty) - self.log_posterior[state_name(())])
 
     @property
     def state(self) -> str:

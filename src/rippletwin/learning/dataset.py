@@ -46,7 +46,7 @@ def augment(
 
     y = np.repeat(np.arange(classes), samples_per_class)
     shift = rng.integers(points, size=y.size)
-    drawn = rng.integers(draws, size=y.size) if draws > 1 else np.zeros(y.size, int)
+    drawn = np.concatenate([_draw(draws, samples_per_class, rng) for _ in range(classes)])
     at = (np.arange(points * revolutions) + shift[:, None]) % points
     x = np.empty((y.size, channels, points * revolutions), dtype=np.float32)
     for label in range(classes):
@@ -55,6 +55,15 @@ def augment(
     std = (noise_fraction * noise_std).astype(np.float32)
     x += std[:, None] * rng.standard_normal(x.shape, dtype=np.float32)
     return remove_mean(x), y
+
+
+def _draw(draws: int, count: int, rng: np.random.Generator) -> np.ndarray:
+    """Which of the draws of a class its samples (count,) are of: each as often as any other, to
+    one, so that no more samples than draws share none."""
+    if draws == 1:
+        return np.zeros(count, int)
+    rounds = [rng.permutation(draws) for _ in range(-(-count // draws))]
+    return np.concatenate(rounds)[:count]
 
 
 def each_once(

@@ -7,12 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from scipy.special import logsumexp
 
 from rippletwin.errors import InputError
 from rippletwin.learning.architectures import CLASSES
 from rippletwin.learning.conformal import Conformal
 from rippletwin.learning.networks import restore_networks, save_tensors
-from rippletwin.learning.training import activation_statistics, predict
+from rippletwin.learning.training import (
+    activation_statistics,
+    predict,
+    predict_log_probabilities,
+)
 
 FORMAT = 2
 """Of the files: counts up when what networks calculate, or what is kept of them, changes."""
@@ -52,10 +57,23 @@ class KeptNetworks:
             p_values.append(conformal.p_values(activation_statistics(network, windows)))
         return np.array(said), np.array(p_values)
 
-    def probabilities(self, windows: np.ndarray) -> np.ndarray:
-        """Mean probability (classes,) over seeds and windows (n, channels, M)."""
+    def log_probabilities(self, windows: np.ndarray) -> np.ndarray:
+        """Logarithm (classes,) of the mean probability over seeds and windows (n, channels, M)."""
         networks = restore_networks(self.architecture, len(self.channels), self.weights)
-        return np.mean([predict(network, windows)[1].mean(axis=0) for network in networks], axis=0)
+        each = np.concatenate([predict_log_probabilities(network, windows) for network in networks])
+        return logsumexp(each, axis=0) - np.log(len(each))
+
+    def strangeness(self, windows: np.ndarray) -> np.ndarray:
+        """Nonconformity (seeds, n) of windows over the largest of the held-out samples: above 1 it
+        ranks windows whose p-values are all the least."""
+        networks = restore_networks(self.architecture, len(self.channels), self.weights)
+        return np.array(
+            [
+                conformal.nonconformity(activation_statistics(network, windows))
+                / conformal.scores[-1]
+                for network, conformal in zip(networks, self.conformal, strict=True)
+            ]
+        )
 
     def save(self, path: str | Path) -> None:
         """Write them to `path`: tensors, lists, text and numbers only."""

@@ -198,9 +198,19 @@ def predict(
     network: Classifier, x: np.ndarray, batch_size: int = BATCH
 ) -> tuple[np.ndarray, np.ndarray]:
     """Class indices (n,) and probabilities (n, classes) of x, in its own unit."""
+    log_probabilities = predict_log_probabilities(network, x, batch_size)
+    return log_probabilities.argmax(axis=1), np.exp(log_probabilities)
+
+
+@torch.no_grad()
+def predict_log_probabilities(
+    network: Classifier, x: np.ndarray, batch_size: int = BATCH
+) -> np.ndarray:
+    """Logarithms (n, classes) of the probabilities of x, in its own unit: they tell apart what is
+    so sure that the probability is 0 or 1."""
     network.eval()
     logits = _in_batches(network, torch.as_tensor(x, dtype=torch.float32), batch_size).cpu()
-    return logits.argmax(1).numpy(), logits.softmax(1).numpy()
+    return logits.double().log_softmax(1).numpy()
 
 
 @torch.no_grad()
