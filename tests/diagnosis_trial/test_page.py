@@ -12,7 +12,8 @@ def _rows(first_found: float) -> list[dict]:
     """Slippers' leaks, each on a rig of its own, found from a change on; healthy recordings beside
     them raise no alarm."""
     row = {"column": "anchored@nominal", "right": True, "told": "slipper", "probability": 0.9,
-           "states": ["healthy", "slipper"], "likeliest": "slipper", "weakest": 0.0, "severities": [], "piston_right": None,
+           "states": ["healthy", "slipper"], "likeliest": "slipper", "weakest": 0.0,
+           "severities": [], "piston_right": None,
            "twin_misfit": 0.1, "fit_s": 1.0, "diagnose_s": 1.0}  # fmt: skip
     leaks = [
         row | {"rig": k, "label": "leak", "state": "slipper", "change": float(change),
