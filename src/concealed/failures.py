@@ -25,7 +25,9 @@ def failure(row: dict) -> str | None:
         return None if row["effects_found"] == 2 else f"{row['effects_found']} of 2 effects named"
     if not row["right"]:
         return ("not noticed" if not row["alarm"] else "not named") if row["plain"] else None
-    return None if all(row["places_right"]) else "wrong place"
+    # an effect that cannot be told from another one may be at another element
+    is_placed = kind == "indistinguishable" or all(row["places_right"])
+    return None if is_placed else "wrong place"
 
 
 def circumstance(row: dict) -> str:

@@ -45,7 +45,8 @@ def judge_names(truth: dict, verdict: dict, levels: Sequence[str] = ESTABLISHED)
     true, named, length = truth["effects"], named_effects(verdict, levels), truth["length"]
     nuisance = truth.get("nuisance", [])
     classes = [set(names) for names in [*verdict["equivalents"], *truth["classes"]]]
-    claims = assign_claims(true, named, classes, length)
+    free = [claim for claim in named if not _is_nuisance(claim, truth, classes)]
+    claims = assign_claims(true, free, classes, length)
     rest = [claim for claim in named if not any(claim is each for each in claims)]
     real = [
         claim
@@ -55,6 +56,17 @@ def judge_names(truth: dict, verdict: dict, levels: Sequence[str] = ESTABLISHED)
     there = [any(claim is each for each in [*claims, *real]) for claim in named]
     found = [(effect, claim) for effect, claim in zip(true, claims) if claim is not None]
     return Names(true, named, there, found, real)
+
+
+def _is_nuisance(claim: dict, truth: dict, classes: Sequence[set]) -> bool:
+    """Whether a named effect is nuisance physics at its own place, and no concealed effect at its."""
+
+    def is_there(effect: dict, names: Sequence[set]) -> bool:
+        alike = same_or_equivalent(claim["name"], effect["name"], names)
+        return alike and is_place_right(effect, claim, truth["length"])
+
+    nuisance = any(is_there(effect, []) for effect in truth.get("nuisance", []))
+    return nuisance and not any(is_there(effect, classes) for effect in truth["effects"])
 
 
 def named_effects(verdict: dict, levels: Sequence[str] = ESTABLISHED) -> list[dict]:

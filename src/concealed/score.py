@@ -104,7 +104,7 @@ def score_case(truth: dict, verdict: dict, baselines: dict, oracle: dict = NO_OR
         "misfit_nominal": nominal,
         "misfit_calibrated": calibrated,
         "misfit_corrected": fit["after"]["in_sample"],
-        "absorbed": max(0.0, 1.0 - calibrated / nominal),
+        "absorbed": float(np.maximum(0.0, 1.0 - calibrated / nominal)),  # keeps a crash's NaN
         "held_out_calibrated": fit["before"]["held_out"],
         "held_out_corrected": fit["after"]["held_out"],
         "line_errors": {
@@ -112,10 +112,9 @@ def score_case(truth: dict, verdict: dict, baselines: dict, oracle: dict = NO_OR
             for which, rows in baselines["segments"].items()
         },
         "baselines": {
-            "bic": score_baseline(true, baselines["bic"], truth["classes"]),
-            "sparse": score_baseline(true, baselines["sparse"], truth["classes"]),
-            "recalibrate": score_baseline(true, None, truth["classes"])
-            | {"alarm": calibrated > ACCEPTABLE_MISFIT},
+            "bic": score_baseline(truth, baselines["bic"]),
+            "sparse": score_baseline(truth, baselines["sparse"]),
+            "recalibrate": score_baseline(truth, None) | {"alarm": calibrated > ACCEPTABLE_MISFIT},
         },
         "seconds": baselines["seconds"],
     }
@@ -170,16 +169,20 @@ def line_errors(true: list[dict], rows: list[dict]) -> list[dict]:
     ]
 
 
-def score_baseline(true: list[dict], picked: dict | None, classes: list[list[str]]) -> dict:
-    """Score of a method that picks one effect or none.
+def score_baseline(truth: dict, picked: dict | None) -> dict:
+    """Score of a method that picks one effect or none, against the seal's content.
 
-    `alarm` whether it picks one, `right` whether that is a true one, `named` the pick as text.
+    `right` whether the pick is a concealed one; `alarm` and `named`, the pick as text, where it is
+    not there at all: like the tool, a method may name nuisance physics. A pick has no position, so
+    that nuisance physics counts by its name.
     """
     if picked is None:
         return {"alarm": False, "right": False, "named": ""}
-    sets = [set(names) for names in classes]
+    sets, name = [set(names) for names in truth["classes"]], picked["name"]
+    right = any(same_or_equivalent(name, effect["name"], sets) for effect in truth["effects"])
+    there = right or any(name == effect["name"] for effect in truth.get("nuisance", ()))
     return {
-        "alarm": True,
-        "right": any(same_or_equivalent(picked["name"], effect["name"], sets) for effect in true),
-        "named": f"{picked['name']} ({picked['element']})",
+        "alarm": not there,
+        "right": right,
+        "named": "" if there else f"{name} ({picked['element']})",
     }

@@ -91,7 +91,8 @@ def compute_baselines(explanation) -> dict:
 
 
 def pick_by_bic(explanation) -> dict | None:
-    """`name` and `element` of the single effect with the least k ln n - 2 ln L, or None.
+    """`name` and `element` of the effect in the fit with the least k ln n - 2 ln L, or None where
+    that has usual effects alone, which are not picked but always tried.
 
     L is the likelihood at the posterior modes of the explanation's own fits, k the number of
     parameters, n that of real numbers measured (Schwarz, Ann. Statist. 6, 1978).
@@ -99,15 +100,14 @@ def pick_by_bic(explanation) -> dict | None:
     count = sum(2 * o.values.size for o in explanation.observations)
 
     def criterion(fit) -> float:
-        proper = np.array([not p.flat for p in fit.twin.parameters])
+        proper = np.array([not p.flat for p in fit.twin.parameters], bool)
         minus_log_likelihood = fit.objective - 0.5 * float(np.sum(fit.twin.theta[proper] ** 2))
         return 2 * minus_log_likelihood + len(fit.twin.parameters) * np.log(count)
 
     best = min([explanation.search.base, *explanation.search.single_effect_fits], key=criterion)
-    if not best.hypothesis:
-        return None
-    effect, place = best.hypothesis[0]
-    return {"name": effect.name, "element": place.element}
+    rig = explanation.rig
+    picked = [(e, place) for e, place in best.hypothesis if not e.usual(rig, place)]
+    return {"name": picked[-1][0].name, "element": picked[-1][1].element} if picked else None
 
 
 if __name__ == "__main__":

@@ -1,11 +1,15 @@
 """Scoring of a case: which names, places and intervals count as right."""
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
 from concealed.failures import failure
-from concealed.names import assign_claims, is_place_right
+from concealed.names import assign_claims, is_place_right, judge_names
 from concealed.score import ACCEPTABLE_MISFIT, intervals_hold, score_baseline, score_case
-from concealed.tool import NO_BASELINES, crash_verdict
+from concealed.tool import NO_BASELINES, crash_verdict, pick_by_bic
+from rippletwin.twin.effects.base import Place
 from scored_cases import claim, effect, pair_truth, score_example, truth, verdict
 
 
@@ -165,17 +169,58 @@ def test_an_own_name_comes_before_an_equivalent_one():
 
 
 def test_a_pick_of_a_simple_method():
-    """None raises no alarm; the true effect is right, and so is a name of one class; another is an
-    alarm that is wrong."""
-    true, classes = [effect("leak")], [["leak", "side_hole"]]
-    assert score_baseline(true, None, classes) == {"alarm": False, "right": False, "named": ""}
-    for name, element, right in (
-        ("leak", "load", True),
-        ("side_hole", "position", True),
-        ("line_volume", "position", False),
+    """None raises no alarm; the true effect is right, and so is a name of one class; nuisance
+    physics is there; another is an alarm that is wrong."""
+    sealed = {
+        "effects": [effect("leak")],
+        "classes": [["leak", "side_hole"]],
+        "nuisance": [effect("unsteady_friction")],
+    }
+    assert score_baseline(sealed, None) == {"alarm": False, "right": False, "named": ""}
+    for name, right, wrong in (
+        ("leak", True, ""),
+        ("side_hole", True, ""),
+        ("unsteady_friction", False, ""),
+        ("line_volume", False, "line_volume (position)"),
     ):
-        score = score_baseline(true, {"name": name, "element": element}, classes)
-        assert score == {"alarm": True, "right": right, "named": f"{name} ({element})"}
+        score = score_baseline(sealed, {"name": name, "element": "position"})
+        assert score == {"alarm": bool(wrong), "right": right, "named": wrong}
+
+
+@pytest.mark.parametrize(
+    ("criteria", "picked"),
+    [((9.0, 5.0, 3.0), "leak"), ((9.0, 2.0, 3.0), None), ((1.0, 2.0, 3.0), None)],
+    ids=["a further effect", "the usual one", "none"],
+)
+def test_the_least_bic_picks_what_is_beside_the_usual_effects(criteria, picked):
+    """Of the line alone, with friction, and with friction and a leak: friction is always tried, so
+    that it is no pick."""
+    friction = SimpleNamespace(name="unsteady_friction", usual=lambda *_: True)
+    leak = SimpleNamespace(name="leak", usual=lambda *_: False)
+    places = (friction, Place("line")), (leak, Place("position"))
+    twin = SimpleNamespace(parameters=[], theta=np.zeros(0))
+    base, *fits = (
+        SimpleNamespace(twin=twin, objective=value, hypothesis=places[:k])
+        for k, value in enumerate(criteria)
+    )
+    explanation = SimpleNamespace(
+        observations=[SimpleNamespace(values=np.zeros(3))],
+        rig=None,
+        search=SimpleNamespace(base=base, single_effect_fits=fits),
+    )
+    found = pick_by_bic(explanation)
+    assert (found and found["name"]) == picked
+
+
+def test_nuisance_physics_at_its_place_counts_for_no_concealed_effect():
+    """A wall of the whole line creeps as nuisance physics, that of segment 3 more: a claim for the
+    line is there, but does not find what is concealed; a claim for the segment does."""
+    wall = effect("viscoelastic_wall") | {"position": None}
+    sealed = truth(effects=[wall | {"element": "segment 3"}], nuisance=[wall | {"element": "line"}])
+    for element, found in (("line", 0), ("segment 3", 1)):
+        said = verdict("named", claim("viscoelastic_wall", element, None))
+        names = judge_names(sealed, said)
+        assert len(names.found) == found and not names.wrong
 
 
 @pytest.mark.parametrize(
