@@ -214,6 +214,8 @@ def print_summary(
     print()
     for kind in KINDS:
         own = [result for name, result in scores if name == kind]
+        if not own:
+            continue
         losses, holes = (
             np.sum([getattr(r, which) for r in own], axis=0) for which in ("losses", "holes")
         )
