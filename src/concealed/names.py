@@ -59,7 +59,7 @@ def judge_names(truth: dict, verdict: dict, levels: Sequence[str] = ESTABLISHED)
 
 
 def _is_nuisance(claim: dict, truth: dict, classes: Sequence[set]) -> bool:
-    """Whether a named effect is nuisance physics at its own place, and no concealed effect at its."""
+    """Whether a named effect is nuisance physics at its place, and no concealed one at its."""
 
     def is_there(effect: dict, names: Sequence[set]) -> bool:
         alike = same_or_equivalent(claim["name"], effect["name"], names)
