@@ -20,6 +20,7 @@ import numpy as np
 
 from diagnosis_trial.taught_signals import fixed_signals, leak_bins
 from rippletwin.case.model import Case, Recording, Rig
+from rippletwin.diagnosis.diagnosis import odds_against_healthy
 from rippletwin.diagnosis.network_answers import (
     STATE_OF,
     cut_windows,
@@ -115,7 +116,6 @@ def ask_network(kept: KeptNetworks, recordings: list[Recording], rig: Rig, twin:
         else:
             windows = cut_windows(recording, rig, kept.samples_per_revolution)
         log_shares = _by_state(kept.classes, kept.log_probabilities(windows))
-        faulty = [value for state, value in log_shares.items() if state != STATE_OF["H"]]
         said, p_values = kept.answers(windows)
         beyond = max(float(np.median(kept.strangeness(windows))), 1.0)
         entries.append(
@@ -123,7 +123,7 @@ def ask_network(kept: KeptNetworks, recordings: list[Recording], rig: Rig, twin:
                 "label": recording.label,
                 "state": judge_windows(kept.classes, said, p_values)["state"],
                 "probabilities": {name: float(np.exp(v)) for name, v in log_shares.items()},
-                "log_odds": float(np.logaddexp.reduce(faulty) - log_shares[STATE_OF["H"]]),
+                "log_odds": odds_against_healthy(log_shares),
                 "unlike": {"p_value": float(np.median(p_values)) / beyond},
             }
         )

@@ -75,6 +75,14 @@ def test_a_fit_of_the_pump_that_is_cut_short_promises_more(healthy, monkeypatch)
     assert calibrate_pump(*fit).expected_gain > UNCONVERGED_GAIN
 
 
+def test_a_band_above_what_tells_the_pump_leaves_it_as_it_is(healthy):
+    """Recordings from 2.6 kHz on: no order of the pistons is left below the highest that counts."""
+    high = [replace(o, min_frequency_hz=2600.0) for o in healthy]
+    twin = Twin(leaking_pump.rig(), high)
+    found = calibrate_pump(twin, high, twin.rig.pump)
+    assert found.twin.rig.pump == leaking_pump.SHEET and found.expected_gain == 0.0
+
+
 def test_a_pump_that_the_twin_has_fitted_amiss_is_fitted_about_the_data_sheet(healthy):
     """Port timing and overlap of the given twin are three and two of their tolerances off, as a fit
     leaves them where its model error takes up the difference. The pump that a diagnosis takes has

@@ -60,8 +60,8 @@ def measure_misfit(model: ErrorModel, theta: np.ndarray) -> Misfit:
     quantities = [[np.concatenate(x) for x in zip(*pressures)]] if pressures else []
     quantities += [joined[REFLECTION]] if REFLECTION in joined else []
     return Misfit(
-        _rms([relative_misfit(*q) for q in quantities]),
-        _rms([theil_coefficient(*q) for q in quantities]),
+        root_mean_square([relative_misfit(*q) for q in quantities]),
+        root_mean_square([theil_coefficient(*q) for q in quantities]),
         {name: relative_misfit(*p) for name, p in joined.items()},
         {name: theil_coefficient(*p) for name, p in joined.items()},
     )
@@ -78,7 +78,8 @@ def readings_by_sensor(model: ErrorModel, theta: np.ndarray) -> dict[str, list[n
     return {name: [np.concatenate(x) for x in zip(*p)] for name, p in pairs.items()}
 
 
-def _rms(values: Sequence[float]) -> float:
+def root_mean_square(values: Sequence[float]) -> float:
+    """Of misfits of several quantities or parts of the data."""
     return float(np.sqrt(np.mean(np.square(values))))
 
 

@@ -78,7 +78,6 @@ def command(
     from rippletwin.diagnosis.diagnosis_file import write_diagnosis
     from rippletwin.diagnosis.faults.library import select_faults
     from rippletwin.diagnosis.kept_answers import diagnose_changed, warnings_of
-    from rippletwin.figures.fault_posterior import draw, remove_figures
     from rippletwin.twin.effects.library import add_effects
 
     faults = select_faults(list(fault_names))
@@ -94,6 +93,8 @@ def command(
     entries = [each.entry for each in found]
     warnings = warnings_of(read, twin)
     result = write_diagnosis(entries, out, _answers(networks, recordings, read), warnings)
+    from rippletwin.figures.fault_posterior import draw, remove_figures  # takes a second
+
     if no_figures:
         remove_figures(out)
     else:
@@ -144,12 +145,13 @@ def _twin_of(twin_file: str | None, out: str, processes: int, case, recordings, 
     from rippletwin.diagnosis.diagnose import check_recordings
     from rippletwin.explanation.explain import explain
     from rippletwin.explanation.verdict.verdict_file import write_verdict
-    from rippletwin.figures.explanation import remove_figures
 
     check_recordings(case, recordings)
     diagnosed = {recording.label for recording in recordings}
     known = tuple(r for r in case.recordings if r.label not in diagnosed)
     explanation = explain(replace(case, recordings=known), processes, progress)
     write_verdict(explanation, out)
+    from rippletwin.figures.explanation import remove_figures
+
     remove_figures(out)  # of an earlier explanation in this folder
     return explanation.twin

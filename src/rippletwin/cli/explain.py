@@ -62,7 +62,6 @@ def command(
     from rippletwin.explanation.checks.bootstrap import MIN_DRAWS
     from rippletwin.explanation.explain import explain
     from rippletwin.explanation.verdict.verdict_file import write_verdict
-    from rippletwin.figures.explanation import draw, remove_figures
     from rippletwin.twin.effects.library import add_effects
 
     if bootstrap and bootstrap < MIN_DRAWS:
@@ -78,6 +77,8 @@ def command(
     with progress_bars(as_json) as progress:
         explanation = explain(read, processes, progress, bootstrap)
     result = write_verdict(explanation, out)
+    from rippletwin.figures.explanation import draw, remove_figures  # takes a second
+
     if no_figures:
         remove_figures(out)
     else:

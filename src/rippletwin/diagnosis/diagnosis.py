@@ -52,8 +52,7 @@ class Diagnosis:
     def log_odds(self) -> float:
         """Log odds of all other states together against the healthy one; they also rank what is so
         sure that its probability is 0 or 1."""
-        faulty = [value for name, value in self.log_posterior.items() if name != state_name(())]
-        return float(np.logaddexp.reduce(faulty) - self.log_posterior[state_name(())])
+        return odds_against_healthy(self.log_posterior)
 
     @property
     def state(self) -> str:
@@ -85,6 +84,14 @@ class Diagnosis:
         faulty = {fault.name for fault in self.best.state if fault.one_piston}
         told = self.pistons
         return next(iter(told.values())) if set(told) == faulty and _one(told) else None
+
+
+def odds_against_healthy(log_probabilities: Mapping[str, float]) -> float:
+    """Log odds of all other states together against the healthy one, of log probabilities by the
+    name of the state."""
+    healthy = state_name(())
+    faulty = [value for name, value in log_probabilities.items() if name != healthy]
+    return float(np.logaddexp.reduce(faulty) - log_probabilities[healthy])
 
 
 def _one(pistons: Mapping[str, int]) -> bool:

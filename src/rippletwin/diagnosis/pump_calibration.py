@@ -76,11 +76,13 @@ def calibrate_pump(twin: Twin, healthy: Sequence, sheet: Mapping) -> Recalibrate
     line may have made up for it.
 
     The line must be known; the pump's numbers are no parameters (`with_fitted_pump`). The twin is
-    returned with its own pump where the data sheet has no geometry.
+    returned with its own pump where the data sheet has no geometry, and where no band has an order
+    of the pistons that tells.
     """
     fitted, gain = with_fitted_pump(twin), 0.0
     pump = stated_numbers(sheet)
-    if set(pump) == {"pistons"}:
+    healthy = [o for o in healthy if np.any(_told_orders(o, pump["pistons"]))]
+    if set(pump) == {"pistons"} or not healthy:
         return RecalibratedTwin(fitted)
     for _ in range(ROUNDS):  # the flow is told beside the chambers of the pump that was fitted
         flows = [_measured_flow(fitted, observation) for observation in healthy]
@@ -125,13 +127,19 @@ def _measured_flow(twin: Twin, observation) -> _Flow:
     response = DriftingLine(twin, observation, ripple).response()
     flow, _ = estimate_flow_at_pump(response, observation.values)
     orders = np.asarray(observation.orders)
-    frequency_hz, low = observation.frequency_hz, observation.min_frequency_hz
-    used = orders % twin.rig.pump["pistons"] == 0
-    used &= (low <= frequency_hz) & (frequency_hz <= HIGHEST_HZ)
+    used = _told_orders(observation, twin.rig.pump["pistons"])
     flow = flow[used]
     least = LEAST_ERROR * np.sqrt(np.mean(np.abs(flow) ** 2))
     error = np.hypot(RELATIVE_ERROR * np.abs(flow), least)
     return _Flow(speed_rpm, pressure, orders[used], flow, error)
+
+
+def _told_orders(observation, pistons: int) -> np.ndarray:
+    """Which orders (F,) of an observation tell the pump: the pistons' in its band, up to
+    HIGHEST_HZ."""
+    frequency_hz = observation.frequency_hz
+    inside = (observation.min_frequency_hz <= frequency_hz) & (frequency_hz <= HIGHEST_HZ)
+    return inside & (np.asarray(observation.orders) % pistons == 0)
 
 
 def _residual(numbers: dict, fluid, flow: _Flow, scale: float) -> np.ndarray:

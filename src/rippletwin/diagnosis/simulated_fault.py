@@ -116,10 +116,8 @@ def _with_pump(twin: Twin, speed_hz: float, load_pressure: float, warnings: list
         condition = OperatingCondition(
             speed_hz=speed_hz, load_pressure=load_pressure, source="free"
         )
-        displacement, giver = (
-            operating_point(twin.rig, condition, None).mean_flow / speed_hz,
-            "load",
-        )
+        mean_flow = operating_point(twin.rig, condition, None).mean_flow
+        displacement, giver = mean_flow / speed_hz, "load"
     warnings.append(
         f"only the number of pistons is known of the pump: a default pump of the {giver}'s mean "
         "flow takes its place, and its leak is as uncertain as that"

@@ -50,30 +50,31 @@ class KeptNetworks:
 
     def answers(self, windows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Class indices and conformal p-values (seeds, n) of windows (n, channels, M)."""
-        networks = restore_networks(self.architecture, len(self.channels), self.weights)
         said, p_values = [], []
-        for network, conformal in zip(networks, self.conformal, strict=True):
+        for network, conformal in zip(self._restored(), self.conformal, strict=True):
             said.append(predict(network, windows)[0])
             p_values.append(conformal.p_values(activation_statistics(network, windows)))
         return np.array(said), np.array(p_values)
 
     def log_probabilities(self, windows: np.ndarray) -> np.ndarray:
         """Logarithm (classes,) of the mean probability over seeds and windows (n, channels, M)."""
-        networks = restore_networks(self.architecture, len(self.channels), self.weights)
-        each = np.concatenate([predict_log_probabilities(network, windows) for network in networks])
+        each = np.concatenate([predict_log_probabilities(n, windows) for n in self._restored()])
         return logsumexp(each, axis=0) - np.log(len(each))
 
     def strangeness(self, windows: np.ndarray) -> np.ndarray:
         """Nonconformity (seeds, n) of windows over the largest of the held-out samples: above 1 it
         ranks windows whose p-values are all the least."""
-        networks = restore_networks(self.architecture, len(self.channels), self.weights)
         return np.array(
             [
                 conformal.nonconformity(activation_statistics(network, windows))
                 / conformal.scores[-1]
-                for network, conformal in zip(networks, self.conformal, strict=True)
+                for network, conformal in zip(self._restored(), self.conformal, strict=True)
             ]
         )
+
+    def _restored(self):
+        """The network of each seed."""
+        return restore_networks(self.architecture, len(self.channels), self.weights)
 
     def save(self, path: str | Path) -> None:
         """Write them to `path`: tensors, lists, text and numbers only."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from rippletwin.calibration.fit import Fit
 from rippletwin.calibration.levenberg_marquardt import descend
-from rippletwin.calibration.misfit import Score, score_fit
+from rippletwin.calibration.misfit import Score, root_mean_square, score_fit
 from rippletwin.calibration.posterior import Posterior
 from rippletwin.calibration.ripple_correction import correct_ripple
 from rippletwin.calibration.shaft_angles import fit_shaft_angles
@@ -93,7 +93,9 @@ def cross_validate(
         after,
         tuple(fold.left_out for fold in folds),
         0.0 if disagreement is None else disagreement.deviations,
-        _rms([predict_held_out(r[1], f.held_out)[0].model_error for r, f in zip(refitted, folds)]),
+        root_mean_square(
+            [predict_held_out(r[1], f.held_out)[0].model_error for r, f in zip(refitted, folds)]
+        ),
         *plain,
     )
 
@@ -129,7 +131,9 @@ def _score(
     ]
     return {
         "in_sample": score_fit(fit, observations, ripple=ripple),
-        "held_out": Score(_rms([s.misfit for s in each]), _rms([s.theil for s in each])),
+        "held_out": Score(
+            root_mean_square([s.misfit for s in each]), root_mean_square([s.theil for s in each])
+        ),
     }
 
 
@@ -253,7 +257,3 @@ def find_disagreement(
             z = float(abs(whole.twin.theta[k] - part.twin.theta[m]) / np.sqrt(variance))
             found.append(Disagreement(z, p.name, values[p.name], part_values[p.name], left_out))
     return max(found, key=lambda each: each.deviations, default=None)
-
-
-def _rms(values: Sequence[float]) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
