@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from case_folders import ripple, sheet, write_case, write_hdf5
+from rippletwin.case.load import load_case
 from rippletwin.cli import main
 
 DONE, FOUND = 0, 3
@@ -33,13 +34,42 @@ def test_fail_on_a_fault_and_on_what_is_unlike_all(
     kept = "rippletwin.diagnosis.kept_answers.diagnose_changed"
     monkeypatch.setattr(kept, lambda *arguments: [stub])
     twin_of = "rippletwin.cli.diagnose._twin_of"
-    monkeypatch.setattr(twin_of, lambda file, out, n, case, *rest: SimpleNamespace(rig=case.rig))
+    monkeypatch.setattr(
+        twin_of, lambda file, out, n, case, *rest: (SimpleNamespace(rig=case.rig), [])
+    )
     command = ["diagnose", str(tmp_path), "--out", str(tmp_path / "out"), "--no-figures"]
     command += ["--recording", "healthy_0", *(f"--fail-on={word}" for word in words)]
     assert main(command) == code
     assert capsys.readouterr().out == f"It is {state}.\n"
     written = json.loads((tmp_path / "out/diagnosis.json").read_text())
     assert [each["state"] for each in written["recordings"]] == [state]
+
+
+def test_healthy_recordings_that_contradict_themselves_are_a_warning(tmp_path, capsys, monkeypatch):
+    """Without --twin the explanation's verdict `bad_data` is told on standard error and in
+    diagnosis.json: the diagnosis compares with these recordings all the same."""
+    write_case(tmp_path, sheet())
+    entry = {"label": "healthy_0", "state": "healthy", "sentence": "It is healthy."}
+    found = SimpleNamespace(
+        twin=SimpleNamespace(rig=load_case(tmp_path).rig),
+        decision=SimpleNamespace(contradiction="sensor p1 reads less than noise"),
+    )
+    stubs = {
+        "rippletwin.diagnosis.kept_answers.diagnose_changed": lambda *_: [
+            SimpleNamespace(entry=entry, numbers=None)
+        ],
+        "rippletwin.diagnosis.diagnose.check_recordings": lambda *_: None,
+        "rippletwin.explanation.explain.explain": lambda *_: found,
+        "rippletwin.explanation.verdict.verdict_file.write_verdict": lambda *_: None,
+    }
+    for name, stub in stubs.items():
+        monkeypatch.setattr(name, stub)
+    out = tmp_path / "out"
+    command = ["diagnose", str(tmp_path), "--out", str(out), "--no-figures"]
+    assert main([*command, "--recording", "healthy_0"]) == DONE
+    told = "the healthy recordings contradict themselves: sensor p1 reads less than noise;"
+    assert told in capsys.readouterr().err
+    assert told in json.loads((out / "diagnosis.json").read_text())["warnings"][0]
 
 
 @pytest.fixture

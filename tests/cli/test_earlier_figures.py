@@ -43,7 +43,8 @@ def explained(monkeypatch):
         (Path(out) / "verdict.json").write_text("{}")
         return VERDICT
 
-    monkeypatch.setattr(explain, "explain", lambda *_: SimpleNamespace(twin=None))
+    found = SimpleNamespace(twin=None, decision=SimpleNamespace(contradiction=""))
+    monkeypatch.setattr(explain, "explain", lambda *_: found)
     monkeypatch.setattr(verdict_file, "write_verdict", write)
 
 

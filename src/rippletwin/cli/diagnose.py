@@ -12,6 +12,11 @@ from rippletwin.cli import options
 from rippletwin.cli.exit_codes import found_code
 from rippletwin.cli.progress import progress_bars, warn
 
+CONTRADICTION = (
+    "the healthy recordings contradict themselves: {}; a diagnosis that compares with them may be "
+    "wrong"
+)
+
 
 @click.command(
     "diagnose", short_help="say what is wrong with the pump in recordings of unknown state"
@@ -88,10 +93,11 @@ def command(
     recordings = select_recordings(read, list(labels))
     networks = _networks_of(results, read)
     with progress_bars(as_json) as progress:
-        twin = _twin_of(twin_file, out, processes, read, recordings, progress)
+        twin, doubts = _twin_of(twin_file, out, processes, read, recordings, progress)
         found = diagnose_changed(read, twin, recordings, faults, out, progress)
     entries = [each.entry for each in found]
-    warnings = warnings_of(read, twin)
+    warn(doubts)
+    warnings = [*doubts, *warnings_of(read, twin)]
     result = write_diagnosis(entries, out, _answers(networks, recordings, read), warnings)
     from rippletwin.figures.fault_posterior import draw, remove_figures  # takes a second
 
@@ -133,13 +139,14 @@ def _answers(networks: dict, recordings, case) -> dict:
 
 
 def _twin_of(twin_file: str | None, out: str, processes: int, case, recordings, progress):
-    """The twin that the command line names, or the one that explains the healthy recordings.
+    """The twin that the command line names, or the one that explains the healthy recordings; and
+    warnings, where these contradict themselves.
 
     Raises InputError as `check_recordings`, before anything is explained."""
     if twin_file is not None:
         from rippletwin.twin.twin_file import load_twin
 
-        return load_twin(twin_file)
+        return load_twin(twin_file), []
     from dataclasses import replace
 
     from rippletwin.diagnosis.diagnose import check_recordings
@@ -154,4 +161,6 @@ def _twin_of(twin_file: str | None, out: str, processes: int, case, recordings, 
     from rippletwin.figures.explanation import remove_figures
 
     remove_figures(out)  # of an earlier explanation in this folder
-    return explanation.twin
+    contradiction = explanation.decision.contradiction
+    doubts = [CONTRADICTION.format(contradiction)] if contradiction else []
+    return explanation.twin, doubts
