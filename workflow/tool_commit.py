@@ -1,4 +1,4 @@
-"""What git says of the tool that the concealed trial tries."""
+"""What git says of the tool that a trial tries."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from snakemake.exceptions import WorkflowError
 
 TOOL = "src/rippletwin"
-TRIAL = "src"  # with it what draws, records and scores
+TRIAL = "src", "workflow"  # with it what draws, records, confines and scores
 
 
 def tool_commit(root: Path) -> str:
@@ -22,7 +22,7 @@ def tool_commit(root: Path) -> str:
 def not_committed(root: Path) -> bool:
     """Whether the tool that runs, or what draws and scores its cases, differs from that commit,
     which the trial's page then says."""
-    return _git(root, "status", "--porcelain", TRIAL) != ""
+    return _git(root, "status", "--porcelain", *TRIAL) != ""
 
 
 def _git(root: Path, *arguments: str) -> str:
@@ -31,5 +31,5 @@ def _git(root: Path, *arguments: str) -> str:
         return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
     except (OSError, subprocess.CalledProcessError) as error:
         raise WorkflowError(
-            "concealed: its cases follow from the tool's commit; run it in a git checkout"
+            "a trial's cases follow from the tool's commit; run it in a git checkout"
         ) from error

@@ -144,7 +144,7 @@ def _draw_reliability(ax, rows: list[dict]) -> None:
         draw_rate(ax, b.mean, b.right, style.CORRECTED, "o")
     ax.set_xlabel("stated probability of the state")
     ax.set_ylabel("share that is right")
-    ax.set_xlim(0.3, 1.02)
+    ax.set_xlim(-0.02, 1.02)
     ax.set_ylim(-0.03, 1.05)
 
 

@@ -96,7 +96,6 @@ def teach_network(kind: str, twin: Twin, covariance: np.ndarray | None, case: Ca
         samples_per_revolution=SAMPLES,
         speed_hz=speed_hz,
         load_pressure=pressure,
-        noise_std=noise.tolist(),
         weights=[network.state_dict()],
         conformal=[fit_conformal(seen, y, unseen)],
     )

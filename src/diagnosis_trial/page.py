@@ -35,8 +35,9 @@ def report_page(rows: list[dict], origin: dict) -> str:
             *(_scores_of_shared(shared) if len(shared) < len(rows) else []),
             "## Smallest leak found at 5 % false alarms",
             "",
-            "The alarm is raised above the log odds against healthy that 5 % of the healthy "
-            "recordings exceed. Intervals are from resampled rigs.",
+            "The alarm is raised above the suspicion that at most 5 % of the healthy recordings "
+            "exceed: the log odds against healthy, or those of the p-value where a recording is "
+            "called unlike and they are larger. Intervals are from resampled rigs.",
             "",
             _smallest(columns),
             "![detection](figures/detection.png)",
@@ -58,7 +59,8 @@ def _origin(rows: list[dict], columns: dict[str, list[dict]], origin: dict) -> l
             ("column", "misfit of the twin", "twin, s", "diagnosis of a rig, s"),
             [(name, *_costs(made)) for name, made in columns.items()],
         ),
-        "* Medians over rigs, the misfit with its least and greatest; seconds of one core.",
+        "* Medians over rigs, the misfit with its least and greatest; seconds of one core. A "
+        "column uses simulations of the pump that an earlier one of the same twin has made.",
         "* Shares are followed by their exact 95 % confidence interval (Clopper and Pearson). It "
         "takes recordings as independent.",
         "* *Change*: norm of the change that the state makes in the sensors' ripple, over that of "

@@ -7,8 +7,10 @@ Its arguments are a case, an output folder and the columns, METHOD@TWIN. METHOD 
     unanchored            the same, but compared with the twin's own healthy ripple
     P, PR, PRA, Q, QR     a network that the twin teaches (`diagnosis_trial.networks`)
 
-and TWIN one of `diagnosis_trial.twins`. Writes diagnosis.json, column -> the content of a file of
-`rippletwin diagnose` with the log odds against healthy of each recording, and run.json, column ->
+and TWIN one of `diagnosis_trial.twins`. Writes diagnosis.json, column -> {"recordings": [...]}: of
+`anchored` and `unanchored` the entries of `rippletwin diagnose` with the log odds against healthy,
+of a network the keys that are scored (`networks.ask_network`), of a column that ended with an error
+label and state alone; and run.json, column ->
 the processor seconds that twin and diagnoses took and the twin's misfit. It runs in one process:
 its confinement has no shared memory.
 """

@@ -135,6 +135,20 @@ def test_displacement_of_uneven_angles(tmp_path):
     assert load_case(tmp_path).rig.displacement == pytest.approx(3e-5, rel=1e-4)
 
 
+def test_a_ripple_without_its_mean_states_no_displacement(tmp_path):
+    """A mean that is the rounding of a table is none: it would make the pump a millionth of its
+    size. An anechoic end needs no mean flow."""
+    content = sheet() | {"load": {"kind": "anechoic"}}
+    content["recordings"][0]["flow_ripple"] = "flow.csv"
+    write_case(tmp_path, content)
+    angle = np.arange(0.0, 360.0, 2.0)
+    table = np.column_stack([angle, 3e-12 + 1e-5 * np.cos(np.radians(9 * angle))])
+    np.savetxt(
+        tmp_path / "flow.csv", table, delimiter=",", header="angle_deg,flow_m3_s", comments=""
+    )
+    assert load_case(tmp_path).rig.displacement is None
+
+
 @pytest.mark.parametrize(
     ("angles", "stated", "highest"), [(180, None, 89), (180, 1200.0, 72), (720, None, 299)]
 )

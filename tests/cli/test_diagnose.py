@@ -35,7 +35,7 @@ def test_fail_on_a_fault_and_on_what_is_unlike_all(
     monkeypatch.setattr(kept, lambda *arguments: [stub])
     twin_of = "rippletwin.cli.diagnose._twin_of"
     monkeypatch.setattr(
-        twin_of, lambda file, out, n, case, *rest: (SimpleNamespace(rig=case.rig), [])
+        twin_of, lambda file, out, n, case, *rest: (SimpleNamespace(rig=case.rig), {})
     )
     command = ["diagnose", str(tmp_path), "--out", str(tmp_path / "out"), "--no-figures"]
     command += ["--recording", "healthy_0", *(f"--fail-on={word}" for word in words)]
@@ -50,24 +50,23 @@ def test_healthy_recordings_that_contradict_themselves_are_a_warning(tmp_path, c
     diagnosis.json: the diagnosis compares with these recordings all the same."""
     write_case(tmp_path, sheet())
     entry = {"label": "healthy_0", "state": "healthy", "sentence": "It is healthy."}
-    found = SimpleNamespace(
-        twin=SimpleNamespace(rig=load_case(tmp_path).rig),
-        decision=SimpleNamespace(contradiction="sensor p1 reads less than noise"),
-    )
+    found = SimpleNamespace(twin=SimpleNamespace(rig=load_case(tmp_path).rig))
     stubs = {
         "rippletwin.diagnosis.kept_answers.diagnose_changed": lambda *_: [
             SimpleNamespace(entry=entry, numbers=None)
         ],
         "rippletwin.diagnosis.diagnose.check_recordings": lambda *_: None,
         "rippletwin.explanation.explain.explain": lambda *_: found,
-        "rippletwin.explanation.verdict.verdict_file.write_verdict": lambda *_: None,
+        "rippletwin.explanation.verdict.verdict_file.write_verdict": lambda *_: {
+            "verdict": "bad_data"
+        },
     }
     for name, stub in stubs.items():
         monkeypatch.setattr(name, stub)
     out = tmp_path / "out"
     command = ["diagnose", str(tmp_path), "--out", str(out), "--no-figures"]
     assert main([*command, "--recording", "healthy_0"]) == DONE
-    told = "the healthy recordings contradict themselves: sensor p1 reads less than noise;"
+    told = "the healthy recordings contradict themselves, as verdict.json says"
     assert told in capsys.readouterr().err
     assert told in json.loads((out / "diagnosis.json").read_text())["warnings"][0]
 

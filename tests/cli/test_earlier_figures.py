@@ -43,8 +43,7 @@ def explained(monkeypatch):
         (Path(out) / "verdict.json").write_text("{}")
         return VERDICT
 
-    found = SimpleNamespace(twin=None, decision=SimpleNamespace(contradiction=""))
-    monkeypatch.setattr(explain, "explain", lambda *_: found)
+    monkeypatch.setattr(explain, "explain", lambda *_: SimpleNamespace(twin=None))
     monkeypatch.setattr(verdict_file, "write_verdict", write)
 
 

@@ -367,6 +367,22 @@ def test_a_line_drifts_though_the_data_sheet_is_exact(name):
     assert np.allclose(one.response(), other.response(), rtol=1e-6)
 
 
+def test_a_load_that_the_twin_has_fitted_stays_though_the_data_sheet_is_exact():
+    """Without a mean flow the orifice's coefficient is guessed, and its factor fitted: a diagnosis
+    takes the fitted factor, whatever tolerance the data sheet states."""
+    anchor = leaking_pump.record("anchor")
+    rig = leaking_pump.rig()
+    lines = []
+    for sd in (0.0, 0.05):
+        sheet = replace(rig, uncertainty=replace(rig.uncertainty, load=sd))
+        twin = Twin(sheet, [anchor], guessed_load=True)
+        theta = twin.theta.copy()
+        theta[twin.index["load"]] = np.log(0.5)
+        lines.append(Diagnoser(twin.with_(theta=theta), ()).make_model(anchor, anchor).line)
+    exact, stated = (line.response() for line in lines)
+    np.testing.assert_allclose(exact, stated, rtol=1e-9)
+
+
 def test_uncertain_gains_stay_with_the_twin():
     """A data sheet with uncertain sensitivities: the twin of recordings has a gain of every sensor,
     and so has the one that a diagnosis takes, read from a file too."""

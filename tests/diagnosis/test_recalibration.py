@@ -10,11 +10,12 @@ import pytest
 
 import leaking_pump
 from rippletwin.calibration.laplace import UNCONVERGED_GAIN
-from rippletwin.diagnosis import pump_calibration
+from rippletwin.diagnosis import diagnose, pump_calibration
 from rippletwin.diagnosis.diagnose import healthy_misfit, recalibrate_twin
 from rippletwin.diagnosis.line_calibration import calibrate_line
 from rippletwin.diagnosis.pump_calibration import calibrate_pump, one_each_point
 from rippletwin.diagnosis.pump_flow import simulate_healthy_pump, with_fitted_pump
+from rippletwin.errors import InputError
 from rippletwin.harmonics import peak_amplitudes
 from rippletwin.twin.twin import Twin
 
@@ -96,6 +97,19 @@ def test_a_pump_that_the_twin_has_fitted_amiss_is_fitted_about_the_data_sheet(he
     found = recalibrate_twin(amiss, healthy, lambda observation: (observation, 0.0))
     timing = with_fitted_pump(found.twin).rig.pump["port_timing_deg"]
     assert timing == pytest.approx(leaking_pump.TRUE["port_timing_deg"], abs=0.5)
+
+
+def test_a_pump_that_cannot_be_simulated_is_an_error_that_names_the_recordings(
+    healthy, monkeypatch
+):
+    """What the simulation of a pump raises reaches the user with the recordings and a remedy."""
+
+    def fail(*_):
+        raise ArithmeticError("pressure of a chamber does not converge")
+
+    monkeypatch.setattr(diagnose, "calibrate_line", fail)
+    with pytest.raises(InputError, match=r"recordings one, two.*does not converge.*Correct them"):
+        recalibrate_twin(Twin(leaking_pump.rig(), healthy), healthy, lambda o: (o, 0.0))
 
 
 def test_an_operating_point_set_twice_is_fitted_once(healthy):

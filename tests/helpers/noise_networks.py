@@ -33,7 +33,6 @@ def kept(seed=0, dataset="CFD-MOC-PR", architecture="cnn1d_341_100", **changes):
         "samples_per_revolution": SAMPLES,
         "speed_hz": 1000 / 60,
         "load_pressure": 9.5e6,
-        "noise_std": [1.0, 1.0],
         "weights": [network.state_dict() for network in networks],
         "conformal": conformal,
     }

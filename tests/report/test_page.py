@@ -27,9 +27,9 @@ from rippletwin.errors import InputError
 from rippletwin.report.content import WorkflowPart, make_page
 from rippletwin.report.page import render, report_case, write_report
 from rippletwin.report.results import read_results
-from rippletwin.report.tables import Cell, Table
+from rippletwin.report.tables import Cell, Table, effect_table
 from rippletwin.report.verdict_words import remaining_sentences
-from rippletwin.report.workflow_tables import answer_table, describe_dataset
+from rippletwin.report.workflow_tables import answer_table, describe_dataset, timing_table
 from rippletwin.twin import twin_file
 from rippletwin.twin.twin import Twin
 
@@ -430,13 +430,38 @@ def test_a_diagnosis_of_nothing_that_was_tried_is_no_fault(tmp_path):
     card; a fault beside it counts."""
     folder = write_results(tmp_path)
     path = folder / "diagnosed" / "diagnosis.json"
-    unlike = DIAGNOSIS | {"state": "unlike", "severity": {}}
+    where = {"orders": [9, 18], "element": "line"}
+    unlike = DIAGNOSIS | {"state": "unlike", "severity": {}, "unlike": {"where": where}}
     path.write_text(json.dumps({"recordings": [unlike, DIAGNOSIS]}))
     page = make_page(read_results(folder))
     tile = next(t for t in page.tiles if t.name == "Diagnosed as faulty")
     assert tile.value == "1 of 2" and "unlike everything that was tried" in tile.note
-    cards = [a["class"] for tag, a in Parsed(render(page)).tags if tag == "article"]
+    parsed = Parsed(render(page))
+    cards = [a["class"] for tag, a in parsed.tags if tag == "article"]
     assert cards == ["card unlike", "card faulty"]
+    changed = "Something else has changed in the line or at the load, most at shaft orders 9, 18"
+    assert changed in parsed.words  # the line is that with its load, as the sentence has it
+
+
+def test_effects_are_sorted_by_the_widths_of_their_intervals():
+    """The column of intervals: the narrowest first, whatever the values are."""
+    effects = [
+        {
+            "name": "leak",
+            "parameters": {"area": {"value": value, "ci95": [low, high], "unit": "m2"}},
+        }
+        for value, low, high in ((5e-7, 1e-7, 9e-7), (9e-7, 8e-7, 1e-6))
+    ]
+    wide, narrow = (row[3] for row in effect_table(effects).rows)
+    assert narrow.value < wide.value
+
+
+def test_a_benchmark_that_is_being_written_counts_for_nothing(tmp_path):
+    """A row without its last fields, as a job that has not ended leaves it."""
+    (tmp_path / "explain.tsv").write_text("s\th:m:s\tmax_rss\n12.5\t0:00:12\t300\n")
+    (tmp_path / "diagnose.tsv").write_text("s\th:m:s\tmax_rss\n12.3\n")
+    rows = [[cell.text for cell in row] for row in timing_table(tmp_path).rows]
+    assert rows == [["explain", "1", "12.5", "300"], ["diagnose", "1", "12.3", "0"]]
 
 
 def test_the_verdict_is_that_of_the_folder_explained(tmp_path):

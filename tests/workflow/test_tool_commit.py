@@ -1,4 +1,4 @@
-"""Which tool a concealed trial tries: the hash of its source in the commit."""
+"""Which tool a trial tries: the hash of its source in the commit."""
 
 import subprocess
 
@@ -49,6 +49,9 @@ def test_an_edited_tool_is_told_from_the_committed_one(checkout):
     assert not_committed(folder)
     commit()
     assert not not_committed(folder)
+    (folder / "workflow").mkdir()  # its rules confine the tool, its scripts compare digests
+    (folder / "workflow" / "score.py").write_text("1\n")
+    assert not_committed(folder)
 
 
 def test_a_folder_without_git_is_an_error_that_says_so(tmp_path):

@@ -6,7 +6,6 @@ import sys
 from pathlib import Path
 
 import pandas as pd
-from snakemake.exceptions import WorkflowError
 from snakemake.utils import validate
 
 sys.path[:0] = [str(ROOT / "workflow"), str(ROOT / "src")]

@@ -4,6 +4,7 @@ rule diagnose:
         rig=rig_sheet(),
         recordings=recordings("all"),
         twin=rules.explain.output.twin,
+        verdict=rules.explain.output.verdict,
         effects=EFFECT_FILES,
         faults=local(
             [name for name in config["faults"]["files"] if name.endswith(".py")]

@@ -11,7 +11,7 @@ from rippletwin.case.diagnosed_point import reference_recordings
 from rippletwin.case.load import load_case, unread_recordings
 from rippletwin.case.rig_yaml import read_sheet
 from rippletwin.learning.dataset import UNKNOWN, remove_mean
-from rippletwin.spectra.noise import noise_cycle_scatter, noise_mad
+from rippletwin.spectra.noise import noise_mad
 from rippletwin.spectra.observation import revolutions_of
 
 report_progress = open_log(snakemake)
@@ -25,8 +25,6 @@ windows = [revolutions.windows[: params.windows] for revolutions in cut]
 counts = [len(w) for w in windows]
 healthy = [k for k, r in enumerate(chosen) if r.state == "healthy"] or range(len(chosen))
 noise = np.mean([noise_mad(chosen[k].pressure) for k in healthy], axis=0)
-scatter = np.mean([noise_cycle_scatter(windows[k]) for k in healthy], axis=0)
-turns = "scatter between revolutions"
 details = "median absolute deviation of finest wavelet details"
 
 store.save(
@@ -38,7 +36,6 @@ store.save(
                 {"units": "Pa", "long_name": "pressure without its mean"},
             ),
             "noise_std": ("channel", noise, {"units": "Pa", "source": details}),
-            "cycle_scatter": ("channel", scatter, {"units": "Pa", "source": turns}),
         },
         coords={
             "state": ("window", np.repeat([r.state_code or UNKNOWN for r in chosen], counts)),

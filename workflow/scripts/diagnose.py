@@ -1,5 +1,6 @@
 """What is wrong with the pump in every recording that is not known to be healthy."""
 
+import json
 from pathlib import Path
 
 from job import open_log
@@ -7,7 +8,7 @@ from rippletwin.case.load import load_case
 from rippletwin.diagnosis.diagnose import select_recordings
 from rippletwin.diagnosis.diagnosis_file import write_diagnosis
 from rippletwin.diagnosis.faults.library import select_faults
-from rippletwin.diagnosis.kept_answers import diagnose_changed, warnings_of
+from rippletwin.diagnosis.kept_answers import diagnose_changed, warn_of_verdict, warnings_of
 from rippletwin.figures.fault_posterior import draw
 from rippletwin.twin.twin_file import load_twin
 
@@ -25,7 +26,9 @@ answers = diagnose_changed(
     lambda what, done, total: report_progress(f"{what}: {done} of {total}"),
 )
 entries = [each.entry for each in answers]
-result = write_diagnosis(entries, folder, warnings=warnings_of(case, twin))
+verdict = json.loads(Path(snakemake.input.verdict).read_text())
+warnings = [*warn_of_verdict(verdict), *warnings_of(case, twin)]
+result = write_diagnosis(entries, folder, warnings=warnings)
 draw([each.numbers for each in answers], folder)
 report_progress(f"{sum(each.kept for each in answers)} of {len(answers)} answers were kept")
 for each in result["recordings"]:

@@ -39,7 +39,6 @@ kept = KeptNetworks(
     samples_per_revolution=recorded.sizes["time"],
     speed_hz=recorded.speed_hz,
     load_pressure=recorded.load_pressure,
-    noise_std=noise.tolist(),
     weights=weights,
     conformal=conformal,
 )

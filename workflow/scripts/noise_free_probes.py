@@ -18,7 +18,6 @@ store.save(
         coords={
             "channel": seeds.channel.values,
             "state": ("sample", np.repeat(seeds.state.values, TURNS)),
-            "turn": ("sample", np.tile(np.arange(TURNS), seeds.sizes["state"])),
         },
         attrs=seeds.attrs,
     ),

@@ -31,7 +31,6 @@ report_progress(
 store.save(
     xr.Dataset(
         {
-            "flow": (("channel_q", "time"), in_pipe.flow[None], {"units": "m3/s"}),
             # the flow into a constant pressure: with the capacitance it can drive any line
             "source_flow": ("time", source.flow, {"units": "m3/s"}),
             "pressure": (("channel", "time"), in_pipe.sensor_pressure, {"units": "Pa"}),
@@ -39,7 +38,6 @@ store.save(
         coords={
             "angle_deg": ("time", in_pipe.angle_deg),
             "channel": [sensor.name for sensor in rig.sensors],
-            "channel_q": ["outlet"],
         },
         attrs={
             "state": snakemake.wildcards.state,

@@ -37,7 +37,6 @@ COPIED_KEYS = (
 )  # fmt: skip
 """Keys of a recording's entry that its fields have as they are."""
 SAMPLED = ("periodic", "random")
-SMALLEST_MEAN = 1e-6  # of the largest flow; a smaller mean is none
 
 
 def load_case(
@@ -167,17 +166,16 @@ def _recording(folder: Path, entry: dict, rig: Rig) -> Recording:
 def _displacement(recordings: Sequence[Recording]) -> float | None:
     """Flow per revolution, m3, of the stated flow ripples; None without one."""
     stated = [
-        abs(r.flow_ripple.mean) / (r.speed_rpm / 60.0)
+        abs(r.flow_ripple.stated_mean) / (r.speed_rpm / 60.0)
         for r in recordings
-        if r.flow_ripple is not None and r.speed_rpm
+        if r.flow_ripple is not None and r.flow_ripple.stated_mean and r.speed_rpm
     ]
-    return float(np.mean(stated)) or None if stated else None
+    return float(np.mean(stated)) if stated else None
 
 
 def _check_mean_flow(path: Path, ripple: FlowRipple, rig: Rig) -> None:
     """Raise InputError where an orifice's coefficient has to come from a mean flow of zero."""
-    largest = np.max(np.abs(ripple.flow))
-    if rig.load.passes_flow and abs(ripple.mean) < SMALLEST_MEAN * largest:
+    if rig.load.passes_flow and ripple.stated_mean is None:
         raise InputError(
             path,
             "flow_m3_s",

@@ -25,6 +25,7 @@ STATE_CODES = {
 ATMOSPHERE = 101325.0
 """Standard atmosphere, Pa. Every pressure of a case, a twin and a pump is a gauge pressure, above
 it; a gas goes by the absolute one."""
+SMALLEST_MEAN = 1e-6  # of the largest flow; a smaller mean is rounding
 ROUNDED_ANGLE = 0.01  # of a step: as much off an even grid are angles that a file rounds
 
 
@@ -149,6 +150,12 @@ class FlowRipple:
     def mean(self) -> float:
         """Mean flow over the revolution, m3/s, however the angles are spaced."""
         return float(np.mean(self.on_even_angles()[1]))
+
+    @property
+    def stated_mean(self) -> float | None:
+        """The same; None where it is rounding, because the mean was taken out."""
+        is_rounding = abs(self.mean) < SMALLEST_MEAN * np.max(np.abs(self.flow))
+        return None if is_rounding else self.mean
 
     @cached_property
     def known_harmonics(self) -> dict[bytes, np.ndarray]:

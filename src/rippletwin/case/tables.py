@@ -131,7 +131,7 @@ def _check_flow(path: Path, ripple: FlowRipple) -> None:
     elif np.ptp(flow) <= SMALLEST_RIPPLE * largest:
         problem = f"the flow is {mean:g} m3/s throughout, without any ripple"
         remedy = "Give the flow against the shaft angle, or leave flow_ripple out"
-    elif mean < -SMALLEST_RIPPLE * largest:
+    elif mean < 0.0 and ripple.stated_mean is not None:
         problem = f"the mean flow is negative, {mean:g} m3/s"
         remedy = "Flow from the pump into the line is positive: change the sign"
     else:

@@ -161,6 +161,20 @@ def name_place(element: str) -> str:
     return f"in {words}" if words.startswith(("segment", "the whole")) else f"at {words}"
 
 
+def name_change(element: str | None, orders: Sequence[int]) -> str:
+    """What else than a fault has changed, of `unlike.where` in diagnosis.json: "something else has
+    changed at the pump, most at shaft orders 9, 18"."""
+    places = {None: "", "source": " at the pump", "line": " in the line or at the load"}
+    where = places.get(element, f" at {element}")
+    most = f", most at shaft orders {', '.join(map(str, orders))}" if orders else ""
+    return f"something else has changed{where}{most}"
+
+
+def name_ordinal(number: int) -> str:
+    """A number counted from 1 as a rank: "first", "second", "third", "4th" ..."""
+    return {1: "first", 2: "second", 3: "third"}.get(number, f"{number}th")
+
+
 def name_state(state: str) -> str:
     """A pump's state in words; two faults together are joined by "and"."""
     return " and ".join(STATES.get(part, part.replace("_", " ")) for part in state.split("+"))

@@ -12,11 +12,6 @@ from rippletwin.cli import options
 from rippletwin.cli.exit_codes import found_code
 from rippletwin.cli.progress import progress_bars, warn
 
-CONTRADICTION = (
-    "the healthy recordings contradict themselves: {}; a diagnosis that compares with them may be "
-    "wrong"
-)
-
 
 @click.command(
     "diagnose", short_help="say what is wrong with the pump in recordings of unknown state"
@@ -82,7 +77,7 @@ def command(
     from rippletwin.diagnosis.diagnose import select_recordings
     from rippletwin.diagnosis.diagnosis_file import write_diagnosis
     from rippletwin.diagnosis.faults.library import select_faults
-    from rippletwin.diagnosis.kept_answers import diagnose_changed, warnings_of
+    from rippletwin.diagnosis.kept_answers import diagnose_changed, warn_of_verdict, warnings_of
     from rippletwin.twin.effects.library import add_effects
 
     faults = select_faults(list(fault_names))
@@ -93,9 +88,10 @@ def command(
     recordings = select_recordings(read, list(labels))
     networks = _networks_of(results, read)
     with progress_bars(as_json) as progress:
-        twin, doubts = _twin_of(twin_file, out, processes, read, recordings, progress)
+        twin, verdict = _twin_of(twin_file, out, processes, read, recordings, progress)
         found = diagnose_changed(read, twin, recordings, faults, out, progress)
     entries = [each.entry for each in found]
+    doubts = warn_of_verdict(verdict)
     warn(doubts)
     warnings = [*doubts, *warnings_of(read, twin)]
     result = write_diagnosis(entries, out, _answers(networks, recordings, read), warnings)
@@ -139,14 +135,14 @@ def _answers(networks: dict, recordings, case) -> dict:
 
 
 def _twin_of(twin_file: str | None, out: str, processes: int, case, recordings, progress):
-    """The twin that the command line names, or the one that explains the healthy recordings; and
-    warnings, where these contradict themselves.
+    """The twin that the command line names, or the one that explains the healthy recordings, with
+    its verdict ({} of a twin that is named).
 
     Raises InputError as `check_recordings`, before anything is explained."""
     if twin_file is not None:
         from rippletwin.twin.twin_file import load_twin
 
-        return load_twin(twin_file), []
+        return load_twin(twin_file), {}
     from dataclasses import replace
 
     from rippletwin.diagnosis.diagnose import check_recordings
@@ -157,10 +153,8 @@ def _twin_of(twin_file: str | None, out: str, processes: int, case, recordings, 
     diagnosed = {recording.label for recording in recordings}
     known = tuple(r for r in case.recordings if r.label not in diagnosed)
     explanation = explain(replace(case, recordings=known), processes, progress)
-    write_verdict(explanation, out)
+    verdict = write_verdict(explanation, out)
     from rippletwin.figures.explanation import remove_figures
 
     remove_figures(out)  # of an earlier explanation in this folder
-    contradiction = explanation.decision.contradiction
-    doubts = [CONTRADICTION.format(contradiction)] if contradiction else []
-    return explanation.twin, doubts
+    return explanation.twin, verdict

@@ -14,7 +14,7 @@ from scipy.ndimage import uniform_filter1d
 
 from rippletwin.case.model import FlowRipple
 from rippletwin.diagnosis.drifting_line import DriftingLine
-from rippletwin.diagnosis.pump_flow import simulate_healthy_pump
+from rippletwin.diagnosis.pump_flow import load_pressure_of, simulate_healthy_pump
 from rippletwin.harmonics import flow_harmonics
 from rippletwin.twin.twin import Twin
 
@@ -85,8 +85,8 @@ def make_anchor(
     here = simulate_healthy_pump(pump, fluid, speed_rpm, pressure)
     there = here
     if apart:
-        pressure = healthy.load_pressure or pressure
-        there = simulate_healthy_pump(pump, fluid, 60.0 * healthy.speed_hz, pressure)
+        other = load_pressure_of(twin, healthy)
+        there = simulate_healthy_pump(pump, fluid, 60.0 * healthy.speed_hz, other)
     response = DriftingLine(twin, healthy, there).response()
     simulated = even_flow(there, orders, pump["pistons"])
     flow, rest = estimate_flow_at_pump(response, healthy.values)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -101,11 +102,18 @@ def recalibrate_twin(twin: Twin, healthy: Sequence[Recording], read: ReadOnce) -
     line fitted to them first (`calibrate_line`): whichever leaves least of the healthy ripples.
 
     As it is without healthy recordings, and where they have one sensor: it tells no line from a
-    pump.
+    pump. Raises InputError where the pump cannot be simulated at an operating point.
     """
     observations = [read(each)[0] for each in healthy]
     if not observations or len(observations[0].values) < 2:
         return RecalibratedTwin(twin)
+    labels = ", ".join(each.label for each in healthy)
+    with pump_errors(f"healthy recordings {labels}"):
+        return _recalibrate(twin, observations)
+
+
+def _recalibrate(twin: Twin, observations: Sequence[Observation]) -> RecalibratedTwin:
+    """`recalibrate_twin` to observations of two sensors or more."""
     points = one_each_point(observations)
     # A line that is right already would lose what it owes to the ripple: ratios between sensors say
     # nothing of the way from the pump to the first sensor.
@@ -128,11 +136,18 @@ def diagnose_one(
     Raises InputError where the pump cannot be simulated at its operating point.
     """
     observation, start = read(recording)
-    try:
+    with pump_errors(f"recording {recording.label}"):
         return diagnoser(observation, [read(each)[0] for each in anchors], start)
+
+
+@contextmanager
+def pump_errors(source: str) -> Iterator[None]:
+    """Raise InputError, naming the recordings `source`, where the pump cannot be simulated."""
+    try:
+        yield
     except ArithmeticError as error:
         raise InputError(
-            f"recording {recording.label}",
+            source,
             "speed_rpm, load_pressure",
             f"the pump cannot be simulated there: {error}",
             "Correct them, or the pump's numbers in rig.yaml",

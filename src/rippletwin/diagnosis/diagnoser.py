@@ -95,8 +95,8 @@ class Diagnoser:
         )
         pressure = _rounded(load_pressure_of(self.twin, observation))
         speed_rpm = _rounded(60.0 * observation.speed_hz)
-        given = healthy.flow_ripple
-        displacement = None if given is None else given.mean / healthy.speed_hz
+        given = healthy.flow_ripple and healthy.flow_ripple.stated_mean
+        displacement = given and given / healthy.speed_hz
         twin = with_fitted_pump(self.twin, displacement)
         pump, fluid = twin.rig.pump, twin.rig.fluid
         ripple = simulate_healthy_pump(pump, fluid, speed_rpm, pressure)

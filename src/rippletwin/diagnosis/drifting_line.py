@@ -73,13 +73,19 @@ class DriftingLine:
 def _free_to_drift(twin: Twin) -> Twin:
     """The twin with a width for the priors of what drifts: what the data sheet calls exact can be
     another state of the line in another recording."""
-    exact = {name: sd for name, sd in DRIFTS.items() if not getattr(twin.rig.uncertainty, name)}
+    exact = {name: sd for name, sd in DRIFTS.items() if _is_exact(twin, name)}
     if not exact:
         return twin
     rig = replace(twin.rig, uncertainty=replace(twin.rig.uncertainty, **exact))
     theta = twin.theta.copy()
     theta[[k for name in exact for k in _indices(twin, name)]] = 0.0
     return rebuild(twin, rig, theta=theta)
+
+
+def _is_exact(twin: Twin, name: str) -> bool:
+    """Whether a twin has parameters of this name, and their priors have no width."""
+    indices = _indices(twin, name)
+    return bool(indices) and not any(twin.parameters[k].prior.scale for k in indices)
 
 
 def _indices(twin: Twin, name: str) -> list[int]:

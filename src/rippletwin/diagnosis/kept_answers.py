@@ -101,6 +101,17 @@ def warnings_of(case: Case, twin: Twin) -> list[str]:
     return list(dict.fromkeys([*case.warnings, *warn_of_pump(twin.rig.pump)]))
 
 
+def warn_of_verdict(verdict: Mapping) -> list[str]:
+    """The warning of a verdict, with the keys of verdict.json, on recordings that contradict
+    themselves; none of another verdict, or of no verdict."""
+    if verdict.get("verdict") != "bad_data":
+        return []
+    return [
+        "the healthy recordings contradict themselves, as verdict.json says; a diagnosis that "
+        "compares with them may be wrong"
+    ]
+
+
 def _recalibrated(
     twin: Twin, healthy: Sequence[Recording], read: ReadOnce, kept: Path, key: str
 ) -> RecalibratedTwin:

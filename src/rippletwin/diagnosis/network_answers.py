@@ -68,7 +68,8 @@ def ask_networks(
 ) -> dict[str, dict]:
     """Recording's label -> what each network says of its windows, in the words of diagnosis.json.
 
-    Networks are not asked about a recording of another operating point than theirs.
+    Networks are not asked about a recording of another operating point than theirs. Raises
+    InputError as `cut_windows`.
     """
     return {
         recording.label: {
@@ -104,7 +105,9 @@ def windows_for(kept: KeptNetworks, recording: Recording, rig: Rig) -> np.ndarra
 
 
 def cut_windows(recording: Recording, rig: Rig, samples: int) -> np.ndarray:
-    """Windows (R, S, M), Pa, of one revolution each at M even shaft angles, without their means."""
+    """Windows (R, S, M), Pa, of one revolution each at M even shaft angles, without their means.
+
+    Raises InputError where no ripple repeats with the shaft (`revolutions_of`)."""
     return remove_mean(revolutions_of(recording, rig, samples).windows)
 
 

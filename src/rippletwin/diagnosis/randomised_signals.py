@@ -70,6 +70,8 @@ class SignalSource:
         parameters of the twin, they are drawn about the data sheet's (`pump_flow.UNCERTAIN`).
     healthy : (R, S, M) consecutive revolutions of one healthy recording, Pa, M even shaft angles.
     speed_hz, load_pressure : rev/s, Pa.
+
+    Raises ArithmeticError where the pump cannot be simulated.
     """
 
     def __init__(
@@ -104,6 +106,8 @@ class SignalSource:
         if covariance is not None:
             values, vectors = np.linalg.eigh(covariance)
             self._root = vectors * np.sqrt(np.clip(values, 0.0, None))
+            # what the data sheet calls exact has a coordinate all the same; its drift is drawn
+            self._root[[p.prior.scale == 0.0 for p in twin.parameters]] = 0.0
 
     @property
     def overall_misfit(self) -> float:
@@ -120,7 +124,8 @@ class SignalSource:
         anchored: bool = False,
     ) -> RandomisedSignals:
         """`count` signals of each class, each class with the same twins. Leak areas are log-uniform
-        in `bins`; a class without a bin is healthy."""
+        in `bins`; a class without a bin is healthy. Raises ArithmeticError where the pump cannot be
+        simulated."""
         leaks = {
             name: simulate_leak_flow(self._pump, self._fluid, *self._point, FAULTS[FAULT_OF[name]])
             for name in classes

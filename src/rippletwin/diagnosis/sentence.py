@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from rippletwin.case.quantities import plain, unit_of, write_quantity
+from rippletwin.case.words import name_change, name_ordinal
 from rippletwin.diagnosis.diagnosis import Diagnosis
 from rippletwin.diagnosis.doubts import find_doubts
 
-ORDINALS = {1: "first", 2: "second", 3: "third"}
 MARGIN = 0.01  # probability of another state that is worth mentioning
 
 
@@ -33,15 +33,8 @@ def describe_diagnosis(diagnosis: Diagnosis) -> str:
 
 
 def _unlike(d: Diagnosis) -> str:
-    where = {
-        None: "",
-        "source": " at the pump",
-        "line": " in the line or at the load",
-    }.get(d.unlikeness.element, f" at {d.unlikeness.element}")
-    text = f"neither healthy nor any fault that was tried: something else has changed{where}"
-    if d.unlikeness.orders:
-        text += f", most at shaft orders {', '.join(map(str, d.unlikeness.orders))}"
-    return text
+    changed = name_change(d.unlikeness.element, d.unlikeness.orders)
+    return f"neither healthy nor any fault that was tried: {changed}"
 
 
 def _fault(d: Diagnosis, fault) -> str:
@@ -53,8 +46,7 @@ def _fault(d: Diagnosis, fault) -> str:
     piston = d.pistons.get(fault.name)
     if piston is None:
         return f"{text} at a piston that cannot be told"
-    ordinal = ORDINALS.get(piston + 1, f"{piston + 1}th")
-    return f"{text} at the {ordinal} piston to begin its delivery in the recording"
+    return f"{text} at the {name_ordinal(piston + 1)} piston to begin its delivery in the recording"
 
 
 def _share(p: float) -> str:

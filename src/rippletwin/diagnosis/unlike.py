@@ -71,12 +71,11 @@ def combine(one: float, other: float) -> float:
 
 def _of_line(model: ObservationModel, best: StateEvidence, prior: ErrorPrior) -> float:
     """The probability of what no flow explains, and of the drift in its standard deviations."""
-    drift, tests = best.mode.drift, []
-    if len(drift):
-        tests.append(float(gammaincc(0.5 * len(drift), 0.5 * np.sum(drift**2))))
-    if model.sensors > 1:
-        tests.append(_of_residual(model, best, prior, ACROSS))
-    return combine(*tests) if len(tests) == 2 else min(tests, default=1.0)
+    drift = best.mode.drift
+    drifted = float(gammaincc(0.5 * len(drift), 0.5 * np.sum(drift**2)))
+    if model.sensors == 1:
+        return drifted
+    return combine(drifted, _of_residual(model, best, prior, ACROSS))
 
 
 def _of_residual(

@@ -19,7 +19,7 @@ from rippletwin.learning.training import (
     predict_log_probabilities,
 )
 
-FORMAT = 2
+FORMAT = 3
 """Of the files: counts up when what networks calculate, or what is kept of them, changes."""
 
 ARCHIVE = b"PK\x03\x04"  # the first bytes of a zip archive, which torch writes
@@ -32,7 +32,6 @@ class KeptNetworks:
     signal, channels        "pressure" or "flow", and the names of its channels
     samples_per_revolution  of a window, which is one revolution
     speed_hz, load_pressure operating point, rev/s and Pa, at which they have learnt
-    noise_std               (channels,) of the sensors, in the signal's unit
     weights, conformal      a state dictionary and a `Conformal` each seed
     """
 
@@ -43,7 +42,6 @@ class KeptNetworks:
     samples_per_revolution: int
     speed_hz: float
     load_pressure: float | None
-    noise_std: list[float]
     weights: list[dict]
     conformal: list[Conformal]
     classes: tuple[str, ...] = CLASSES

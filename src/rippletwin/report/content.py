@@ -13,7 +13,7 @@ from markupsafe import Markup
 from rippletwin import __version__
 from rippletwin.case.model import Rig
 from rippletwin.case.quantities import write_certainty, write_share
-from rippletwin.case.words import name_element, name_place, name_state
+from rippletwin.case.words import name_change, name_element, name_ordinal, name_state
 from rippletwin.figures.explained_numbers import LinePlace, Places
 from rippletwin.figures.line_drawing import describe_free, shown_places
 from rippletwin.report import charts, verdict_words
@@ -31,7 +31,6 @@ from rippletwin.report.tables import (
 
 WIDE, NARROW = 960.0, 358.0  # widths of the line's drawing, on a desk and on a phone
 LIBRARIES = ("numpy", "scipy", "numba")
-ORDINALS = {1: "first", 2: "second", 3: "third"}
 
 
 @dataclass(frozen=True)
@@ -244,18 +243,12 @@ def _kind(entry: Mapping) -> str:
 def _diagnosis(entry: Mapping, results: Results) -> DiagnosisCard:
     facts = [f"Leak area, {words}" for words in severity_words(entry.get("severity") or {})]
     if entry.get("piston") is not None:
-        number = entry["piston"] + 1
-        ordinal = ORDINALS.get(number, f"{number}th")
+        ordinal = name_ordinal(entry["piston"] + 1)
         facts.append(f"It is the {ordinal} piston to begin its delivery in the recording")
-    unlike = entry.get("unlike") or {}
     if entry["state"] == "unlike":
-        where = unlike.get("where") or {}
-        element = f" {name_place(where['element'])}" if where.get("element") else ""
-        orders = ", ".join(map(str, where.get("orders") or ()))
-        facts.append(
-            f"Something else has changed{element}"
-            + (f", most at orders {orders}" if orders else "")
-        )
+        where = (entry.get("unlike") or {}).get("where") or {}
+        changed = name_change(where.get("element"), where.get("orders") or ())
+        facts.append(changed[0].upper() + changed[1:])
     facts += [f"Doubtful: {doubt}" for doubt in entry.get("doubts") or ()]
     networks = [
         f"{name}: {name_state(said['state'])}, {write_share(said['share'])} of windows and seeds"

@@ -23,8 +23,9 @@ MAX_DECADES = 4.5  # of a logarithmic axis: less than that of the largest value 
 
 @dataclass(frozen=True)
 class Series:
-    """One curve: name, y (N,), `role` for its colour (measured, calibrated, corrected, allowed) and
-    `form`: line, dots or stems. NaN is left out. `ends` (2, N) of intervals about dots."""
+    """One curve: name, y (N,), `role` for its colour (measured, calibrated, corrected, predicted,
+    allowed) and `form`: line, dots or stems. NaN is left out. `ends` (2, N) of intervals about
+    dots."""
 
     name: str
     y: np.ndarray

@@ -136,7 +136,7 @@ def effect_table(effects: Sequence[Mapping]) -> Table:
                 ends = None if ends is None else tuple(ends)
                 cells = [
                     Cell(write_value(entry["value"], unit, ends), entry["value"]),
-                    Cell(interval, entry["value"]),
+                    Cell(interval, 0.0 if ends is None else abs(ends[1] - ends[0])),
                 ]
             probable = Cell(said, -1.0 if probability is None else probability)
             parameter = text(_effect_parameter(name))

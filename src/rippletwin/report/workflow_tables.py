@@ -107,7 +107,9 @@ def timing_table(folder: str | Path) -> Table:
         with path.open(newline="") as file:
             for row in csv.DictReader(file, delimiter="\t"):
                 rule = path.relative_to(folder).with_suffix("").parts[0]
-                rules.setdefault(rule, []).append((_number(row["s"]), _number(row["max_rss"])))
+                rules.setdefault(rule, []).append(
+                    (_number(row.get("s")), _number(row.get("max_rss")))
+                )
     cells = []
     for rule, jobs in sorted(rules.items(), key=lambda item: -sum(s for s, _ in item[1])):
         seconds, memory = sum(s for s, _ in jobs), max(m for _, m in jobs)
@@ -127,9 +129,10 @@ def timing_table(folder: str | Path) -> Table:
     )
 
 
-def _number(words: str) -> float:
-    """A number of a benchmark file; 0 where the job was too short to be measured."""
+def _number(words: str | None) -> float:
+    """A number of a benchmark file; 0 where the job was too short to be measured, or has not
+    written it yet."""
     try:
-        return float(words)
+        return float(words or "")
     except ValueError:
         return 0.0
