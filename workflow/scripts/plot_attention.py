@@ -8,6 +8,7 @@ from job import open_log
 from rippletwin import store
 from rippletwin.case.load import load_case
 from rippletwin.figures import attention
+from rippletwin.figures.ripple import shown_unit
 from rippletwin.figures.style import save
 from rippletwin.learning.architectures import ARCHITECTURES
 from rippletwin.learning.synchrosqueezing import SstSettings, image_axes
@@ -43,9 +44,7 @@ def draw(states, variable, titles, region=None):
         frequency_hz, _ = image_axes(settings, 2 / first.speed_hz)
         axis = (frequency_hz, first.speed_hz, pistons)
         return attention.plot_images(networks, states, signal, heat, titles, *axis, region)
-    pressure = first.simulated.attrs["units"] == "Pa"
-    label = "pressure ripple / bar" if pressure else "flow ripple / L/min"
-    scale = 1e5 if pressure else 1e-3 / 60
+    scale, label = shown_unit(first.simulated.attrs["units"])
     return attention.plot_windows(networks, states, signal / scale, heat, titles, label, region)
 
 

@@ -31,8 +31,7 @@ states = [str(state) for state in seeds.state.values]
 signals = seeds.signal.isel(channel=0).values
 signals = signals - signals.mean(axis=-1, keepdims=True)
 
-pressure = seeds.signal.attrs["units"] == "Pa"
-scale, label = (1e5, "pressure ripple / bar") if pressure else (1e-3 / 60, "flow ripple / L/min")
+scale, label = ripple.shown_unit(seeds.signal.attrs["units"])
 angle = np.arange(signals.shape[-1]) * 360 / signals.shape[-1]
 figure = ripple.plot_states(
     angle, dict(zip(states, signals)), f"{snakemake.wildcards.dataset}: {label}", scale

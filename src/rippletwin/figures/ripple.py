@@ -18,6 +18,11 @@ _LOOK = {
 }
 
 
+def shown_unit(units: str) -> tuple[float, str]:
+    """What a signal in `units`, Pa or m3/s, is divided by to be drawn, and the label of its axis."""
+    return (1e5, "pressure ripple / bar") if units == "Pa" else (1e-3 / 60, "flow ripple / L/min")
+
+
 def plot_overlay(
     angle_deg: np.ndarray, curves: Mapping[str, np.ndarray], sensors: Sequence[str], title: str = ""
 ) -> Figure:
