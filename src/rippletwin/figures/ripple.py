@@ -19,7 +19,7 @@ _LOOK = {
 
 
 def shown_unit(units: str) -> tuple[float, str]:
-    """What a signal in `units`, Pa or m3/s, is divided by to be drawn, and the label of its axis."""
+    """What a signal in `units`, Pa or m3/s, is divided by to be drawn, and its axis's label."""
     return (1e5, "pressure ripple / bar") if units == "Pa" else (1e-3 / 60, "flow ripple / L/min")
 
 
