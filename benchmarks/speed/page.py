@@ -22,10 +22,10 @@ this page and its figure:
 make bench
 ```
 
-Compared programs are measured in turns in one run, and ratios are medians over rounds. Times are
-processor seconds of one thread. Times of different machines cannot be compared. The other programs
-are requirements of the benchmarks alone (`environment-bench.txt`); nothing of `src/` needs them
-for what is measured here.
+Programs that run in one process are measured in turns, and their ratios are medians over rounds;
+sections say where it is otherwise. Times are processor seconds of one thread. Times of different
+machines cannot be compared. The other programs are requirements of the benchmarks alone
+(`environment-bench.txt`); nothing of `src/` needs them for what is measured here.
 
 ![Speeds over their targets](figures/benchmarks.svg)
 """

@@ -74,8 +74,8 @@ def bound_sentences(results: Path, seconds: pd.DataFrame, wall_s: float, cores: 
         f"Trainings take {100 * trained / wall_s:.0f} % of the default run's job seconds; the rest "
         f"alone takes {(wall_s - trained) / cores / 60:.0f} min of {cores} cores.",
         f"At the rate of large {'bfloat16' if bfloat16 else 'float32'} products, the convolutions "
-        f"of all trainings would take {least / cores / 60:.0f} min of {cores} cores, "
-        f"{100 * least / trained:.0f} % of what the trainings take.",
+        f"of all trainings on simulated samples would take {least / cores / 60:.0f} min of {cores} "
+        f"cores, {100 * least / trained:.0f} % of what all trainings take.",
     ]
 
 

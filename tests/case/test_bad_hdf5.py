@@ -94,7 +94,11 @@ def three_dimensions(file):
 STRUCTURES = {
     "2e12 samples claimed": (huge, "pressure", ["the limit is 1 GiB"]),
     "4e8 samples claimed": (large, "pressure", ["2.98 GiB", "the limit is 1 GiB"]),
-    "pressure is a group": (pressure_group, "pressure", ["a group that holds p1"]),
+    "pressure is a group": (
+        pressure_group,
+        "pressure",
+        ["a group that holds p1", "dataset: pressure/p1"],
+    ),
     "time_s is a group": (time_group, "time_s", ["a group that holds nothing"]),
     "a dangling soft link": (dangling_soft, "pressure", ["leads nowhere"]),
     "a link to itself": (looping_soft, "pressure", ["to itself"]),

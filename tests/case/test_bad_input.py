@@ -202,7 +202,7 @@ def test_hdf5_without_sampling_rate(tmp_path):
     write_case(tmp_path, sheet(), pressure=None)
     with h5py.File(tmp_path / "healthy_0.h5", "w") as file:
         file["pressure"] = ripple()
-    refused(tmp_path, "healthy_0.h5", "sampling_rate_hz", "missing")
+    refused(tmp_path, "healthy_0.h5", "sampling_rate_hz", "missing", "time: NAME")
 
 
 def test_missing_sensor_row(tmp_path):
@@ -243,6 +243,43 @@ def test_time_column_with_a_gap(tmp_path):
 
     csv_case(tmp_path, columns=gap)
     refused(tmp_path, "r.csv", "time_s", "not evenly spaced")
+
+
+def test_times_in_milliseconds(tmp_path):
+    """They are not taken for a sampling rate in kHz."""
+    csv_case(tmp_path, columns=lambda table: table * [1000.0, 1.0, 1.0])
+    words = "51.2 Hz", "looks like times in ms", "Give times in seconds"
+    refused(tmp_path, "r.csv", "sampling_rate_hz", *words)
+
+
+def test_times_that_are_rounded_to_more_than_a_step(tmp_path):
+    """Three decimals at 51.2 kHz: no sample was dropped."""
+    csv_case(tmp_path, columns=lambda table: np.column_stack([table[:, 0].round(3), table[:, 1:]]))
+    refused(tmp_path, "r.csv", "time_s", "rounded to more than a step", "with more digits")
+
+
+def test_a_time_column_of_a_file_without_a_header(tmp_path):
+    """No column has that name: gaps in the times would not be seen."""
+    numbered = {"channels": {"p1": 2, "p2": 3}, "time": "t", "sampling_rate_hz": 51200.0}
+    csv_case(tmp_path, header="", **numbered)
+    text = (tmp_path / "r.csv").read_text()
+    (tmp_path / "r.csv").write_text(text.lstrip("\n"))
+    refused(tmp_path, "r.csv", "time", "the file has no header")
+
+
+def test_points_of_thousands_beside_decimal_commas(tmp_path):
+    """12.345 is twelve thousand there, not twelve: the cell is told."""
+    csv_case(tmp_path)
+    lines = [
+        line.replace(",", ";").replace(".", ",")
+        for line in (tmp_path / "r.csv").read_text().splitlines()
+    ]
+    lines[7] = lines[7].rpartition(";")[0] + ";9.500.000,5"
+    (tmp_path / "r.csv").write_text("\n".join(lines))
+    refused(tmp_path, "r.csv", "p2", "'9.500.000,5' in data row 7")
+    lines[7] = lines[7].rpartition(";")[0] + ";9500.123"
+    (tmp_path / "r.csv").write_text("\n".join(lines))
+    refused(tmp_path, "r.csv", "p2", "'9500.123' in data row 7")
 
 
 # signals

@@ -101,6 +101,7 @@ FLOWS = {
     "flow towards the pump": (table(-FLOW), "flow_m3_s", ["negative", "change the sign"]),
     "ripple without a mean": (table(FLOW - 5e-4), "flow_m3_s", ["mean flow is zero"]),
     "a mean of rounding": (table(FLOW - 5e-4 - 3e-12), "flow_m3_s", ["mean flow is zero"]),
+    "kg/s": (table(900 * FLOW), "flow_m3_s", ["1.48e+03 m/s in the narrowest", "by the density"]),
     "other letters": (table(FLOW, "Angle_deg,flow_m3_s"), "angle_deg", ["Did you mean Angle_deg"]),
     "header only": ("angle_deg,flow_m3_s\n", "file", ["no rows"]),
     "nothing": ("", "file", ["empty"]),

@@ -106,9 +106,14 @@ def test_value_that_is_possible_but_unusual(tmp_path, name):
 
 def test_a_good_sheet_has_no_warnings(tmp_path):
     """Nothing of the tests' oil line is called unusual, with a pump of its own. With a number of
-    pistons only, faults would be those of another pump: one warning says so."""
-    spoilt(tmp_path, lambda c: c["pump"].update(piston_diameter=0.017))
+    pistons only, faults would be those of another pump: one warning says so. Numbers that do not
+    give its size leave it that of another pump too."""
+    size = {"piston_diameter": 0.017, "pitch_radius": 0.0335, "swash_angle_deg": 17.0}
+    spoilt(tmp_path, lambda c: c["pump"].update(size))
     assert load_case(tmp_path).warnings == ()
+    spoilt(tmp_path, lambda c: c["pump"].update(piston_diameter=0.017, port_opening_deg=15.0))
+    (warning,) = load_case(tmp_path).warnings
+    assert warning.startswith("pump: pitch_radius, swash_angle_deg not given")
     write_case(tmp_path, sheet())
     (warning,) = (w for w in load_case(tmp_path).warnings if "travel too" not in w)
     assert "generic pump of 42 cm3" in warning

@@ -32,6 +32,20 @@ def vectors(file):
     file["fs"] = RATE
 
 
+def vectors_with_times(file):
+    file["run/p1"], file["run/p2"] = PRESSURE
+    file["run/time_s"] = TIME
+
+
+def vectors_with_rates(file):
+    file["p1"], file["p2"] = PRESSURE
+    for name in ("p1", "p2"):
+        file[name].attrs["sampling_rate_hz"] = RATE
+
+
+IN_RUN = {"channels": {"p1": "run/p1", "p2": "run/p2"}}
+
+
 def named_rows(file):
     file["pressure"] = ALL
     file["pressure"].attrs.update(sampling_rate_hz=RATE, sensors=["a", "out", "b", "in"])
@@ -48,6 +62,8 @@ HDF5 = {
         vectors,
         {"channels": {"p1": "daq/in0", "p2": "daq/in1"}, "sampling_rate_name": "fs"},
     ),
+    "vectors beside their times": (vectors_with_times, IN_RUN),
+    "vectors with a rate": (vectors_with_rates, {}),
     "rows by name": (named_rows, {"channels": {"p1": "in", "p2": "out"}}),
     "samples by sensors": (
         lambda file: (
@@ -133,6 +149,19 @@ def test_zarr(tmp_path):
         tmp_path, "r.zarr", write, dataset="run/raw", sampling_rate_name="fs", **NUMBERED
     )
     same(recording)
+
+
+def test_zarr_of_vectors_whose_group_has_the_rate(tmp_path):
+    """One array for each sensor, in a group that states the sampling rate."""
+    import zarr
+
+    def write(path):
+        group = zarr.open_group(path, mode="w").create_group("run")
+        for name, row in zip(("p1", "p2"), PRESSURE):
+            group.create_array(name, data=row)
+        group.attrs["sampling_rate_hz"] = RATE
+
+    same(read(tmp_path, "r.zarr", write, **IN_RUN))
 
 
 def tdms(path):

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rippletwin.case.pressure_units import unit_error
+from rippletwin.case.pressure_units import mean_warnings, unit_error
 
 LOAD = 9e6  # Pa
 PHASE = 2 * np.pi * np.arange(1000) / 1000
@@ -75,6 +75,27 @@ def test_the_unit_is_told_from_the_mean(unit, pascals):
         assert (f"looks like {unit}" in said) is is_told
     said = problem_of(LOAD / pascals, 0.01 * LOAD / pascals)
     assert float(said.partition("multiply by ")[2].partition(",")[0]) == pytest.approx(pascals)
+
+
+@pytest.mark.parametrize(
+    ("means", "is_told"),
+    [
+        ((9.1e6, 9.0e6), False),
+        ((7.1e6, 9.0e6), False),  # one sensor with an offset
+        ((7.1e6, 7.0e6), True),  # less than 0.8 of the load
+        ((11.7e6, 11.9e6), False),  # 1.2 of the load and 1 MPa of the line's resistance
+        ((11.9e6, 12.0e6), True),
+        ((0.0, 0.1e6), False),  # AC-coupled
+    ],
+)
+def test_a_load_pressure_that_all_sensors_contradict(means, is_told):
+    """Two swapped entries of the data sheet: both sensors' means are another load's."""
+    rows = np.array(means)[:, None] + 3e5 * np.sin(PHASE)
+    recording = SimpleNamespace(label="a", load_pressure=LOAD, pressure=rows)
+    rig = SimpleNamespace(sensors=[SimpleNamespace(name="p1"), SimpleNamespace(name="p2")])
+    told = mean_warnings(recording, rig)
+    assert bool(told) == is_told
+    assert all("contradict load_pressure, 90 bar" in each for each in told)
 
 
 def test_whole_numbers_of_a_converter_are_counts():

@@ -159,6 +159,7 @@ def test_a_sheet_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
 
 
 REFUSED = {
+    "a temperature in K": ("temperature", "323", "up to 200 °C is possible. Give °C"),
     "a length of text": ("segment", "long,20,2", "no length"),
     "a bore below zero": ("segment", "5950,-20,2", "-20 is no bore. Give a positive number of mm"),
     "a bore in m": ("segment", "5.95,0.0197,2", "possible; it looks like m (19.7 mm). Give mm"),
@@ -191,6 +192,14 @@ def test_a_flow_without_a_recording_sets_no_orifice(tmp_path):
     assert main(["new", str(tmp_path), *flags(recording=[])]) == 0
     assert read_sheet(tmp_path / "rig.yaml")["load"] == {"kind": "orifice"}
     assert "# divide 6.333e-04 m3/s by the root" in (tmp_path / "rig.yaml").read_text()
+
+
+def test_an_invented_recording_is_said_to_be_one(tmp_path, capsys):
+    """Without --recording the sheet has an example, which no one took."""
+    assert main(["new", str(tmp_path / "case"), *flags(recording=[])]) == 0
+    assert "1000 r/min and 95 bar, is an example; correct it" in capsys.readouterr().err
+    assert main(["new", str(tmp_path / "other"), *flags()]) == 0
+    assert "example" not in capsys.readouterr().err
 
 
 def test_files_of_one_name_in_two_folders(tmp_path):

@@ -42,7 +42,7 @@ OPTIONS = {
 
 def known_pump(content):
     """Give the sheet a pump of its own, so that no warning is told."""
-    content["pump"]["piston_diameter"] = 0.017
+    content["pump"] |= {"piston_diameter": 0.017, "pitch_radius": 0.0335, "swash_angle_deg": 17.0}
 
 
 @pytest.mark.parametrize("name", OPTIONS)

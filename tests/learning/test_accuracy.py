@@ -105,7 +105,7 @@ def tidy():
     """Two seeds of one cell, one of another, of a dataset the paper has not."""
     rows = []
     for dataset, seed, said in (("CFD-P", 0, [H, S]), ("CFD-P", 1, [H, H]), ("CFD-P+", 0, [S, S])):
-        history = History([1.0], [0.5], [0.9], 0, True, "target")
+        history = History([0.5], [0.9], 0, True, "target")
         scored = score(["H", "S"], said, "pressure")
         rows.append(result_row("cnn1d_3_1", dataset, seed, scored, history))
     return pd.DataFrame(rows)

@@ -7,10 +7,10 @@ import pytest
 
 import rippletwin
 from case_folders import sheet, write_case
-from leaking_pump import LOAD, SPEED, rig
+from leaking_pump import DIAMETER, LOAD, OIL, SPEED, WAVE_SPEED, rig
 from rippletwin.diagnosis.simulated_fault import SimulatedFault
 from rippletwin.report.labelled_arrays import label_spectra, to_xarray
-from rippletwin.spectra.observation import observe
+from rippletwin.spectra.observation import Observation, observe
 from rippletwin.twin.operating_point import OperatingCondition
 from rippletwin.twin.twin import Twin
 
@@ -42,12 +42,32 @@ def test_spectra_are_found_by_sensor_and_order(case):
 
 
 def test_predictions_stand_beside_what_was_measured(case):
-    """A twin's prediction has the coordinates of the measured spectra, and its own values."""
+    """A twin's prediction has the coordinates of the measured spectra, and is in their unit: of a
+    source that is not known, the flow that comes nearest leaves a residual across the response."""
     observation = observe(case.recordings[0], case.rig, 1000.0)
     twin = Twin(case.rig, [observation])
     labelled = label_spectra(observation, {"predicted": twin})
     assert labelled.predicted.dims == labelled.measured.dims
-    np.testing.assert_array_equal(labelled.predicted, twin.predict([observation])[0])
+    response = twin.predict([observation])[0]  # to unit flow
+    left = labelled.measured.values - labelled.predicted.values
+    across = np.abs(np.sum(np.conj(response) * left, axis=0))
+    sizes = np.linalg.norm(response, axis=0) * np.linalg.norm(observation.values, axis=0)
+    assert np.all(across < 1e-9 * sizes)
+
+
+def test_a_predicted_impedance_is_an_impedance():
+    """Predicted as a reflection coefficient, it is given as what was measured: Pa s/m3."""
+    sheet = rig()
+    frequency_hz = np.array([50.0, 120.0])
+    observation = Observation(
+        kind="input_impedance", label="z", frequency_hz=frequency_hz, orders=None,
+        values=np.full((1, 2), 1e9 + 0j), covariance=np.tile(np.eye(1) + 0j, (2, 1, 1)), mean=None,
+        speed_hz=None, load_pressure=LOAD, source="free", flow_ripple=None, sensors=(),
+    )  # fmt: skip
+    twin = Twin(sheet, [observation])
+    found = label_spectra(observation, {"predicted": twin}).predicted.values
+    unit = OIL.density * WAVE_SPEED / (np.pi / 4 * DIAMETER**2)
+    np.testing.assert_allclose((found - unit) / (found + unit), twin.predict([observation])[0])
 
 
 def test_a_twin_has_values_with_units():

@@ -52,7 +52,7 @@ def test_a_short_recording_that_nobody_learns_from_does_not_stop_a_training(tmp_
 
     def train(network, x, y, *_):
         learnt.append(y.tolist())
-        return network, History([1.0], [0.5], [0.9], 0, True, "target")
+        return network, History([0.5], [0.9], 0, True, "target")
 
     monkeypatch.setattr("rippletwin.learning.training.train_stepwise", train)
     monkeypatch.setattr("rippletwin.learning.side_by_side.train_all", lambda made, _: made)

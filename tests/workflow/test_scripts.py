@@ -71,7 +71,7 @@ def predictions(path, truth, said):
 def reported(folder, truth, said):
     """(accuracy.csv, accuracy.md) of one network on one dataset."""
     predictions(folder / "said.csv", truth, said)
-    history = asdict(History([1.0], [0.5], [0.9], 0, True, "target"))
+    history = asdict(History([0.5], [0.9], 0, True, "target"))
     (folder / "ended.json").write_text(json.dumps([history, history]))
     paper = folder / "paper.csv"
     pd.DataFrame(columns=["architecture", "dataset", "mean", "std"]).to_csv(paper, index=False)

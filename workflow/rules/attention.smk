@@ -13,7 +13,7 @@ rule attention:
         f"{RESULTS}/benchmarks/attention/{{dataset}}/{{architecture}}.tsv"
     priority: 30
     resources:
-        mem_mb=2000,
+        mem_mb=3000,
     params:
         gpu=config["training"]["gpu"],
     script:

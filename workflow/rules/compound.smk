@@ -12,7 +12,7 @@ rule evaluate_compound:
         f"{RESULTS}/benchmarks/evaluate_compound/{{dataset}}/{{architecture}}.tsv"
     priority: 30
     resources:
-        mem_mb=2000,
+        mem_mb=3000,
     params:
         gpu=config["training"]["gpu"],
     script:

@@ -12,7 +12,7 @@ rule evaluate:
         f"{RESULTS}/benchmarks/evaluate/{{dataset}}/{{architecture}}.tsv"
     priority: 30
     resources:
-        mem_mb=2000,
+        mem_mb=3000,
     params:
         gpu=config["training"]["gpu"],
         learnt_share=learnt_share_of,

@@ -30,7 +30,7 @@ rule explain:
     priority: 50
     threads: 2
     resources:
-        mem_mb=3000,
+        mem_mb=4000,
     params:
         rig=rig_content(*RIG_SECTIONS, recordings="fit"),
     script:

@@ -1,4 +1,4 @@
-# Recorded pressure -> flow at the pump outlet, by the line of the calibrated or corrected twin.
+# Recorded pressure -> source flow of the pump, by the line of the calibrated or corrected twin.
 rule flow_sensor:
     input:
         recorded=rules.cut_windows.output.windows,

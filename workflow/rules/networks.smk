@@ -15,7 +15,7 @@ rule keep_networks:
         f"{RESULTS}/benchmarks/keep_networks/{{dataset}}/{{architecture}}.tsv"
     priority: 30
     resources:
-        mem_mb=2000,
+        mem_mb=3000,
     params:
         signal=lambda wildcards: DATASETS[wildcards.dataset].signal,
         gpu=config["training"]["gpu"],

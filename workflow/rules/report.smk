@@ -18,8 +18,8 @@ rule accuracy_table:
             f"{RESULTS}/accuracy.csv",
             category="Accuracy",
             subcategory="Tables",
-            labels={"result": "accuracy beside the paper's"},
-            caption="../report/accuracy.rst",
+            labels={"result": "accuracy of every training"},
+            caption="../report/trainings.rst",
         ),
         page=f"{RESULTS}/accuracy.md",
     log:

@@ -36,7 +36,8 @@ page = f"""# Diagnostic accuracy on recordings, per cent
 The recordings are {params.recordings}, of each state the first; mean and standard deviation over
 {len(endings)} seeds, the paper's values in brackets. A cylinder fault is right as
 {params.severity["pressure"]} for pressure and {params.severity["flow"]} for flow; as either, where
-networks learnt a range of severities.
+networks learnt a range of severities. Networks of `experimental` and of randomised datasets are
+tested on the late windows of these recordings alone.
 
 {accuracy_table(results, paper, params.columns)}
 ## Either severity of a cylinder fault counts as right

@@ -1,4 +1,4 @@
-"""Recorded pressure windows -> flow at the pump outlet, by the line of a twin."""
+"""Recorded pressure windows -> source flow of the pump, by the line of a twin."""
 
 import xarray as xr
 

@@ -23,7 +23,8 @@ params, name = snakemake.params, snakemake.wildcards.architecture
 recorded = store.load(snakemake.input.recorded)
 noise = recorded.noise_std.values
 (x, y), (held_out, _) = (
-    each_once(store.load(path).signal.values, noise, np.random.default_rng(seed), params.noise)
+    # Signals were drawn from generators of these seeds alone.
+    each_once(store.load(path).signal.values, noise, np.random.default_rng([seed, 3]), params.noise)
     for seed, path in enumerate((snakemake.input.learnt, snakemake.input.held_out))
 )
 weights = torch.load(snakemake.input.weights, weights_only=True)

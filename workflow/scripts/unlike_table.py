@@ -24,7 +24,7 @@ store.write_text(
     f"""# Windows that are unlike everything simulated
 
 Share of the windows of each recording that networks call unlike, per cent over seeds. Of simulated
-windows {100 * PROMISED_RATE:.0f} % are called so; this is promised by their conformal p-values.
+windows at most {100 * PROMISED_RATE:.0f} % are called so; their conformal p-values promise it.
 
 """
     + markdown_table(["Network", *table.columns], lines),

@@ -23,7 +23,7 @@ from rippletwin.case.model import (
     Uncertainty,
 )
 from rippletwin.case.plausibility import unusual_values
-from rippletwin.case.pressure_units import PASCALS, count_warnings
+from rippletwin.case.pressure_units import PASCALS, count_warnings, mean_warnings
 from rippletwin.case.readers.layout import Layout
 from rippletwin.case.readers.registry import read_signals
 from rippletwin.case.rig_yaml import find_sheet, find_sheet_faults, parse_sheet
@@ -37,6 +37,7 @@ COPIED_KEYS = (
 )  # fmt: skip
 """Keys of a recording's entry that its fields have as they are."""
 SAMPLED = ("periodic", "random")
+LARGEST_VELOCITY = 100.0  # m/s, mean, of a liquid; lines are designed for 0.5 to 6
 
 
 def load_case(
@@ -82,6 +83,7 @@ def load_case(
             recording, limited = limit_to_ripple(recording)
             recordings.append(recording)
             limits += limited
+            limits += mean_warnings(recording, rig)
             if "scale" not in entry:
                 limits += count_warnings(recording, rig)
         except InputError as error:
@@ -174,8 +176,17 @@ def _displacement(recordings: Sequence[Recording]) -> float | None:
 
 
 def _check_mean_flow(path: Path, ripple: FlowRipple, rig: Rig) -> None:
-    """Raise InputError where an orifice's coefficient has to come from a mean flow of zero."""
-    if rig.load.passes_flow and ripple.stated_mean is None:
+    """Raise InputError where an orifice's coefficient has to come from a mean flow of zero, and
+    where a liquid would be impossibly fast in the line."""
+    mean, area = ripple.stated_mean, min(segment.area for segment in rig.line)
+    if mean is not None and not rig.fluid.is_gas and mean > LARGEST_VELOCITY * area:
+        raise InputError(
+            path,
+            "flow_m3_s",
+            f"the mean flow of {mean:.3g} m3/s is {mean / area:.3g} m/s in the narrowest segment",
+            "Give m3/s: divide L/s by 1000, L/min by 60000, kg/s by the density",
+        )
+    if rig.load.passes_flow and mean is None:
         raise InputError(
             path,
             "flow_m3_s",

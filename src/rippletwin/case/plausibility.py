@@ -112,6 +112,7 @@ GAS = BOTH | {
 LONGEST_IN_DIAMETERS = 2e4  # 400 m of 20 mm pipe; ripple does not come back from there
 SMALLEST_PRESSURE = 1000.0  # Pa; a pressure below it other than 0 is most likely in bar or MPa
 KELVIN = 273.15
+PUMP_SIZE = ("piston_diameter", "pitch_radius", "swash_angle_deg")
 PORT_OVERLAP_DEG = 5.0  # that a pump has where port_overlap_deg is not given
 
 
@@ -131,12 +132,21 @@ def unusual_values(path: Path, sheet: dict) -> list[str]:
 
 
 def warn_of_pump(pump: Mapping) -> list[str]:
-    """The warning of a pump of which no more is given than the number of pistons."""
-    if {key for key, value in pump.items() if value is not None} - {"pistons"}:
+    """The warning of a pump whose size is not given: numbers that are not are those of a generic
+    pump."""
+    given = {key for key, value in pump.items() if value is not None}
+    missing = [key for key in PUMP_SIZE if key not in given]
+    if not missing:
         return []
+    if given <= {"pistons"}:
+        return [
+            "pump: only pistons is given, so that faults are those of a generic pump of 42 cm3 per "
+            "revolution; give piston_diameter, pitch_radius and swash_angle_deg"
+        ]
     return [
-        "pump: only pistons is given, so that faults are those of a generic pump of 42 cm3 per "
-        "revolution; give piston_diameter, pitch_radius and swash_angle_deg"
+        f"pump: {', '.join(missing)} not given, so that size and flow are those of a generic pump "
+        "of 42 cm3 per revolution; give piston_diameter, pitch_radius and swash_angle_deg, or "
+        "pistons alone"
     ]
 
 

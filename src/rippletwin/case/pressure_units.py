@@ -14,6 +14,8 @@ LARGEST_COUNT = 2**24  # of a converter of 24 bits
 VACUUM = -1.1e5  # Pa; gauge pressure cannot be lower
 FEW = 1000  # samples that spare a look at all of a recording
 LARGEST_FALL = 1e6  # Pa; of the mean pressure from a sensor to the load
+LEAST_MEAN, MOST_MEAN = 0.8, 1.2  # of the load pressure, beside LARGEST_FALL; calibrated sensors
+SURE_MEAN = 10.0  # of the ripple's rms, above which a sensor is not AC-coupled
 LARGEST_RIPPLE = 1e8  # Pa rms, where no load pressure is stated
 
 
@@ -93,3 +95,22 @@ def _unit_guess(mean: float, load: float | None) -> tuple[str, float] | None:
         return UNITS[0]
     near = min(UNITS, key=lambda unit: abs(np.log(max(mean, 1e-12) * unit[1] / load)))
     return near if 0.5 < mean * near[1] / load < 2 else None
+
+
+def mean_warnings(recording: Recording, rig: Rig) -> list[str]:
+    """A line where all sensors of a sampled recording have a mean pressure, and all contradict the
+    load pressure that is stated."""
+    load = recording.load_pressure
+    if recording.pressure is None or load is None or not rig.sensors:
+        return []
+    means = [float(np.mean(row, dtype=float)) for row in recording.pressure]
+    coupled = [abs(m) > SURE_MEAN * np.std(row) for m, row in zip(means, recording.pressure)]
+    if not all(coupled):  # the mean of an AC-coupled sensor is next to none
+        return []
+    if max(means) >= LEAST_MEAN * load and min(means) <= MOST_MEAN * load + LARGEST_FALL:
+        return []
+    shown = ", ".join(f"{sensor.name} {mean / 1e5:.4g}" for sensor, mean in zip(rig.sensors, means))
+    return [
+        f"{recording.label}: the sensors' means, {shown} bar, contradict load_pressure, "
+        f"{load / 1e5:.4g} bar; correct load_pressure, unit or scale"
+    ]

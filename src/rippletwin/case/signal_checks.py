@@ -14,6 +14,7 @@ from rippletwin.case.speed_estimate import estimate_speed
 from rippletwin.errors import InputError
 
 FEWEST_REVOLUTIONS = 4
+TIME_COLUMN = "the time column"  # as who says a sampling rate
 RATE_TOLERANCE = 1e-3
 SPEED_TOLERANCE = 0.01
 LONGEST_FLAT_S = 0.02  # for random recordings; periodic ones use the piston period
@@ -29,7 +30,7 @@ def sampling_rate(path: Path, signals: Signals, stated: float | None) -> float:
         for claim, rate in (
             ("the file's sampling_rate_hz", signals.sampling_rate_hz),
             ("rig.yaml's sampling_rate_hz", stated),
-            ("the time column", from_time),
+            (TIME_COLUMN, from_time),
         )
         if rate is not None
     ]
@@ -38,17 +39,23 @@ def sampling_rate(path: Path, signals: Signals, stated: float | None) -> float:
             path,
             "sampling_rate_hz",
             "missing",
-            "Store it in the file, or give sampling_rate_hz for this recording in rig.yaml",
+            "Say where the file has it, time: NAME (times in seconds) or sampling_rate_name: NAME, "
+            "or give sampling_rate_hz for this recording in rig.yaml",
         )
     for claim, rate in claims:
         if not RATES_HZ[0] <= rate <= RATES_HZ[1]:
-            in_khz = RATES_HZ[0] <= 1000 * rate <= 1e6
+            by_time = claim == TIME_COLUMN
+            looks = "times in ms" if by_time else "kHz"
+            remedy = "Give samples a second, Hz"
+            if by_time:
+                remedy = "Give times in seconds, or leave them out and give sampling_rate_hz"
+            is_thousandth = RATES_HZ[0] <= 1000 * rate <= 1e6
             raise InputError(
                 path,
                 "sampling_rate_hz",
                 f"{claim} says {rate:g} Hz, an implausible sampling rate"
-                + ("; it looks like kHz" if in_khz else ""),
-                "Give samples a second, Hz",
+                + (f"; it looks like {looks}" if is_thousandth else ""),
+                remedy,
             )
     rates = [rate for _, rate in claims]
     if max(rates) - min(rates) > RATE_TOLERANCE * max(rates):
@@ -87,6 +94,13 @@ def _rate_of_time(path: Path, signals: Signals) -> float:
     usual = np.median(np.diff(time))
     off = np.abs(time - time[0] - step * np.arange(samples)) > 0.5 * step + rounding
     if np.any(off):
+        if np.any(np.diff(time) == 0.0):
+            raise InputError(
+                path,
+                "time_s",
+                f"times repeat: they are rounded to more than a step of {step:.2g} s",
+                "Export them with more digits, or leave them out and give sampling_rate_hz",
+            )
         row = int(np.argmax(np.abs(np.diff(time) - usual) > 0.5 * abs(usual) + rounding)) + 2
         raise InputError(
             path,
@@ -147,7 +161,8 @@ def _length_error(recording: Recording, rig: Rig) -> InputError | None:
             path,
             "sampling_rate_hz",
             f"{rate:g} Hz is too low for pistons at {piston_hz:.4g} Hz",
-            "Record at ten times the piston frequency and more, or correct speed_rpm",
+            "Record at ten times the piston frequency and more, or correct speed_rpm, or times "
+            "that are not in seconds",
         )
     return None
 

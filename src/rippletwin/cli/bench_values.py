@@ -22,7 +22,8 @@ STATES = ("healthy", "unknown", "slipper", "cylinder", "cylinder_slight", "cylin
 class BenchQuantity:
     """A number in `unit`; times `factor` it is in the SI unit of `field` of rig.yaml.
 
-    `floor` is what it may not fall below, in `unit`; None where it must be above zero.
+    `floor` is what it may not fall below, in `unit`; None where it must be above zero. `ceiling`
+    is what it may not exceed; None for the range of `field`.
     """
 
     what: str
@@ -30,10 +31,16 @@ class BenchQuantity:
     factor: float = 1.0
     field: str = ""
     floor: float | None = None
+    ceiling: float | None = None
 
     def read(self, text: object) -> float:
         """The number in SI units; raises ValueError("problem. remedy")."""
         value = options.number(str(text), self.what, self.unit, self.floor)
+        if self.ceiling is not None and value > self.ceiling:
+            raise ValueError(
+                f"a {self.what} of {value:g} {self.unit} is implausible: up to {self.ceiling:g} "
+                f"{self.unit} is possible. Give {self.unit}"
+            )
         allowed = LIQUID.get(self.field)
         if allowed is None or value == 0:
             return value * self.factor
@@ -62,7 +69,7 @@ WAVE_SPEED = BenchQuantity("wave speed", "m/s", 1.0, "line.segments.wave_speed")
 POSITION = BenchQuantity("position", "mm", 1e-3, "line.segments.length", floor=0.0)
 SPEED = BenchQuantity("speed", "r/min", 1.0, "recordings.speed_rpm")
 PRESSURE = BenchQuantity("pressure", "bar", 1e5, "recordings.load_pressure")
-TEMPERATURE = BenchQuantity("temperature", "°C", floor=-60.0)
+TEMPERATURE = BenchQuantity("temperature", "°C", floor=-60.0, ceiling=200.0)
 DENSITY = BenchQuantity("density", "kg/m3", 1.0, "fluid.density")
 VISCOSITY = BenchQuantity("viscosity", "cSt", 1e-6, "fluid.kinematic_viscosity")
 BULK_MODULUS = BenchQuantity("bulk modulus", "bar", 1e5, "pump.bulk_modulus")

@@ -53,7 +53,6 @@ def command(
         before, after = calibration.before, calibration.after
         print(f"relative misfit {before.relative:.1%} -> {after.relative:.1%}")
         print(f"Theil's coefficient {before.theil:.3f} -> {after.theil:.3f}")
-        for warning in calibration.warnings:
-            print(f"warning: {warning}")
+    warn(calibration.warnings)
     warned = bool(calibration.warnings or read.warnings)
     return found_code(["warning"] if warned else [], fail_on)

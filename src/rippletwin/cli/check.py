@@ -22,11 +22,13 @@ def command(case: Path, fail_on: tuple[str, ...], as_json: bool) -> int:
 
     from rippletwin.case.load import load_case
     from rippletwin.errors import InputError, raise_any
+    from rippletwin.explanation.checks.data_contradictions import plateau_warnings
     from rippletwin.spectra import case_summary
 
     with progress_bars(as_json, passing=True) as progress:
         read = load_case(case, progress=progress)
-    warn(read.warnings)
+    warnings = [*read.warnings, *plateau_warnings(read.rig, read.recordings)]
+    warn(warnings)
     summary = case_summary.summarise_rig(read)
     if not as_json:
         print("\n".join(case_summary.rig_in_words(summary)), flush=True)
@@ -50,7 +52,7 @@ def command(case: Path, fail_on: tuple[str, ...], as_json: bool) -> int:
         print(json.dumps(summary))
     else:
         _print_outlook(effects, summary["advice"])
-    return found_code(["warning"] if read.warnings else [], fail_on)
+    return found_code(["warning"] if warnings else [], fail_on)
 
 
 def _effects(case, healthy: list, advice: list[str], progress) -> list:

@@ -77,7 +77,8 @@ def command(
     from rippletwin.diagnosis.diagnose import select_recordings
     from rippletwin.diagnosis.diagnosis_file import write_diagnosis
     from rippletwin.diagnosis.faults.library import select_faults
-    from rippletwin.diagnosis.kept_answers import diagnose_changed, warn_of_verdict, warnings_of
+    from rippletwin.diagnosis.input_warnings import find_warnings
+    from rippletwin.diagnosis.kept_answers import diagnose_changed
     from rippletwin.twin.effects.library import add_effects
 
     faults = select_faults(list(fault_names))
@@ -91,9 +92,8 @@ def command(
         twin, verdict = _twin_of(twin_file, out, processes, read, recordings, progress)
         found = diagnose_changed(read, twin, recordings, faults, out, progress)
     entries = [each.entry for each in found]
-    doubts = warn_of_verdict(verdict)
-    warn(doubts)
-    warnings = [*doubts, *warnings_of(read, twin)]
+    warnings = find_warnings(read, twin, recordings, verdict)
+    warn(each for each in warnings if each not in read.warnings)
     result = write_diagnosis(entries, out, _answers(networks, recordings, read), warnings)
     from rippletwin.figures.fault_posterior import draw, remove_figures  # takes a second
 

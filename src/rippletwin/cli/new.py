@@ -130,6 +130,12 @@ def command(case: Path, ask: bool | None, as_json: bool, **given) -> None:
     sheet = _sheet(given)
     path = write_new_sheet(sheet, case)
     warnings, advice = _judge(path)
+    if not given["recordings"]:
+        _, _, speed, pressure = EXAMPLE
+        warnings.append(
+            f"no --recording is given: that of rig.yaml, {speed:g} r/min and {pressure / 1e5:g} "
+            "bar, is an example; correct it"
+        )
     warn(warnings)
     if as_json:
         print(json.dumps({"rig_yaml": str(path), "warnings": warnings, "advice": advice}))

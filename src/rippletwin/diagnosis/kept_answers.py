@@ -22,7 +22,6 @@ from threadpoolctl import threadpool_limits
 import rippletwin
 from rippletwin import store
 from rippletwin.case.model import Case, Recording
-from rippletwin.case.plausibility import warn_of_pump
 from rippletwin.diagnosis.diagnose import (
     ReadOnce,
     check_twin,
@@ -94,22 +93,6 @@ def diagnose_changed(
     if progress:
         progress("diagnosing", len(recordings), len(recordings))
     return answers
-
-
-def warnings_of(case: Case, twin: Twin) -> list[str]:
-    """Warnings of a case and of the pump that its twin simulates, each once."""
-    return list(dict.fromkeys([*case.warnings, *warn_of_pump(twin.rig.pump)]))
-
-
-def warn_of_verdict(verdict: Mapping) -> list[str]:
-    """The warning of a verdict, with the keys of verdict.json, on recordings that contradict
-    themselves; none of another verdict, or of no verdict."""
-    if verdict.get("verdict") != "bad_data":
-        return []
-    return [
-        "the healthy recordings contradict themselves, as verdict.json says; a diagnosis that "
-        "compares with them may be wrong"
-    ]
 
 
 def _recalibrated(

@@ -76,7 +76,7 @@ def plot_images(
 
     pictures (states, size, size), lowest frequency first; heat (networks, states, size, size), NaN
     without attention; frequency_hz (size,) of the rows; region (states, size) booleans: rows that
-    the fault changes. Titles as in ``windows``.
+    the fault changes. Titles as in ``plot_windows``.
     """
     fig, axes = _panels(networks, states, height=1.7)
     rows = np.log(frequency_hz)

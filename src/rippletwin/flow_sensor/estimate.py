@@ -9,12 +9,13 @@ import numpy as np
 
 from rippletwin.harmonics import one_period, peak_amplitudes
 
-RELATIVE_SPEED_STEP = 2e-4  # windows of speeds closer than that share one inversion
+RELATIVE_SPEED_STEP = 2e-4  # width of the bins of speed whose windows share one inversion
 
 
 @dataclass(frozen=True)
 class FlowEstimate:
-    """Flow ripple at the pump outlet of n windows, zero mean, nothing above the bandwidth.
+    """Flow ripple of n windows, source flow or flow into the line, zero mean, nothing above the
+    bandwidth.
 
     flow (n, M) m3/s; orders (F,); harmonics (n, F) complex peak amplitudes; standard_deviation
     (F,) of the complex harmonics' errors by the error model; prior (F,) the same without any

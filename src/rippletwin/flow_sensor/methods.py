@@ -30,7 +30,7 @@ def estimate_flow_by(
     threads: int,
     progress: Callable[[str], None],
 ) -> FlowEstimate:
-    """Outlet flow of each one-revolution window, by one of `METHODS`.
+    """The pump's source flow of each one-revolution window, by one of `METHODS`.
 
     windows : (n, S, M) pressure, Pa; speed_hz : (n,) speed of each, rev/s, of which "pinn" takes
     the mean; noise : (S,) standard deviation of a sample, Pa. `width` (neurons of a hidden layer),

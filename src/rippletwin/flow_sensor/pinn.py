@@ -14,8 +14,9 @@ Desai et al. 2021, One-shot transfer learning of physics-informed neural network
     joints    p and q fit where segments or lumped elements meet
     load      p and q at the end are in the load's ratio
 
-The trunk is trained once, at the calibrated parameters, on the sum of these losses for known states
-at the pump, whose sensor readings the twin predicts. In each training step the heads are solved
+The trunk is trained once, at the calibrated parameters, on data, equations, joints and the waves at
+the pump, for known states there, whose sensor readings the twin predicts. The load has a part in a
+window's head alone. In each training step the heads are solved
 exactly and only the trunk moves (variable projection; Golub & Pereyra 1973, SIAM J. Numer. Anal.
 10, 413). Each uniform piece of line has shape functions of its own (Jagtap & Karniadakis 2020,
 Commun. Comput. Phys. 28, 2002): slow envelopes on carriers of the calibrated wave length, so that
@@ -60,8 +61,8 @@ def train(
 ) -> tuple[Trunk, np.ndarray]:
     """A trunk for the line of `line_at`, at orders of `speed_hz` up to `bandwidth_hz`.
 
-    Returns it with the loss of each step: the mean square of all residuals for unit waves at the
-    pump. `progress` is called with step and loss.
+    Returns it with the loss of each evaluation, of which a step takes one or more: the mean square
+    of all residuals for unit waves at the pump. `progress` is called with step and loss.
     """
     settings = settings or Settings()
     highest = bandwidth_hz / speed_hz

@@ -127,8 +127,8 @@ Blind: share of simulated faults for which a network shows no positive evidence 
 ## Does alignment choose the network?
 
 Spearman's rank correlation of alignment and accuracy over the networks of a dataset,
-its 95 % interval and the p-value over all orders; then the accuracy of the network with
-the highest alignment, of the best network and of the mean network.
+its 95 % interval and the p-value over all orders (random ones beyond eight networks); then the
+accuracy of the network with the highest alignment, of the best network and of the mean network.
 
 {markdown_table(RANKING_HEADS, rankings)}
 **{ranking_sentence(ranks)}**

@@ -41,9 +41,8 @@ class TrainingSettings:
 
 @dataclass
 class History:
-    """Per epoch: mean losses and validation accuracy; how it ended, and what it computed with."""
+    """Per epoch: validation loss and accuracy; how it ended, and what it computed with."""
 
-    training_loss: list[float] = field(default_factory=list)
     validation_loss: list[float] = field(default_factory=list)
     validation_accuracy: list[float] = field(default_factory=list)
     best_epoch: int = 0
@@ -138,7 +137,6 @@ def train_stepwise(
             yield
         if settings.falling_rate:
             fall.step()
-        history.training_loss.append(steps.pop_loss() / len(fit))
         loss, accuracy = _validate(steps, validation)
         history.validation_loss.append(loss)
         history.validation_accuracy.append(accuracy)

@@ -18,7 +18,7 @@ WARM_UP = 3  # steps before a recording, in which libraries choose kernels and t
 
 
 class TrainingSteps:
-    """Takes steps of one network on batches of its samples, and adds up their losses.
+    """Takes steps of one network on batches of its samples.
 
     images, labels  all samples, on the device of the network; the attribute ``images`` has them
                     standardised, in the precision of the products
@@ -42,7 +42,6 @@ class TrainingSteps:
         self.optimiser = torch.optim.Adam(
             network.parameters(), lr=rate, fused=True, capturable=recorded
         )
-        self.loss = torch.zeros((), dtype=torch.float64, device=arithmetic.device)
         self.batch = torch.arange(min(batch_size, len(labels)), device=arithmetic.device)
         self.graph = self._record() if recorded else None
 
@@ -54,12 +53,6 @@ class TrainingSteps:
         else:
             self._step(batch)
 
-    def pop_loss(self) -> float:
-        """Sum of the losses of all samples since the last call, in nats."""
-        loss = float(self.loss)
-        self.loss.zero_()
-        return loss
-
     def _step(self, batch: torch.Tensor) -> None:
         with self.arithmetic.mixed():
             logits = self.network.answer(self.images[batch])
@@ -67,7 +60,6 @@ class TrainingSteps:
         self.optimiser.zero_grad()
         loss.backward()
         self.optimiser.step()
-        self.loss += loss.detach().double() * len(batch)
 
     def _record(self) -> torch.cuda.CUDAGraph:
         """A graph of one step on ``self.batch``; the network is left as it was."""
@@ -87,7 +79,6 @@ class TrainingSteps:
         for state in self.optimiser.state.values():
             for moment in state.values():
                 moment.zero_()
-        self.loss.zero_()
         return graph
 
 

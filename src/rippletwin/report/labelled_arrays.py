@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
+from rippletwin.calibration.misfit import with_likely_amplitude
 from rippletwin.case.model import Recording, Sensor
 from rippletwin.diagnosis.simulated_fault import SimulatedFault
 from rippletwin.spectra.observation import Observation
+from rippletwin.twin.reflection import stated_unit
 from rippletwin.twin.twin import Twin
 
 if TYPE_CHECKING:
@@ -32,7 +34,8 @@ def to_xarray(
     simulated fault `pressure` (sensor, time), Pa gauge, of one revolution
     twin            `value` and `data_sheet` (parameter), in the unit of the coordinate `unit`
     explanation     a tree with one dataset for each recording: that of its observation, with the
-                    twin's `predicted` and, without the effects, `predicted_without_effects`
+                    twin's `predicted` and, without the effects, `predicted_without_effects`; a
+                    source that is not known has its likeliest amplitude
 
     Raises TypeError for anything else.
     """
@@ -67,7 +70,7 @@ def label_spectra(observation: Observation, twins: Mapping[str, Twin] | None = N
         "sd": (dims, np.sqrt(observation.variance), attributes | {"long_name": "of the error"}),
     }
     for name, twin in (twins or {}).items():
-        data[name] = (dims, twin.predict([observation])[0], attributes)
+        data[name] = (dims, _predict(twin, observation), attributes)
     coords = {"frequency": ("frequency", observation.frequency_hz, {"units": "Hz"})}
     if observation.orders is not None:
         coords["order"] = ("frequency", observation.orders, {"long_name": "shaft order"})
@@ -76,6 +79,15 @@ def label_spectra(observation: Observation, twins: Mapping[str, Twin] | None = N
     stated = {"speed_hz": observation.speed_hz, "load_pressure_pa": observation.load_pressure}
     known = {name: value for name, value in stated.items() if value is not None}
     return xr.Dataset(data, coords, {"label": observation.label, **known})
+
+
+def _predict(twin: Twin, observation: Observation) -> np.ndarray:
+    """What a twin predicts of an observation, in its unit; a free source has the amplitude that
+    comes nearest to what was measured."""
+    predicted = twin.predict([observation])[0]
+    if observation.kind == "input_impedance":
+        return stated_unit(observation, twin.rig) * (1.0 + predicted) / (1.0 - predicted)
+    return with_likely_amplitude(observation, predicted, observation.values)
 
 
 def _recording(recording: Recording, sensors: Sequence[Sensor] | None) -> xr.Dataset:

@@ -26,6 +26,13 @@ class NominalRipples:
         return self._made[key][1]
 
     def _simulated(self, observation) -> FlowRipple:
+        if observation.load_pressure is None:
+            raise InputError(
+                "rig.yaml",
+                f"load_pressure of {observation.label}",
+                "missing: the pump is simulated against it",
+                "Give the mean gauge pressure at the load, Pa",
+            )
         key = observation.speed_hz, observation.load_pressure
         if key not in self._made:
             from rippletwin.pump.outlets import ConstantPressure

@@ -50,7 +50,7 @@ def read_arrays(file: ArrayFile, layout: Layout) -> Signals:
     elif layout.dataset is not None:
         raise missing_name(file.path, "dataset", name, file.present())
     else:
-        pressure, name = _vectors(file, layout), ""
+        pressure, name = _vectors(file, layout), str(layout.channel(layout.sensors[0]))
     time = _beside(file, name, layout.time_name)
     if time is None and layout.time is not None:
         raise missing_name(file.path, "time", layout.time, file.present())

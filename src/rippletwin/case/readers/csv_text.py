@@ -84,6 +84,14 @@ def _columns(path: Path, layout: Layout, form: TextFormat) -> tuple[list[int], i
             f"Write the columns' names into the first line: {named}; or number the columns in "
             f"rig.yaml: channels: {{{layout.sensors[0]}: 2}}",
         )
+    if layout.time is not None:
+        raise InputError(
+            path,
+            "time",
+            f"{layout.time}: the file has no header, so no column has a name",
+            "Write the columns' names into the first line, or take time out and give "
+            "sampling_rate_hz",
+        )
     count = form.columns
     chosen = [int(layout.channels[sensor]) for sensor in layout.sensors]
     raise_any(

@@ -46,9 +46,16 @@ def find_dataset(path: Path, file: h5py.File, name: str) -> h5py.Dataset | None:
     if item is None:
         return None
     if not isinstance(item, h5py.Dataset):
-        what = f"a group that holds {', '.join(names_in(item)) or 'nothing'}"
-        problem = what if isinstance(item, h5py.Group) else "a data type"
-        raise InputError(path, name, f"{problem}, not a dataset", HERE)
+        if not isinstance(item, h5py.Group):
+            raise InputError(path, name, "a data type, not a dataset", HERE)
+        inside = names_in(item)
+        example = f"{name.strip('/')}/{inside[0]}" if inside else "GROUP/DATASET"
+        raise InputError(
+            path,
+            name,
+            f"a group that holds {', '.join(inside) or 'nothing'}, not a dataset",
+            f"Name a dataset in it: dataset: {example}, or channels: {{SENSOR: {example}}}",
+        )
     if item.file.filename != file.filename or item.is_virtual or item.external:
         raise InputError(path, name, "its data lie in another file", HERE)
     if item.shape is None or not item.size:

@@ -161,7 +161,9 @@ def parse_floats(column: pd.Series, form: TextFormat) -> np.ndarray:
     import pandas as pd
 
     if form.decimal != "." and not pd.api.types.is_numeric_dtype(column):
-        column = column.astype(str).str.replace(form.decimal, ".", regex=False)
+        text = column.astype(str)
+        pointed = text.str.contains(".", regex=False)  # of thousands: no decimal sign here
+        column = text.mask(pointed).str.replace(form.decimal, ".", regex=False)
     return pd.to_numeric(column, errors="coerce").to_numpy(float)
 
 

@@ -1,7 +1,7 @@
 """zarr: array `pressure`, in either orientation, Pa, with the attribute `sampling_rate_hz`.
 
-The attribute may sit on the array or on the store. Optional: attribute `sensors`, the channels'
-names; array `time_s` (samples,). rig.yaml may name others.
+The attribute may sit on the array, on its group or on the store. Optional: attribute `sensors`, the
+channels' names; array `time_s` (samples,). rig.yaml may name others.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ def read(path: Path, layout: Layout) -> Signals:
         store = zarr.open_group(path, mode="r")
         members = store.members(max_depth=4)
         arrays = {name: item for name, item in members if isinstance(item, zarr.Array)}
+        groups = {name: item for name, item in members if isinstance(item, zarr.Group)}
 
         def array(name: str) -> zarr.Array | None:
             item = arrays.get(name)
@@ -36,10 +37,9 @@ def read(path: Path, layout: Layout) -> Signals:
             return item
 
         def attribute(beside: str, name: str):
-            holders: list[zarr.Array | zarr.Group] = [store]
-            if beside in arrays:
-                holders.insert(0, arrays[beside])
-            return next((h.attrs[name] for h in holders if name in h.attrs), None)
+            group = groups.get(beside.rpartition("/")[0])
+            holders = (arrays.get(beside), group, store)
+            return next((h.attrs[name] for h in holders if h is not None and name in h.attrs), None)
 
         return read_arrays(ArrayFile(path, lambda: list(arrays), array, attribute), layout)
 

@@ -204,6 +204,14 @@ def find_clipping_plateau(recording, sensor: str, row: np.ndarray) -> str:
     return ""
 
 
+def plateau_warnings(rig, recordings: Sequence) -> list[str]:
+    """A line for every clipped signal with noise of recordings as read."""
+    found = [
+        find_clipping_plateau(r, sensor, row) for r in recordings for sensor, row in _rows(rig, r)
+    ]
+    return [f"{each}; record again with a larger range" for each in found if each]
+
+
 def _rows(rig, recording) -> list:
     """(sensor's name, samples) of each sensor of a recording."""
     if recording.pressure is None:

@@ -30,7 +30,7 @@ class Explanation:
     search             base, best explanation and rivals
     alarms             of the base fit
     validation         cross-validation of base, explanation and plain calibration
-    decision           the verdict and the accepted fit
+    decision           what the search decides; verdict.json also counts shaft orders
     source_free_fits   the leading fits of the search, with an unknown source
     prior_sensitivity  fits with wide priors without each accepted effect
     shaft_orders       ripple at orders that are no multiples of the number of pistons
