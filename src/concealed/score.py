@@ -32,7 +32,8 @@ def score_case(truth: dict, verdict: dict, baselines: dict, oracle: dict = NO_OR
     Keys of the row:
         kind, effects, change, noise, points, sensors, floor   from the truth; `effects` as text
         plain            change >= PLAIN_CHANGE
-        mesh             estimated error of the recording's numerics, None for a linear line
+        mesh             frequency, Hz, estimated and allowed error, Pa, of the mesh of a nonlinear
+                         line of the bench `clean`; None elsewhere
         oracle_log_evidence, oracle_held_out   of the fit begun from the truth, None without one
         verdict, named, sentence   from the verdict; `named` are its effects as text
         alarm            the verdict is not one of SILENT_VERDICTS

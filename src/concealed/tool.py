@@ -54,7 +54,6 @@ def crash_verdict(error: Exception) -> dict:
     unknown = {"in_sample": float("nan"), "held_out": float("nan")}
     return {
         "verdict": "crashed",
-        "mismatch": {"present": None, "where": None},
         "effects": [],
         "equivalents": [],
         "fit": {"before": unknown, "after": unknown},

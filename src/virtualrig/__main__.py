@@ -1,6 +1,8 @@
 """python -m virtualrig: the command line."""
 
+import sys
+
 from virtualrig.cli import main
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

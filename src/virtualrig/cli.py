@@ -61,7 +61,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         options.run(options)
-    except RigError as error:
+    except (RigError, OSError) as error:
         print(f"virtualrig: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
@@ -131,12 +131,23 @@ def _points(choice: str) -> tuple[Point, ...]:
         return POINTS[choice]
     listing = read_yaml(choice).get("points")
     try:
-        return tuple(Point(**entry) for entry in listing)
+        points = tuple(Point(**entry) for entry in listing)
+        for point in points:
+            for name in ("speed_rpm", "load_pressure", "seconds"):
+                if not getattr(point, name) > 0:
+                    raise TypeError(f"{point.label}: {name} must be above zero")
     except TypeError as error:
         raise RigError(f"{choice}: field points: {error}") from None
+    labels = [point.label for point in points]
+    twice = sorted({label for label in labels if labels.count(label) > 1})
+    if twice:
+        raise RigError(f"{choice}: field points: label {', '.join(twice)} is there twice")
+    return points
 
 
 def _record(options: argparse.Namespace) -> None:
+    _at_least(options, "processes", 1)
+    _at_least(options, "seed", 0)
     points = _points(options.points)
     if options.seconds is not None:
         if not options.seconds > 0:
@@ -169,7 +180,15 @@ def _record_point(options: argparse.Namespace, known: dict, rig: Rig, index: int
     return point.label
 
 
+def _at_least(options: argparse.Namespace, name: str, least: int) -> None:
+    """Raises RigError where an option is below `least`."""
+    value = getattr(options, name)
+    if value < least:
+        raise RigError(f"--{name} {value}: must be at least {least}")
+
+
 def _check(options: argparse.Namespace) -> None:
+    _at_least(options, "cases", 1)
     checks = check_numerics(options.cases, options.commit, options.number)
     options.out.write_text(json.dumps([vars(check) for check in checks], indent=1) + "\n")
     for check in checks:
@@ -207,10 +226,16 @@ def _population(options: argparse.Namespace) -> None:
 
 
 def _keep_truth_out(options: argparse.Namespace) -> None:
-    """Raises RigError where the seal or its key would lie in the case folder."""
+    """Raises RigError where the seal or its key would lie in the case folder, or would replace
+    another file; makes their folders."""
+    if options.seal.resolve() == options.key.resolve():
+        raise RigError(f"--key {options.key}: is the file of --seal; name another")
     for path, name in ((options.seal, "--seal"), (options.key, "--key")):
         if path.resolve().is_relative_to(options.out.resolve()):
             raise RigError(f"{name} {path}: lies in the case folder; keep the truth out of it")
+        if path.exists():
+            raise RigError(f"{name} {path}: is there already; name a new file")
+        path.parent.mkdir(parents=True, exist_ok=True)
 
 
 def _write_seal(options: argparse.Namespace, truth: dict) -> None:

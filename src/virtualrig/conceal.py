@@ -79,7 +79,7 @@ def change_and_floor(drawn: DrawnCase) -> dict[str, float]:
     `change` is the norm of the change that the effects make at the first operating point, over that
     of the ripple without them. `floor` is the norm of the error that the nominal flow makes, over
     that of the ripple, root mean square over the operating points as held-out misfits are: no twin
-    can be better.
+    with the nominal flow can be better.
     """
     rig = build_drawn(drawn, BASE_NUMERICS)
     points = [replace(point, seconds=0.0) for point in drawn.points]

@@ -8,6 +8,7 @@ import numpy as np
 
 from virtualrig.pump import Pump
 
+AT_LOAD = 1e-6  # m; nearer to the load is at the load
 SHORTEST_PIPE = 0.05  # m; shorter ones need small time steps
 
 
@@ -41,6 +42,13 @@ class Draft:
         self.fittings.append((position, node))
 
 
+def _from_one(what: str, number: int) -> int:
+    """The index of a segment or sensor counted from 1; raises ValueError for less."""
+    if number < 1:
+        raise ValueError(f"{what} {number}: {what}s count from 1")
+    return number - 1
+
+
 def unsteady_friction(draft: Draft) -> None:
     """Friction of the unsteady laminar velocity profile."""
     draft.friction = "unsteady"
@@ -48,7 +56,7 @@ def unsteady_friction(draft: Draft) -> None:
 
 def viscoelastic_wall(draft: Draft, segment: int, compliance: float, time: float) -> None:
     """Kelvin-Voigt wall of segment `segment` (1 is the pump's); relative compliance, time in s."""
-    draft.segments[segment - 1]["wall"] = (compliance, time)
+    draft.segments[_from_one("segment", segment)]["wall"] = (compliance, time)
 
 
 def entrained_air(draft: Draft, fraction: float, exponent: float = 1.2) -> None:
@@ -67,7 +75,10 @@ def side_branch(
 
 
 def leak(draft: Draft, position: float, conductance: float = 0.0, orifice: float = 0.0) -> None:
-    """Laminar (m3/s/Pa) or square-law (m3/s/Pa^0.5) leak to the tank."""
+    """Laminar (m3/s/Pa) or square-law (m3/s/Pa^0.5) leak to the tank. Raises ValueError at the
+    load, whose orifice is set by the operator."""
+    if abs(position - draft.length) < AT_LOAD:
+        raise ValueError("a leak cannot be at the load; move it towards the pump")
     draft.fit(position, leak=conductance, orifice=orifice)
 
 
@@ -119,17 +130,17 @@ def speed_fluctuation(draft: Draft, order: int, amplitude: float, phase: float =
 
 def sensor_dynamics(draft: Draft, sensor: int, frequency_hz: float, damping: float) -> None:
     """Sensor `sensor` (1 is nearest the pump) resonates: a cavity or its diaphragm."""
-    draft.sensing[sensor - 1]["resonance"] = (frequency_hz, damping)
+    draft.sensing[_from_one("sensor", sensor)]["resonance"] = (frequency_hz, damping)
 
 
 def sensor_gain(draft: Draft, sensor: int, gain: float) -> None:
-    """Readings of sensor `sensor` are `gain` times the pressure ripple."""
-    draft.sensing[sensor - 1]["gain"] = gain
+    """Readings of sensor `sensor` are `gain` times the pressure."""
+    draft.sensing[_from_one("sensor", sensor)]["gain"] = gain
 
 
 def sensor_delay(draft: Draft, sensor: int, delay: float) -> None:
     """Readings of sensor `sensor` are late by `delay` s."""
-    draft.sensing[sensor - 1]["delay"] = delay
+    draft.sensing[_from_one("sensor", sensor)]["delay"] = delay
 
 
 def gas_volume(

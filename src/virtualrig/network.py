@@ -185,7 +185,8 @@ def sensor_rows(network: Network) -> tuple[np.ndarray, np.ndarray]:
 
 
 def state_at_rest(network: Network, line: waves.Line, pressure: float, flow: float, pistons: int):
-    """A steady state: `pressure` (Pa) everywhere, `flow` (m3/s) through the pipes to the load.
+    """A steady state: `pressure` (Pa) everywhere, `flow` (m3/s) through the pipes to the load; the
+    pipe before a load without an orifice in `network` starts without flow.
 
     Chambers start at `pressure`; pipes that end at a node without an outlet carry no flow.
     """

@@ -98,7 +98,7 @@ def draw_nuisance_case(count: int, commit: str, number: int | str, index: int) -
     truth = {
         "kind": kind,
         "effects": [truth_of_effect(effect, sheet, true) for effect in effects],
-        "nuisance": nuisance_effects(sheet, true, nuisance, geometry),
+        "nuisance": nuisance_effects(sheet, true),
         "classes": classes,
         "segments": truth_of_segments(
             segments_as_recorded(
@@ -142,7 +142,7 @@ def _with_chambers(
     ]
 
 
-def nuisance_effects(sheet: dict, true: dict, nuisance: dict, geometry: bool) -> list[dict]:
+def nuisance_effects(sheet: dict, true: dict) -> list[dict]:
     """What the nuisance physics is in the words of a verdict, as `truth_of_effect` has them.
 
     The pump responds to the line; where the data sheet gives its geometry, its chambers differ from

@@ -33,8 +33,7 @@ class Orbit:
 
     `pressure` (sensors, RECORDS) Pa; `outlet_flow` (RECORDS,) m3/s into the line at x = 0;
     `outlet_pressure` (RECORDS,); `load_pressure` the mean at the load; `valve` the load's orifice
-    coefficient, m3/s/Pa^0.5; `residual` the greatest change of any sensor's pressure over the last
-    revolution, Pa.
+    coefficient, m3/s/Pa^0.5.
     """
 
     speed_rpm: float
@@ -43,8 +42,6 @@ class Orbit:
     outlet_pressure: np.ndarray
     load_pressure: float
     valve: float
-    residual: float
-    revolutions: int
 
 
 class Bench:
@@ -129,8 +126,6 @@ class Bench:
                     outlet_pressure=np.roll(nodal[0], 1),
                     load_pressure=float(nodal[self.rig.load_node].mean()),
                     valve=float(load[node_elements.ORIFICE]),
-                    residual=float(residual),
-                    revolutions=revolution,
                 )
         raise RuntimeError(f"not periodic after {most} revolutions: still moving {residual:.0f} Pa")
 

@@ -220,8 +220,8 @@ def step_chambers(stations, history, lead, chambers, ports, outlet_lead, outlet_
     Solves lead e(p_i) - history_i = de_i/dt for the chambers' compression and
     outlet_lead p - outlet_rest = sum of delivered flows for the outlet pressure, by Newton's
     method. `x` (pistons + 1,) holds the chamber pressures and the outlet pressure: start values
-    in, solution out. `stations` are those of `crank`; `matrix` (pistons + 1, pistons + 2) is
-    workspace.
+    in, solution out. `stations` are those of `chamber_kinematics`; `matrix` (pistons + 1,
+    pistons + 2) is workspace.
     """
     squeezed = np.empty((len(chambers), 2))
     compress_all(x, ports, squeezed)
@@ -239,7 +239,7 @@ def solve_chambers(
     laminar = ports[LAMINAR]
     coupled = False
     for i in range(n):
-        coupled |= chambers[i, NEIGHBOUR] > 0
+        coupled |= chambers[i, NEIGHBOUR] > 0 or chambers[i, NEIGHBOUR_GAP] > 0
     for iteration in range(MOST_NEWTON_STEPS):
         matrix[:] = 0.0
         matrix[n, n] = outlet_lead
@@ -267,7 +267,7 @@ def solve_chambers(
                 matrix[n, n + 1] += opening * delivery
             matrix[i, n + 1] += history[i] - lead * strain + stiffness * gain
             matrix[i, i] += lead * softness + stiffness * slope
-            if chambers[i, NEIGHBOUR] > 0:
+            if chambers[i, NEIGHBOUR] > 0 or chambers[i, NEIGHBOUR_GAP] > 0:
                 k = (i + 1) % n
                 across, tangent = orifice_flow(x[i] - x[k], laminar)
                 across *= chambers[i, NEIGHBOUR]

@@ -96,7 +96,9 @@ def nominal_ripple(known: dict, point: Point) -> tuple[np.ndarray, np.ndarray]:
 def draw_speed_wander(
     count: int, deviation: float, correlation_s: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """Slow relative deviation of the speed (count,): Gaussian, smooth, of zero mean."""
+    """Slow relative deviation of the speed (count,): Gaussian, with the correlation
+    exp(-(t/correlation_s)^2) and the standard deviation `deviation` before its mean is taken off.
+    """
     step = 0.02
     grid = np.arange(int(np.ceil(count / SAMPLING_RATE_HZ / step)) + 2)
     width = correlation_s / 2 / step

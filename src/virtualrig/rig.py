@@ -36,8 +36,9 @@ class Rig:
     """The true rig; the load's orifice is set by the operator, so its node has none yet.
 
     `noise` Pa rms; `speed_error` and `load_pressure_error` relative standard deviations of what the
-    operator sets; `wander` relative standard deviation of speed within a recording, correlated over
-    `correlation_s`; `ripple` rows (order, relative amplitude of crank speed, phase).
+    operator sets; `wander` relative standard deviation of the slow speed over a long time,
+    correlated over `correlation_s`: less within a recording, whose mean is taken off; `ripple` rows
+    (order, relative amplitude of crank speed, phase).
     """
 
     pump: Pump
@@ -66,6 +67,8 @@ def read_yaml(path: Path | str) -> dict:
     """A YAML mapping; raises RigError naming the file where it is missing or not one."""
     try:
         content = yaml.load(Path(path).read_text(), Loader=_Loader)
+    except UnicodeDecodeError:
+        raise RigError(f"{path}: not text; give a YAML file") from None
     except OSError as error:
         raise RigError(f"{path}: cannot be read ({error.strerror}); give a YAML file") from None
     except yaml.YAMLError as error:
@@ -80,7 +83,7 @@ def read_rig(sheet: Path | str = SHEET, seal: Path | str = SEAL) -> tuple[dict, 
     known, true = read_yaml(sheet), read_yaml(seal)
     try:
         return known, build(known, true)
-    except (KeyError, TypeError, ValueError, IndexError) as error:
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         what = f"{error.args[0]!r} is missing" if isinstance(error, KeyError) else error
         raise RigError(f"{seal} with {sheet}: {what}") from error
 

@@ -3,7 +3,8 @@
 A seal can be shown to anyone. It holds the truth encrypted and a commitment to it; the key lies in
 another file, for the scoring alone. The cipher is AES-256-GCM (NIST SP 800-38D): it also detects
 every change of the seal, the commitment included. The commitment is SHA-256 of the plaintext, which
-begins with random bytes: without them a guessed truth could be compared with the commitment.
+begins with random bytes: without them a guessed truth could be compared with the commitment. Truths
+are filled up with blanks, so that their length tells nothing.
 """
 
 import hashlib
@@ -17,6 +18,7 @@ from cryptography.hazmat.primitives.ciphers.aead import AESGCM
 _KEY_BITS = 256
 _NONCE_BYTES = 12  # the length for which GCM uses the nonce as it is
 _BLINDING_BYTES = 32
+_PADDED_BYTES = 2**15  # to a multiple: a ciphertext is as long as what it hides
 
 
 class SealError(ValueError):
@@ -33,7 +35,9 @@ def seal(truth: dict, key: bytes) -> dict:
 
     Use a key for one seal only.
     """
-    plain = secrets.token_bytes(_BLINDING_BYTES) + json.dumps(truth, sort_keys=True).encode()
+    text = json.dumps(truth, sort_keys=True).encode()
+    text += b" " * (-len(text) % _PADDED_BYTES)
+    plain = secrets.token_bytes(_BLINDING_BYTES) + text
     commitment, nonce = hashlib.sha256(plain).digest(), secrets.token_bytes(_NONCE_BYTES)
     return {
         "nonce": nonce.hex(),
@@ -59,7 +63,8 @@ def open_seal(sealed: dict, key: bytes) -> dict:
 
 
 def open_seal_file(seal_file: str | Path, key_file: str | Path) -> dict:
-    """The truth in a seal's file; raises SealError naming both files."""
+    """The truth in a seal's file; raises SealError naming both files where it cannot
+    be opened, and OSError for a file that cannot be read."""
     try:
         return open_seal(json.loads(Path(seal_file).read_text()), Path(key_file).read_bytes())
     except ValueError as error:

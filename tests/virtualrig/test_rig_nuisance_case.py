@@ -68,7 +68,7 @@ def test_nuisance_physics_is_part_of_the_truth():
     """A tool that names it is right: each place of the rig has its effects."""
     (case, *_) = cases("none")
     rig = case.rig
-    listed = nuisance_effects(rig.sheet, rig.true, rig.nuisance, case.geometry)
+    listed = nuisance_effects(rig.sheet, rig.true)
     places = {(effect["name"], effect["element"]) for effect in listed}
     assert {("unsteady_friction", "line"), ("viscoelastic_wall", "line")} <= places
     assert ("viscoelastic_wall", "segment 2") in places

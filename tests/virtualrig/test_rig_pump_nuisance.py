@@ -110,6 +110,10 @@ CASES = {
             "worn": HOLE,
         },
     ),
+    "a laminar leak alone": (
+        (Leak("cylinder", HOLE, 1.0, OUTLET),),
+        {"cross_gap": COEFFICIENT * HOLE / np.sqrt(OUTLET)},
+    ),
     "blocked port": ((BlockedPort(0.1),), {"inlet": np.array([0.1, 1.0, 1.0])}),
     "cavitation": ((CavitatingSuction(-6e4),), {"suction": -6e4}),
 }

@@ -31,7 +31,7 @@ def orbit(harmonic, speed_rpm=1000.0, sensors=1, delay=0.0):
     turn = np.arange(4608) / 4608
     pressure = 5 + np.cos(2 * np.pi * harmonic * (turn - delay * speed_rpm / 60))
     pressure = np.tile(pressure, (sensors, 1))
-    return Orbit(speed_rpm, pressure, turn, turn, 0.0, 0.0, 0.0, 1)
+    return Orbit(speed_rpm, pressure, turn, turn, 0.0, 0.0)
 
 
 def test_sensor_gain_delay_and_resonance_are_those_of_the_formulae():
@@ -144,6 +144,12 @@ def test_nominal_flow_ripple_is_the_sheets_and_not_the_true_one(case):
         (["--seconds", "-1"], "--seconds"),
         (["--true-flow", "OUT/truth"], "--true-flow"),
         (["--sealed", "BAD"], "magic"),
+        (["--sealed", "EMPTY_KEY"], "empty_key.yaml"),
+        (["--sheet", "BYTES"], "not text"),
+        (["--points", "TWICE"], "label a is there twice"),
+        (["--points", "BACKWARDS"], "a: seconds must be above zero"),
+        (["--processes", "0"], "--processes 0"),
+        (["--seed", "-1"], "--seed -1"),
         (["--sealed", "FAULTLESS"], "faults"),
     ],
 )
@@ -152,12 +158,38 @@ def test_wrong_input_is_named(arguments, words, tmp_path, capsys):
     (tmp_path / "bad.yaml").write_text("effects: [{name: magic}]")
     (tmp_path / "faultless.yaml").write_text("noise: 1.0")
     out = tmp_path / "out"
-    names = {"BAD": "bad.yaml", "FAULTLESS": "faultless.yaml"}
+    (tmp_path / "empty_key.yaml").write_text("speed:\n")
+    (tmp_path / "bytes.yaml").write_bytes(b"\x89HDF\xff\xfe")
+    point = "{label: a, speed_rpm: 1000, load_pressure: 9.5e6, seconds: "
+    (tmp_path / "twice.yaml").write_text(f"points: [{point}1}}, {point}2}}]")
+    (tmp_path / "backwards.yaml").write_text(f"points: [{point}-1}}]")
+    names = {
+        "BAD": "bad.yaml",
+        "FAULTLESS": "faultless.yaml",
+        "EMPTY_KEY": "empty_key.yaml",
+        "BYTES": "bytes.yaml",
+        "TWICE": "twice.yaml",
+        "BACKWARDS": "backwards.yaml",
+    }
     arguments = [str(tmp_path / names[a]) if a in names else a for a in arguments]
     arguments = [a.replace("OUT", str(out)) for a in arguments]
     assert main(["record", "--out", str(out), *arguments]) == 2
     assert words in capsys.readouterr().err
     assert not (out / "recordings").exists()
+
+
+@pytest.mark.parametrize(
+    ("seal", "key", "words"),
+    [("old", "new", "--seal"), ("new", "old", "--key"), ("same", "same", "is the file of --seal")],
+)
+def test_no_seal_and_no_key_is_replaced(seal, key, words, tmp_path, capsys):
+    """Refused before anything is recorded: an older key fits its seal alone."""
+    (tmp_path / "old").write_text("precious")
+    files = ["--seal", str(tmp_path / seal), "--key", str(tmp_path / key)]
+    drawn = ["--commit", "0" * 40, "--number", "1000", "--rig", "0"]
+    assert main(["population", "--out", str(tmp_path / "out"), *files, *drawn]) == 2
+    assert words in capsys.readouterr().err
+    assert (tmp_path / "old").read_text() == "precious" and not (tmp_path / "out").exists()
 
 
 def test_full_folder_is_not_overwritten(tmp_path, capsys):
@@ -171,9 +203,14 @@ def test_wrong_arguments_of_effects_are_named():
     """Errors name an unknown parameter, a position outside the line and two effects that set the
     same element."""
     known = read_yaml(SHEET)
+    length = sum(segment["length"] for segment in known["line"]["segments"])
     for effect, words in (
         ({"name": "leak", "position": 99.0, "conductance": 1e-12}, "outside the line"),
         ({"name": "leak", "place": 1.0}, "place"),
+        ({"name": "leak", "position": length, "orifice": 1e-9}, "at the load"),
+        ({"name": "sensor_gain", "sensor": 0, "gain": 1.1}, "sensors count from 1"),
+        ({"name": "viscoelastic_wall", "segment": 0, "compliance": 0.1, "time": 1e-3},
+         "segments count from 1"),
         ({"name": "resonator", "position": 0.0, "frequency_hz": 1e3, "damping": 0.1,
           "compliance": 1e-14}, "outlet"),
     ):  # fmt: skip

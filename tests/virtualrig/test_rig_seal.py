@@ -26,6 +26,14 @@ def test_the_key_opens_the_seal_and_the_seal_shows_nothing(key):
     assert "none" not in json.dumps(sealed)
 
 
+def test_the_length_of_a_seal_tells_nothing(key):
+    """A truth with effects is no longer than one without."""
+    effects = [{"name": "leak", "element": "position", "position": 3.21}] * 2
+    longer = TRUTH | {"kind": "pair", "effects": effects}
+    sizes = {len(seal(truth, key)["sealed"]) for truth in (TRUTH, longer)}
+    assert len(sizes) == 1 and open_seal(seal(longer, key), key) == longer
+
+
 def test_equal_truths_give_different_seals(key):
     """Neither ciphertext nor commitment allows a guessed truth to be compared."""
     first, second = seal(TRUTH, key), seal(TRUTH, key)
