@@ -212,3 +212,23 @@ def test_gains_of_two_sensors_are_one_class():
     search = SimpleNamespace(best=best, rivals=[best, *others], other_positions=[])
     assert equivalent_places(search) == (("sensor_gain at sensor p1", "sensor_gain at sensor p2"),)
     assert rival_fits(search) == others[:1]
+
+
+def test_no_recording_below_the_back_pressure_of_the_load_is_proposed():
+    """An orifice passes flow from the line alone: 0.4 of 9.5 MPa is less than 4 MPa behind it.
+    Every candidate that is left has an operating point."""
+    bench, observations, _ = make(np.random.default_rng(4), points=POINTS)
+    rig = replace(bench, load=replace(bench.load, back_pressure=4e6))
+    twin = Twin(rig, observations)
+    others = [o for _, _, o in list_candidate_recordings(twin, observations) if o.load_pressure]
+    pressures = {o.load_pressure for o in others}
+    assert len(pressures) > 1 and min(pressures) > 4.2e6
+    assert all(twin.operating_point(o).mean_flow > 0.0 for o in others)
+
+
+def test_no_speed_is_proposed_at_which_no_harmonic_is_used():
+    """At 20000 r/min 1.4 times the speed has its first harmonic above the highest that counts."""
+    bench, observations, _ = make(np.random.default_rng(4), points=((20000, 9.5e6),))
+    twin = Twin(bench, observations)
+    speeds = [o.speed_hz for _, _, o in list_candidate_recordings(twin, observations) if o.speed_hz]
+    assert max(speeds) * twin.rig.pump["pistons"] <= 4000.0

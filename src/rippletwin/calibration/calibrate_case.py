@@ -21,8 +21,8 @@ def calibrate_case(
     friction  "none", "steady" (the paper's) or "unsteady"
     progress  is called with a sentence after each frequency limit
 
-    Raises InputError where no recording is healthy, and where the band of one holds no
-    harmonic of the pistons.
+    Raises InputError where no recording is healthy, where the band of one holds no harmonic of the
+    pistons, and as `check_sources` and `check_load_table`; ValueError for another friction law.
     """
     observations = observe_healthy(case)
     twin = Twin(case.rig, observations, friction=friction)

@@ -78,6 +78,11 @@ def parameter_table(calibration: Calibration) -> list[dict]:
     ]
 
 
+def finite_or_none(value: float) -> float | None:
+    """A number that JSON has; None where no steady state was found."""
+    return value if np.isfinite(value) else None
+
+
 def to_dict(calibration: Calibration) -> dict:
     """A calibration as plain data; `twin_file.twin_of` makes a twin of it again."""
     return {
@@ -88,7 +93,7 @@ def to_dict(calibration: Calibration) -> dict:
         "load": None if calibration.load is None else calibration.load.as_dict(),
         "error_floor": calibration.model_error,
         "source_sd": calibration.source_sd,
-        "minus_log_posterior": calibration.objective,
+        "minus_log_posterior": finite_or_none(calibration.objective),
         "fit": {"before": _misfit(calibration.before), "after": _misfit(calibration.after)},
         "warnings": list(calibration.warnings),
     }

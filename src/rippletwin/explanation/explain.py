@@ -10,11 +10,10 @@ The steps of the method, each with the module that takes it:
  6. Couple the pump to the line and resume the search             stages.staged_search
  7. Take volumes side by side for one stretch of pipe             search.neighbouring_lumps
  8. Judge the support of each effect, drop what has none          checks.support
- 9. Find the intervals of the effects' parameters                 checks.profile_intervals
-10. Fit passive networks, which need no name                      search.passive_networks
-11. Judge the effects beside a network that stands in, and find
-    the intervals of both                                         checks.support,
-                                                                  checks.profile_intervals
+ 9. Fit passive networks, which need no name                      search.passive_networks
+10. Judge the effects beside a network that stands in             checks.support
+11. Find the intervals of the effects' parameters, with those of
+    a network that stands in                                      checks.profile_intervals
 12. Fit gas in place of volumes of liquid                         search.gas_rivals
 13. Find swapped sensors and inverted signs                       checks.sensor_wiring
 14. Read the alarms: misfit, pull, disagreement, drift            checks.alarms

@@ -62,4 +62,4 @@ def common_coordinates(fit: Fit, hypothesis: Hypothesis) -> dict[str, float]:
     """Fitted coordinates by name of the effects that another hypothesis has too."""
     names = {f"{effect.name}@{place}" for effect, place in hypothesis}
     index, theta = fit.twin.index, fit.twin.theta
-    return {name: float(theta[k]) for name, k in index.items() if name.split(".")[0] in names}
+    return {name: float(theta[k]) for name, k in index.items() if name.rpartition(".")[0] in names}

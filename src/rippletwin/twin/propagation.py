@@ -46,7 +46,7 @@ def propagate(
 
     Returns the `Transient` with M samples a revolution. The load factor of the twin scales orifice
     and mean flow alike, so that the load pressure stays that of the recording, as in the frequency
-    domain. Raises InputError for a load given as a measured impedance.
+    domain. Raises InputError as `line_in_time`.
     """
     line = line_in_time(twin, flow, healthy_flow, speed_hz, load_pressure, source_capacitance)
     count = method_of_characteristics.steps_a_period(line.pipes, line.period, steps)
@@ -64,7 +64,8 @@ def line_in_time(
 ) -> TimeDomainLine:
     """The twin as a `TimeDomainLine`, every effect in it; arguments as `propagate`'s.
 
-    Raises InputError for a load that has no time domain, and for a mean flow into a closed end.
+    Raises InputError for a load that has no time domain, for a mean flow into a closed end, and for
+    an effect that no passive rational function follows.
     """
     rig = twin.calibrated_rig()
     if rig.load.kind == "impedance":

@@ -101,7 +101,8 @@ class Twin:
     ripple : the pump's flow ripple as recordings correct it, for simulations; predictions of
         observations, which a fit compares with them, take the nominal ripple.
 
-    Raises ValueError for an unknown friction or a theta of the wrong length.
+    Raises ValueError for an unknown friction, a theta of the wrong length, two recordings of one
+    label and an effect twice at a place.
     """
 
     def __init__(
@@ -251,7 +252,9 @@ class Twin:
 
     def operating_point(self, observation) -> OperatingPoint:
         """Mean pressure and flow, orifice coefficient and source of an observation or an
-        `OperatingCondition`."""
+        `OperatingCondition`. Raises InputError for an orifice without a mean pressure above its
+        back pressure, and where the pump has no load pressure to be simulated against, or delivers
+        nothing."""
         ripple = None
         if observation.kind == "periodic" and observation.source != "free":
             ripple = self._ripples.of(observation)

@@ -181,6 +181,8 @@ def find_incompatible_recordings(observations: Sequence, delay: float) -> str:
     outliers = [k for k, comparisons in differs.items() if all(comparisons)]
     if not outliers:
         return ""
+    first = periodic[outliers[0]]
+    outliers = [k for k in outliers if _same_operating_point(periodic[k], first)]
     labels = " and ".join(periodic[k].label for k in outliers)
     if len(outliers) == 1:
         return f"{labels} differs from every other recording of its operating point"

@@ -184,7 +184,7 @@ def sensor_intervals(fit: Fit) -> dict[str, dict]:
     """
     sensors: dict[str, dict] = {}
     for k, p in enumerate(fit.twin.parameters):
-        kind, _, name = p.name.rstrip("]").partition("[")
+        kind, _, name = p.name.removesuffix("]").partition("[")
         if kind in ("gain", "phase") and p.place == f"sensor {name}":
             value, ends, unit = _value_and_interval(fit, k)
             sensors.setdefault(name, {})[kind] = {"value": value, "ci95": ends, "unit": unit}

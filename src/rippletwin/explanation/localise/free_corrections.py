@@ -121,7 +121,9 @@ def locate_mismatch(fit: Fit, observations: Sequence) -> MismatchLocation | None
     if log_bayes_factors["position"] > log_bayes_factors[best] - profile.margin:
         ends = max(low, 0.0), min(high, float(rig.length))
         return MismatchLocation("position", ends, kind, log_bayes_factors, profile)
-    element, _, kind = best.partition(", ")
+    element, kind = best, ""
+    if best.startswith("segment"):
+        element, _, kind = best.partition(", ")
     extent = element_extent(rig, element)
     return MismatchLocation(element, extent, kind, log_bayes_factors, profile)
 

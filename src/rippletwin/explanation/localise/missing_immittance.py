@@ -186,6 +186,8 @@ def _changed_quantity(without: FrequencyDomainLine, changed: FrequencyDomainLine
         return f"{kind} {name}", f"{float(x):.2f} m from the pump", unit, over(value)
     if changed.load is not without.load:
         (p1, q1), (p0, q0) = changed.load_state(), without.load_state()
+        if without.load[0] == "closed":  # it has no impedance
+            return "admittance of the load", "load", "m3/(Pa s)", over(q1 / p1)
         return "impedance of the load", "load", "Pa s/m3", over(p1 / q1) - over(p0 / q0)
     return None
 
@@ -204,7 +206,10 @@ def _interpolate_networks(
     load = without.load
     if changed.load is not without.load:
         (p1, q1), (p0, q0) = changed.load_state(), without.load_state()
-        load = "impedance", mix(p0 / q0, p1 / q1)
+        if without.load[0] == "closed":
+            load = "admittance", share * q1 / p1
+        else:
+            load = "impedance", mix(p0 / q0, p1 / q1)
     return replace(
         without,
         series=mix(without.series, changed.series),

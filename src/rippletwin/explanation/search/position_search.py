@@ -1,8 +1,8 @@
 """Search over local modes along the position of an accepted effect.
 
-The posterior of a position has about one local mode per wavelength along the line. The stepwise
-search may end in a wrong one, because the effect was added to a line whose parameters were biased
-by its absence. With few sensors several positions may fit equally well.
+The posterior of a position has about one local mode per half wavelength along the line. The
+stepwise search may end in a wrong one, because the effect was added to a line whose parameters were
+biased by its absence. With few sensors several positions may fit equally well.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ def move_to_best_position(workers: Workers, best: Fit) -> tuple[Fit, list[Fit]]:
 
 
 def fit_other_positions(workers: Workers, best: Fit) -> list[Fit]:
-    """Fits with one effect started at every wavelength along the line, best first.
+    """Fits with one effect started at STARTS_PER_WAVELENGTH positions a wavelength along the line,
+    best first.
 
     The list has neither `best` nor two fits at the same positions. It is empty for a line with
     nonlinear compliance, where each fit would take long.

@@ -13,6 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from rippletwin.calibration.fit import Fit
+from rippletwin.errors import InputError
 from rippletwin.explanation.fit_jobs import (
     Continuation,
     FitJob,
@@ -45,11 +46,19 @@ def fit_single_effects(
     """The base, the fit with the usual effects that the data show, and the fits of each other of
     `candidates` beside these, best first.
 
-    The second is the base where the data show none; the fits then are of each effect alone.
+    The second is the base where the data show none; the fits then are of each effect alone. Raises
+    InputError where no fit finds a steady state of the line.
     """
     usual = [c for c in candidates if c[0].usual(workers.base.rig, c[1])]
     jobs = [FitJob(()), *(FitJob((c,)) for c in usual)]
     base, *fits = workers.fit(jobs, progress_callback(progress, "usual effects", len(jobs)))
+    if not any(np.isfinite(fit.evidence) for fit in (base, *fits)):
+        raise InputError(
+            "rig.yaml",
+            "load_pressure, flow_ripple",
+            "no steady state of the line was found, whatever its numbers are",
+            "Correct load_pressure, flow_ripple or load.coefficient",
+        )
     start = _add_usual_effects(workers, base, fits)
     if not start.hypothesis:
         base, fits = _fit_each_alone(workers, base, fits, candidates, progress)

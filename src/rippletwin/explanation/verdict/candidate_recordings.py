@@ -23,6 +23,7 @@ HIGHEST_HZ = 4000.0  # of a proposed recording
 RANDOM_RANGE_HZ = (30.0, HIGHEST_HZ)
 RANDOM_BINS = 150  # independent frequencies of a random recording
 SAME_POINT_DISTANCE = 0.05  # in logarithms of speed and pressure
+LEAST_DROP = 0.05  # of the load pressure: what an orifice needs to have
 NEW_LABEL = "next recording"
 
 
@@ -84,8 +85,12 @@ def _operating_points(twin: Twin, periodic: Sequence[Observation]) -> list:
     loads: list[float | None] = [None]
     if pressures:
         loads = [float(f"{np.median(pressures) * factor:.2g}") for factor in PRESSURE_FACTORS]
+        if twin.rig.load.kind == "orifice":  # which passes flow from the line alone
+            back = twin.rig.load.back_pressure
+            loads = [p for p in loads if p - back > LEAST_DROP * p]
     candidates = []
-    for rpm in sorted(rpms - {0.0}):
+    highest = 60.0 * HIGHEST_HZ / twin.rig.pump["pistons"]  # above it no harmonic is used
+    for rpm in sorted(rpm for rpm in rpms if 0.0 < rpm <= highest):
         for load in loads:
             nearest = min(periodic, key=lambda o: _distance(o, rpm / 60, load))
             if _distance(nearest, rpm / 60, load) < SAME_POINT_DISTANCE:

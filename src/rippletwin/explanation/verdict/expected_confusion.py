@@ -191,7 +191,7 @@ def _coordinate(prior, strength: float) -> float:
     """Coordinate of an effect's parameter at a strength; a prior about zero has no median size."""
     if prior.kind == "lognormal":
         return strength
-    centred = prior.kind == "normal" and prior.centre == 0.0
+    centred = prior.kind in ("normal", "bounded") and prior.centre == 0.0
     return float(np.exp(min(strength, 1.0))) if centred else 0.0
 
 

@@ -72,6 +72,9 @@ def propose_recording(
         )
 
     candidates = list_candidate_recordings(accepted.twin, observations)
+    if any(e.element == "load" for fit in (accepted, *rivals) for e, _ in fit.hypothesis):
+        # at another end an effect at the load is not there
+        candidates = [c for c in candidates if c[1].load is accepted.twin.rig.load]
     if any(parameter.place == "pump" for parameter in accepted.twin.parameters):
         # How its numbers change the ripple at a new operating point takes many runs of the pump.
         candidates.sort(key=lambda each: -loss(each, uncertain_pump=False))
@@ -156,6 +159,7 @@ def transfer_twin(
         effects=old.effects,
         source_sd=old.source_sd,
         guessed_load=old.guessed_load and rig.load.kind == "orifice",
+        absolute_gains=old.absolute_gains,
         uncertain_pump=old.uncertain_pump and uncertain_pump,
         changing_state=old.changing_state,
     )

@@ -274,10 +274,8 @@ def _pulls(e: Explanation, is_off_data_sheet: bool = False) -> list[str]:
         is_told = pull > PULL_ALARM
     if not is_told:
         return []
-    return [
-        f"Check the {name_parameter(name)}: it is {pull:.1f} standard deviations from the data "
-        "sheet."
-    ]
+    whose = "that of the other recordings" if name.startswith("state[") else "the data sheet"
+    return [f"Check the {name_parameter(name)}: it is {pull:.1f} standard deviations from {whose}."]
 
 
 def _effects(e: Explanation, entries: Sequence[dict]) -> str:

@@ -137,7 +137,8 @@ def _next_recording(e: Explanation, places: tuple) -> str | None:
     verdict, accepted = e.decision.verdict, e.decision.accepted
     proposal = None
     if verdict == "ambiguous" or places:
-        proposal = propose_recording(accepted, rival_fits(e.search), e.observations)
+        # rivals are of the best explanation, without a network that stands in
+        proposal = propose_recording(e.search.best, rival_fits(e.search), e.observations)
     elif verdict == "unexplained" and accepted.hypothesis:
         effect, _ = accepted.hypothesis[-1]
         if effect.named:

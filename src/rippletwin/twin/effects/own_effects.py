@@ -13,6 +13,7 @@ from rippletwin.twin.parameters import Parameter
 ELEMENTS = ("line", "segment", "position", "load", "source", "sensor")
 MEDIA = ("liquid", "gas", "any")
 TRIED_HZ = np.linspace(20.0, 4000.0, 60)
+TRIED_PRESSURE = 1e7  # Pa, of a liquid
 TRIED_COORDINATES = (0.0, -1.0, 1.0)  # of all parameters at once
 ROUNDING = 1e-9  # relative, of a real part that should not be negative
 
@@ -118,6 +119,7 @@ def _lossless_line(rig, matched: bool) -> tuple[FrequencyDomainLine, LineState]:
         orders=np.arange(1, len(s) + 1),
         recording=np.zeros(len(s), int),
         mean_flow=np.full(len(s), last.area),  # at a metre a second
+        mean_pressure=0.0 if fluid.is_gas else TRIED_PRESSURE,
     )
     return line, state
 
