@@ -179,10 +179,13 @@ def test_what_a_recording_is_called_after_and_where_it_lies_makes_no_difference(
 
 def test_the_workflow_diagnoses_what_is_new(case, asked, monkeypatch):
     """The script's second run, on a case with one recording more; diagnosis.json has all three, and
-    the warning that the pump is a generic one."""
+    the warnings that the pump is a generic one and that the healthy recordings contradict
+    themselves, as the verdict says."""
     read = load_case(case)
     monkeypatch.setattr("rippletwin.twin.twin_file.load_twin", lambda *files: Twin(read.rig))
     monkeypatch.setattr("rippletwin.figures.fault_posterior.draw", lambda numbers, folder: [])
+
+    (case / "verdict.json").write_text('{"verdict": "bad_data"}')
 
     def job():
         run_script(
@@ -193,6 +196,7 @@ def test_the_workflow_diagnoses_what_is_new(case, asked, monkeypatch):
             params={"faults": []},
             rig=str(case / "rig.yaml"),
             twin="",
+            verdict=str(case / "verdict.json"),
         )
         return json.loads((case / "out" / "diagnosis.json").read_text())
 
@@ -207,3 +211,4 @@ def test_the_workflow_diagnoses_what_is_new(case, asked, monkeypatch):
     assert [each["label"] for each in written["recordings"]] == [*UNKNOWN, "third"]
     assert asked == ["twin", *UNKNOWN, "third"]
     assert any("generic pump" in warning for warning in written["warnings"])
+    assert any("contradict themselves" in warning for warning in written["warnings"])
