@@ -10,9 +10,8 @@ Its arguments are a case, an output folder and the columns, METHOD@TWIN. METHOD 
 and TWIN one of `diagnosis_trial.twins`. Writes diagnosis.json, column -> {"recordings": [...]}: of
 `anchored` and `unanchored` the entries of `rippletwin diagnose` with the log odds against healthy,
 of a network the keys that are scored (`networks.ask_network`), of a column that ended with an error
-label and state alone; and run.json, column ->
-the processor seconds that twin and diagnoses took and the twin's misfit. It runs in one process:
-its confinement has no shared memory.
+label and state alone; and run.json, column -> the processor seconds that twin and diagnoses took
+and the twin's misfit. It runs in one process: its confinement has no shared memory.
 """
 
 import json

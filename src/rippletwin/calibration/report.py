@@ -78,13 +78,9 @@ def parameter_table(calibration: Calibration) -> list[dict]:
     ]
 
 
-def finite_or_none(value: float) -> float | None:
-    """A number that JSON has; None where no steady state was found."""
-    return value if np.isfinite(value) else None
-
-
 def to_dict(calibration: Calibration) -> dict:
     """A calibration as plain data; `twin_file.twin_of` makes a twin of it again."""
+    objective = calibration.objective  # not finite where no steady state was found
     return {
         "twin": twin_file.to_dict(calibration.twin),
         "covariance": calibration.covariance.tolist(),
@@ -93,7 +89,7 @@ def to_dict(calibration: Calibration) -> dict:
         "load": None if calibration.load is None else calibration.load.as_dict(),
         "error_floor": calibration.model_error,
         "source_sd": calibration.source_sd,
-        "minus_log_posterior": finite_or_none(calibration.objective),
+        "minus_log_posterior": objective if np.isfinite(objective) else None,
         "fit": {"before": _misfit(calibration.before), "after": _misfit(calibration.after)},
         "warnings": list(calibration.warnings),
     }

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import yaml
 
+from rippletwin.case.plausibility import PUMP_SIZE
 from rippletwin.errors import InputError
 
 GENERIC_PUMP = {
@@ -95,8 +96,7 @@ class NewSheet:
     @property
     def displacement(self) -> float | None:
         """What the pump displaces in one revolution, m3; None where its geometry is not known."""
-        keys = ("pistons", "piston_diameter", "pitch_radius", "swash_angle_deg")
-        known = [self.pump.get(key) for key in keys]
+        known = [self.pump.get(key) for key in ("pistons", *PUMP_SIZE)]
         if None in known:
             return None
         pistons, bore, radius, angle = known

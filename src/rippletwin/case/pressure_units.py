@@ -104,10 +104,10 @@ def mean_warnings(recording: Recording, rig: Rig) -> list[str]:
     if recording.pressure is None or load is None or not rig.sensors:
         return []
     means = [float(np.mean(row, dtype=float)) for row in recording.pressure]
-    coupled = [abs(m) > SURE_MEAN * np.std(row) for m, row in zip(means, recording.pressure)]
-    if not all(coupled):  # the mean of an AC-coupled sensor is next to none
-        return []
     if max(means) >= LEAST_MEAN * load and min(means) <= MOST_MEAN * load + LARGEST_FALL:
+        return []
+    coupled = (abs(m) > SURE_MEAN * np.std(row) for m, row in zip(means, recording.pressure))
+    if not all(coupled):  # the mean of an AC-coupled sensor is next to none
         return []
     shown = ", ".join(f"{sensor.name} {mean / 1e5:.4g}" for sensor, mean in zip(rig.sensors, means))
     return [

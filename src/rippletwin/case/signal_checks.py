@@ -44,10 +44,9 @@ def sampling_rate(path: Path, signals: Signals, stated: float | None) -> float:
         )
     for claim, rate in claims:
         if not RATES_HZ[0] <= rate <= RATES_HZ[1]:
-            by_time = claim == TIME_COLUMN
-            looks = "times in ms" if by_time else "kHz"
-            remedy = "Give samples a second, Hz"
-            if by_time:
+            looks, remedy = "kHz", "Give samples a second, Hz"
+            if claim == TIME_COLUMN:
+                looks = "times in ms"
                 remedy = "Give times in seconds, or leave them out and give sampling_rate_hz"
             is_thousandth = RATES_HZ[0] <= 1000 * rate <= 1e6
             raise InputError(

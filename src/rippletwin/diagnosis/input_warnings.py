@@ -33,7 +33,7 @@ def find_warnings(
     ]
     if changed:
         found.append(
-            f"rig.yaml: {', '.join(changed)} differ from what the twin was made with, and the "
-            "twin's count; explain or calibrate again for a twin of this data sheet"
+            f"rig.yaml: the twin was made with other values of {', '.join(changed)}, and these "
+            "count; explain or calibrate again for a twin of this data sheet"
         )
     return list(dict.fromkeys([*found, *case.warnings, *warn_of_pump(twin.rig.pump)]))

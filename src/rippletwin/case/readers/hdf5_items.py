@@ -45,9 +45,7 @@ def find_dataset(path: Path, file: h5py.File, name: str) -> h5py.Dataset | None:
     item = _item(path, file, name)
     if item is None:
         return None
-    if not isinstance(item, h5py.Dataset):
-        if not isinstance(item, h5py.Group):
-            raise InputError(path, name, "a data type, not a dataset", HERE)
+    if isinstance(item, h5py.Group):
         inside = names_in(item)
         example = f"{name.strip('/')}/{inside[0]}" if inside else "GROUP/DATASET"
         raise InputError(
@@ -56,6 +54,8 @@ def find_dataset(path: Path, file: h5py.File, name: str) -> h5py.Dataset | None:
             f"a group that holds {', '.join(inside) or 'nothing'}, not a dataset",
             f"Name a dataset in it: dataset: {example}, or channels: {{SENSOR: {example}}}",
         )
+    if not isinstance(item, h5py.Dataset):
+        raise InputError(path, name, "a data type, not a dataset", HERE)
     if item.file.filename != file.filename or item.is_virtual or item.external:
         raise InputError(path, name, "its data lie in another file", HERE)
     if item.shape is None or not item.size:

@@ -38,6 +38,7 @@ PASSAGES_BEFORE_DECAY = 3.0  # passages of the line before a wave has decayed
 EDGE_SHARE = 0.02  # of a signal's range, at either end
 PLATEAU_CROWDING = 8.0  # of samples within EDGE_SHARE of the end over those in the next EDGE_SHARE
 PLATEAU_SHARE = 0.03  # of all samples
+BLOCK = 2**20  # samples that are looked at together: long recordings fill the memory
 
 
 def find_contradictions(
@@ -57,9 +58,7 @@ def find_contradictions(
     """
     delay = rig.delay
     pressures = [o for o in observations if o.kind != "input_impedance"]
-    reasons = [
-        find_clipping_plateau(r, sensor, row) for r in recordings for sensor, row in _rows(rig, r)
-    ]
+    reasons = find_plateaus(rig, recordings)
     reasons += [
         check(o)
         for o in pressures
@@ -199,19 +198,29 @@ def find_clipping_plateau(recording, sensor: str, row: np.ndarray) -> str:
     step = EDGE_SHARE * (high - low)
     if step == 0:
         return ""
-    for side, x in (("top", high - row), ("bottom", row - low)):
-        outer, next_ = np.count_nonzero(x < step), np.count_nonzero((x >= step) & (x < 2 * step))
-        if outer > PLATEAU_SHARE * row.size and outer > PLATEAU_CROWDING * max(int(next_), 1):
+    counts = np.zeros((2, 2), int)  # of the outermost samples and of the next, at top and bottom
+    for begin in range(0, row.size, BLOCK):
+        block = row[begin : begin + BLOCK]
+        for end, x in zip(counts, (high - block, block - low)):
+            outer, both = np.count_nonzero(x < step), np.count_nonzero(x < 2 * step)
+            end += outer, both - outer
+    for side, (outer, next_) in zip(("top", "bottom"), counts):
+        if outer > PLATEAU_SHARE * row.size and outer > PLATEAU_CROWDING * max(next_, 1):
             return f"sensor {sensor} is clipped at the {side} in {recording.label}"
     return ""
 
 
+def find_plateaus(rig, recordings: Sequence) -> list[str]:
+    """`find_clipping_plateau` of each sensor of recordings as read, where it is not ""."""
+    found = (
+        find_clipping_plateau(r, sensor, row) for r in recordings for sensor, row in _rows(rig, r)
+    )
+    return [each for each in found if each]
+
+
 def plateau_warnings(rig, recordings: Sequence) -> list[str]:
     """A line for every clipped signal with noise of recordings as read."""
-    found = [
-        find_clipping_plateau(r, sensor, row) for r in recordings for sensor, row in _rows(rig, r)
-    ]
-    return [f"{each}; record again with a larger range" for each in found if each]
+    return [f"{each}; record again with a larger range" for each in find_plateaus(rig, recordings)]
 
 
 def _rows(rig, recording) -> list:
