@@ -144,8 +144,8 @@ def warn_of_pump(pump: Mapping) -> list[str]:
             "revolution; give piston_diameter, pitch_radius and swash_angle_deg"
         ]
     return [
-        f"pump: {', '.join(missing)} not given, so that size and flow are those of a generic pump "
-        "of 42 cm3 per revolution; give piston_diameter, pitch_radius and swash_angle_deg, or "
+        f"pump: {', '.join(missing)} not given, so that numbers of a generic pump of 42 cm3 per "
+        "revolution take their place; give piston_diameter, pitch_radius and swash_angle_deg, or "
         "pistons alone"
     ]
 
